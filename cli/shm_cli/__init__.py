@@ -1,0 +1,1 @@
+"""The shm command line: one module a verb."""

@@ -1,0 +1,303 @@
+"""JSON documents of the values: modal tests (`shm.modes/1`), posteriors, drifts, alerts.
+
+Unknown numbers are null in JSON and NaN in memory. Reading checks everything and names the test,
+mode and key at fault.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.values import (
+    NAN,
+    PLANES,
+    AddedMass,
+    Alert,
+    Drift,
+    FloatArray,
+    ModalTest,
+    Mode,
+    Posterior,
+    Selection,
+    ShapePoint,
+)
+
+MODES_SCHEMA = "shm.modes/1"
+
+
+def dump(document: object) -> str:
+    """A document as JSON text: two-space indent, NaN as null."""
+    return json.dumps(_clean(document), indent=2, allow_nan=False)
+
+
+def _clean(node: object) -> object:
+    """`node` with what JSON cannot hold replaced: NaN by null, times by ISO texts."""
+    if isinstance(node, Mapping):
+        return {str(key): _clean(value) for key, value in node.items()}
+    if isinstance(node, list | tuple):
+        return [_clean(value) for value in node]
+    if isinstance(node, datetime):
+        return format_time(node)
+    if isinstance(node, float | np.floating):
+        return float(node) if math.isfinite(node) else None
+    return int(node) if isinstance(node, np.integer) else node
+
+
+def format_time(time: datetime | None) -> str | None:
+    """A time as ISO 8601 in UTC with a trailing Z."""
+    if time is None:
+        return None
+    return time.astimezone(UTC).isoformat().replace("+00:00", "Z")
+
+
+def parse_time(text: str) -> datetime:
+    """An ISO 8601 text as a UTC time; a text without zone is taken as UTC. Raises ValueError."""
+    time = datetime.fromisoformat(text)
+    return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
+
+
+# ---------------------------------------------------------------- modal tests
+
+
+def modes_document(tests: Sequence[ModalTest]) -> dict[str, Any]:
+    """The `shm.modes/1` document of tests of one hanger."""
+    hanger = tests[0].hanger if tests else None
+    return {
+        "schema": MODES_SCHEMA,
+        "hanger": hanger,
+        "tests": [test_document(test) for test in tests],
+    }
+
+
+def test_document(test: ModalTest) -> dict[str, Any]:
+    """One entry of a modal-tests document."""
+    document = asdict(test)
+    document.pop("hanger")
+    if test.added_mass is None:
+        document.pop("added_mass")
+    return document
+
+
+def load_modes(path: Path) -> tuple[ModalTest, ...]:
+    """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as error:
+        raise BadInput(
+            f"not JSON: {error.msg}.", file=path, line=error.lineno, remedy="Write it anew."
+        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"cannot be read: {error}.", file=path, remedy="Check the path.") from error
+    return parse_modes(document, path)
+
+
+def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
+    """The tests of a modal-tests document already parsed from JSON; raises BadInput."""
+    if not isinstance(document, dict) or document.get("schema") != MODES_SCHEMA:
+        raise BadInput(
+            f"not a modal-tests document of schema {MODES_SCHEMA}.",
+            file=file,
+            remedy="Make one with `shm identify FILE --json`.",
+        )
+    hanger = document.get("hanger")
+    if hanger is not None and (not isinstance(hanger, int) or isinstance(hanger, bool)):
+        raise BadInput(
+            f"hanger = {hanger!r} is not a whole number.", file=file, remedy="Give its number."
+        )
+    tests = document.get("tests")
+    if not isinstance(tests, list) or not tests:
+        raise BadInput(
+            "the list `tests` is missing or empty.", file=file, remedy="Give at least one test."
+        )
+    return tuple(_parse_test(test, hanger, index, file) for index, test in enumerate(tests))
+
+
+def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> ModalTest:
+    label = f"tests[{index}]"
+    if not isinstance(test, dict) or not isinstance(test.get("modes"), list) or not test["modes"]:
+        raise BadInput(
+            f"{label} has no list `modes`.", file=file, remedy="Give its modes or drop the test."
+        )
+    modes = tuple(
+        _parse_mode(mode, f"{label}.modes[{i}]", file) for i, mode in enumerate(test["modes"])
+    )
+    keys = [(mode.plane, mode.order) for mode in modes]
+    for plane, order in keys:
+        if keys.count((plane, order)) > 1:
+            raise BadInput(
+                f"{label}: {plane} mode {order} is given twice.", file=file, remedy="Keep one."
+            )
+    return ModalTest(
+        id=str(test.get("id", f"t{index + 1}")),
+        modes=modes,
+        hanger=hanger,
+        time=_time(test.get("time"), label, file),
+        temperature_c=_number(test, "temperature_c", label, file),
+        amplitude=_number(test, "amplitude", label, file),
+        added_mass=_added_mass(test.get("added_mass"), label, file),
+    )
+
+
+def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
+    if not isinstance(mode, dict) or mode.get("plane") not in PLANES:
+        raise BadInput(
+            f"{label}: plane must be one of {', '.join(PLANES)}.", file=file, remedy="Correct it."
+        )
+    order = mode.get("order")
+    if not isinstance(order, int) or isinstance(order, bool) or order < 1:
+        raise BadInput(f"{label}: order must be 1, 2, 3, ...", file=file, remedy="Correct it.")
+    frequency = _number(mode, "frequency_hz", label, file)
+    if not frequency > 0:
+        raise BadInput(f"{label}: frequency_hz must be positive.", file=file, remedy="Correct it.")
+    frequency_sd = _number(mode, "frequency_sd_hz", label, file)
+    if frequency_sd < 0:
+        raise BadInput(
+            f"{label}: frequency_sd_hz is negative.",
+            file=file,
+            remedy="Leave it out where unknown.",
+        )
+    return Mode(
+        plane=mode["plane"],
+        order=order,
+        frequency_hz=frequency,
+        frequency_sd_hz=frequency_sd,
+        damping_ratio=_number(mode, "damping_ratio", label, file),
+        damping_sd=_number(mode, "damping_sd", label, file),
+        shape=tuple(
+            _shape_point(p, f"{label}.shape[{i}]", file)
+            for i, p in enumerate(mode.get("shape") or ())
+        ),
+    )
+
+
+def _shape_point(point: Any, label: str, file: str | Path) -> ShapePoint:
+    if not isinstance(point, dict):
+        raise BadInput(f"{label} is not an object.", file=file, remedy="Give x_m and value.")
+    return ShapePoint(
+        **{key: _number(point, key, label, file) for key in ("x_m", "value", "cross", "sd")}
+    )
+
+
+def _added_mass(mass: Any, label: str, file: str | Path) -> AddedMass | None:
+    if mass is None:
+        return None
+    label = f"{label}.added_mass"
+    if not isinstance(mass, dict):
+        raise BadInput(f"{label} is not an object.", file=file, remedy="Give mass_kg and x_m.")
+    values = {key: _number(mass, key, label, file) for key in ("mass_kg", "x_m")}
+    if not values["mass_kg"] > 0 or not values["x_m"] >= 0:
+        raise BadInput(
+            f"{label} needs a positive mass_kg and an x_m.",
+            file=file,
+            remedy="Give both, in kg and m.",
+        )
+    return AddedMass(**values)
+
+
+def _number(table: Mapping[str, Any], key: str, label: str, file: str | Path) -> float:
+    value = table.get(key)
+    if value is None:
+        return NAN
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    raise BadInput(
+        f"{label}: {key} = {value!r} is not a number.",
+        file=file,
+        remedy="Leave it out where unknown.",
+    )
+
+
+def _time(text: Any, label: str, file: str | Path) -> datetime | None:
+    if text is None:
+        return None
+    try:
+        return parse_time(text)
+    except (TypeError, ValueError):
+        raise BadInput(
+            f"{label}: time = {text!r} is not an ISO 8601 time.",
+            file=file,
+            remedy="Write 2026-05-01T10:00:00Z.",
+        ) from None
+
+
+# ---------------------------------------------------------------- posteriors
+
+
+def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
+    """Mean, standard deviation, quantiles and most probable value of samples (samples,)."""
+    q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
+    return {
+        "mean": float(samples.mean()),
+        "sd": float(samples.std(ddof=1)),
+        "q05": float(q05),
+        "q50": float(q50),
+        "q95": float(q95),
+        "map": float(most_probable),
+    }
+
+
+def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[str, Any]:
+    """The document of `shm update --json`; `probability` is known after a selection only."""
+    most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    return {
+        "model": posterior.model,
+        "hanger": posterior.hanger,
+        "tests": list(posterior.tests),
+        "tension_n": summary(
+            posterior.tension_n, most_probable["theta_F"] * posterior.nominal_tension_n
+        ),
+        "nominal_tension_n": posterior.nominal_tension_n,
+        "parameters": {
+            name: summary(posterior.parameter(name), most_probable[name])
+            for name in posterior.names
+        },
+        "log_evidence": posterior.log_evidence,
+        "log_evidence_sd": posterior.log_evidence_sd,
+        "probability": probability,
+        "samples": len(posterior.samples),
+        "effective_sample_size": posterior.effective_sample_size,
+        "r_hat": posterior.r_hat,
+        "evaluations": posterior.evaluations,
+        "predicted": [
+            {
+                "plane": p.plane,
+                "order": p.order,
+                "frequency_hz": {"mean": p.mean_hz, "sd": p.sd_hz},
+                "measured_hz": p.measured_hz,
+            }
+            for p in posterior.predicted
+        ],
+        "seconds": posterior.seconds,
+        "seed": posterior.seed,
+    }
+
+
+def selection_document(selection: Selection) -> dict[str, Any]:
+    """The document of `shm select --json`."""
+    pairs = zip(selection.posteriors, selection.probabilities, strict=True)
+    return {
+        "models": [posterior_document(posterior, probability) for posterior, probability in pairs],
+        "selected": selection.selected.model,
+    }
+
+
+# ---------------------------------------------------------------- drift
+
+
+def drift_document(drift: Drift) -> dict[str, Any]:
+    """One row of `shm drift --json`."""
+    return asdict(drift)
+
+
+def alert_document(alert: Alert) -> dict[str, Any]:
+    """What a hook gets on its standard input."""
+    return {"schema": "shm.alert/1", **asdict(alert)}

@@ -1,0 +1,104 @@
+"""The error tree. Each message says what is wrong, where, and what to do.
+
+ShmError                      exit code 1
+├── UsageError                2   the call itself is off
+├── BadInput                  3   a file, channel, line or value that cannot be used
+│   └── NotIdentifiable       3   a readable recording in which no mode can be trusted
+├── NothingThere              4   a right question that has no answer yet
+├── StoreError                5   the store cannot be used
+│   ├── SchemaOutdated        5   mend: `shm db upgrade`
+│   └── StoreBusy             5   passing: try again after `retry_after_s`
+└── GateNotMet                6   a validation or a blind trial missed its mark
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class ShmError(Exception):
+    """Base of all errors that shm raises on purpose.
+
+    `remedy` says what to do; `retry_after_s` is None where trying again cannot help.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, remedy: str = "", retry_after_s: float | None = None):
+        super().__init__(message)
+        self.message = message
+        self.remedy = remedy
+        self.retry_after_s = retry_after_s
+
+    @property
+    def where(self) -> str:
+        """File, channel and line of the fault, as far as they are known."""
+        return ""
+
+    def __str__(self) -> str:
+        where = f"{self.where}: " if self.where else ""
+        remedy = f" {self.remedy}" if self.remedy else ""
+        return f"{where}{self.message}{remedy}"
+
+
+class UsageError(ShmError):
+    """The command or call was put together wrongly."""
+
+    exit_code = 2
+
+
+class BadInput(ShmError):
+    """A file or value that cannot be used, with the place of the fault."""
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | Path = "",
+        channel: str = "",
+        line: int | None = None,
+        remedy: str = "",
+    ):
+        super().__init__(message, remedy=remedy)
+        self.file = str(file)
+        self.channel = channel
+        self.line = line
+
+    @property
+    def where(self) -> str:
+        parts = [Path(self.file).name if self.file else ""]
+        parts.append(f"line {self.line}" if self.line is not None else "")
+        parts.append(f"channel {self.channel}" if self.channel else "")
+        return ", ".join(part for part in parts if part)
+
+
+class NotIdentifiable(BadInput):
+    """A recording that reads well but holds no mode that can be trusted."""
+
+
+class NothingThere(ShmError):
+    """Nothing has been stored yet that answers the question."""
+
+    exit_code = 4
+
+
+class StoreError(ShmError):
+    """The store cannot be opened, read or written."""
+
+    exit_code = 5
+
+
+class SchemaOutdated(StoreError):
+    """The store was written by another version of shm."""
+
+
+class StoreBusy(StoreError):
+    """Another process holds the store; trying again helps."""
+
+
+class GateNotMet(ShmError):
+    """A measured figure missed the mark that was set for it."""
+
+    exit_code = 6

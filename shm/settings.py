@@ -1,0 +1,139 @@
+"""The one table of settings: name, default, unit, help, range.
+
+A value comes from the flag, else the environment (`SHM_<NAME>`), else the table `[settings]` of
+`bridge.toml`, else the default here. Help texts and docs are made from `TABLE`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from shm.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One row of the table; `low` and `high` bound numbers, both included."""
+
+    name: str
+    default: float | int | str
+    unit: str
+    help: str
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def environment_variable(self) -> str:
+        return f"SHM_{self.name.upper()}"
+
+    def parse(self, raw: Any, source: str) -> Any:
+        """`raw` as a value of this setting's type; raises BadInput naming `source`."""
+        try:
+            value = type(self.default)(raw)
+        except (TypeError, ValueError):
+            raise self._refusal(raw, source) from None
+        rounded = isinstance(raw, float) and value != raw
+        if rounded or (isinstance(value, int | float) and not self._holds(value)):
+            raise self._refusal(raw, source)
+        return value
+
+    def _holds(self, value: float) -> bool:
+        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+    def _refusal(self, raw: object, source: str) -> BadInput:
+        kind = {int: "a whole number", float: "a number", str: "a text"}[type(self.default)]
+        bounds = "" if self.low is None else f" from {self.low:g}"
+        bounds += "" if self.high is None else f" to {self.high:g}"
+        return BadInput(
+            f"setting {self.name} = {raw!r} is not {kind}{bounds}.",
+            file=source,
+            remedy=f"Give {kind}{bounds}; the default is {self.default}.",
+        )
+
+
+def _row(
+    default: float | int | str, unit: str, help_text: str, low: float | None, high: float | None
+) -> Any:
+    return field(
+        default=default, metadata={"unit": unit, "help": help_text, "low": low, "high": high}
+    )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The values in force; each field is a row of `TABLE`: default, unit, help, low, high."""
+
+    spool_scan_seconds: float = _row(2.0, "s", "how often the spool is scanned", 0.05, 3600)
+    spool_stable_seconds: float = _row(
+        2.0, "s", "a file is whole once unchanged for so long", 0, 3600
+    )
+    future_tolerance_seconds: float = _row(
+        3600.0, "s", "how far ahead of the clock a test may claim to be", 0, None
+    )
+    max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
+    band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
+    band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
+    models: str = _row("beam1,beam2", "", "model classes that compete", None, None)
+    samples: int = _row(1000, "", "posterior samples kept a test and class", 100, 1_000_000)
+    seed: int = _row(1, "", "seed of the random numbers", 0, None)
+    workers: int = _row(1, "", "processes that identify and update", 1, 64)
+    baseline_tests: int = _row(1, "", "how many first tests form the baseline", 1, 1000)
+    hook_timeout_seconds: float = _row(30.0, "s", "a hook is ended after so long", 0.1, 3600)
+    hook_attempts: int = _row(8, "", "deliveries of one alert to one hook at most", 1, 1000)
+    hook_backoff_seconds: float = _row(
+        5.0, "s", "wait after a failed delivery, doubled each time", 0, 86400
+    )
+
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        return tuple(name.strip() for name in self.models.split(",") if name.strip())
+
+
+TABLE: tuple[Setting, ...] = tuple(
+    Setting(row.name, row.default, **row.metadata)  # type: ignore[arg-type]
+    for row in fields(Settings)
+)
+
+
+def load_settings(
+    file_table: Mapping[str, object] | None = None,
+    flags: Mapping[str, object] | None = None,
+    environment: Mapping[str, str] | None = None,
+    source: str = "bridge.toml",
+) -> Settings:
+    """The settings in force; raises BadInput for an unknown name or a value out of range."""
+    environment = os.environ if environment is None else environment
+    file_table = file_table or {}
+    flags = {name: value for name, value in (flags or {}).items() if value is not None}
+    _refuse_unknown({**file_table, **flags}, source)
+    return Settings(
+        **{row.name: _value(row, file_table, flags, environment, source) for row in TABLE}
+    )
+
+
+def _value(
+    row: Setting,
+    file_table: Mapping[str, object],
+    flags: Mapping[str, object],
+    environment: Mapping[str, str],
+    source: str,
+) -> Any:
+    if row.name in flags:
+        return row.parse(flags[row.name], "command line")
+    if row.environment_variable in environment:
+        return row.parse(environment[row.environment_variable], row.environment_variable)
+    return row.parse(file_table.get(row.name, row.default), source)
+
+
+def _refuse_unknown(names: Mapping[str, object], source: str) -> None:
+    known = {row.name for row in TABLE}
+    for name in names:
+        if name not in known:
+            raise BadInput(
+                f"unknown setting {name!r}.",
+                file=source,
+                remedy=f"Known: {', '.join(sorted(known))}.",
+            )

@@ -1,0 +1,262 @@
+"""The nouns that flow between the steps: frozen, complete at birth, SI units in their names.
+
+Arrays are numpy arrays whose shapes stand beside them. An unknown number is NaN, an unknown thing
+is None; neither is ever 0. Times are timezone-aware UTC. `x_m` runs along the hanger from the deck
+end (0) to the arch end (its length).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+ComplexArray: TypeAlias = NDArray[np.complex128]
+Plane: TypeAlias = Literal["transverse", "longitudinal"]
+Quantity: TypeAlias = Literal["force", "acceleration"]
+
+PLANES: tuple[Plane, Plane] = ("transverse", "longitudinal")
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """How large a shift of this hanger matters, and how sure one must be to say so."""
+
+    tension_shift_fraction: float = 0.05
+    stiffness_shift_decades: float = 0.5
+    alert_probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class Hanger:
+    """One hanger as its owner describes it: geometry, material, nominal tension."""
+
+    id: int
+    length_m: float
+    elastic_modulus_pa: float
+    area_m2: float
+    second_moment_m4: float
+    mass_per_length_kg_m: float
+    nominal_tension_n: float
+    name: str = ""
+    thresholds: Thresholds = field(default_factory=Thresholds)
+
+    @property
+    def bending_stiffness_n_m2(self) -> float:
+        return self.elastic_modulus_pa * self.second_moment_m4
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One sensor of a recording; `values` has shape (samples,), in N or m/s^2, NaN where bad."""
+
+    name: str
+    quantity: Quantity
+    values: FloatArray
+    plane: Plane | None = None
+    x_m: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Force and accelerations over time, as received; one file, one or many hits."""
+
+    source: str
+    channels: tuple[Channel, ...]
+    sampling_rate_hz: float
+    hanger: int | None = None
+    time: datetime | None = None
+    temperature_c: float = NAN
+
+    @property
+    def force(self) -> Channel | None:
+        return next((c for c in self.channels if c.quantity == "force"), None)
+
+    @property
+    def accelerations(self) -> tuple[Channel, ...]:
+        return tuple(c for c in self.channels if c.quantity == "acceleration")
+
+    @property
+    def samples(self) -> int:
+        return len(self.channels[0].values) if self.channels else 0
+
+    @property
+    def duration_s(self) -> float:
+        return self.samples / self.sampling_rate_hz
+
+
+@dataclass(frozen=True)
+class ResponsePoint:
+    """Where a response was measured, or (roving hammer, by reciprocity) where it was excited."""
+
+    name: str
+    plane: Plane | None = None
+    x_m: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Accelerance of each response to the hammer force.
+
+    `frequency_hz` (lines,), evenly spaced from 0; `accelerance` (points, lines), complex, in
+    m/s^2/N; `coherence` (points, lines) or None where the averages are not known.
+    """
+
+    source: str
+    points: tuple[ResponsePoint, ...]
+    frequency_hz: FloatArray
+    accelerance: ComplexArray
+    coherence: FloatArray | None = None
+    hanger: int | None = None
+    time: datetime | None = None
+    temperature_c: float = NAN
+
+
+@dataclass(frozen=True)
+class ShapePoint:
+    """A mode shape at one place: `value` in the mode's plane, `cross` in the other plane."""
+
+    x_m: float
+    value: float
+    cross: float = NAN
+    sd: float = NAN
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One identified mode. `order` counts from 1 in each plane; standard deviations may be NaN."""
+
+    plane: Plane
+    order: int
+    frequency_hz: float
+    frequency_sd_hz: float = NAN
+    damping_ratio: float = NAN
+    damping_sd: float = NAN
+    shape: tuple[ShapePoint, ...] = ()
+
+
+@dataclass(frozen=True)
+class AddedMass:
+    """A known mass clamped on the hanger for one test."""
+
+    mass_kg: float
+    x_m: float
+
+
+@dataclass(frozen=True)
+class ModalTest:
+    """What one hammer test says about a hanger: its identified modes and the conditions."""
+
+    id: str
+    modes: tuple[Mode, ...]
+    hanger: int | None = None
+    time: datetime | None = None
+    temperature_c: float = NAN
+    amplitude: float = NAN
+    added_mass: AddedMass | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Independent uniform priors: `lower` and `upper` have shape (parameters,)."""
+
+    names: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+
+
+@dataclass(frozen=True)
+class PredictedFrequency:
+    """A posterior predictive frequency beside its measurement (NaN where none was made)."""
+
+    plane: Plane
+    order: int
+    mean_hz: float
+    sd_hz: float
+    measured_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Samples of one model class's parameters given modal tests, and its evidence.
+
+    `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
+    `sample_predictions_hz` (samples, modes) follows `predicted`, without prediction error.
+    `r_hat` compares the chains of the final population (1 is converged).
+    """
+
+    model: str
+    hanger: int | None
+    names: tuple[str, ...]
+    samples: FloatArray
+    log_likelihood: FloatArray
+    most_probable: FloatArray
+    nominal_tension_n: float
+    log_evidence: float
+    log_evidence_sd: float
+    effective_sample_size: float
+    r_hat: float
+    evaluations: int
+    predicted: tuple[PredictedFrequency, ...]
+    tests: tuple[str, ...]
+    seed: int
+    seconds: float
+
+    def parameter(self, name: str) -> FloatArray:
+        """Samples of one parameter, shape (samples,)."""
+        return self.samples[:, self.names.index(name)]
+
+    @property
+    def tension_n(self) -> FloatArray:
+        """Samples of the tension, shape (samples,)."""
+        return self.parameter("theta_F") * self.nominal_tension_n
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Model classes compared on the same tests, most probable first."""
+
+    posteriors: tuple[Posterior, ...]
+    probabilities: tuple[float, ...]
+
+    @property
+    def selected(self) -> Posterior:
+        return self.posteriors[0]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far one quantity has moved from its baseline, with the probability that it matters.
+
+    `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
+    `log10_k1` (shift in decades); `probability` is that of a shift beyond `threshold`, up or down.
+    """
+
+    hanger: int
+    test: str
+    time: datetime
+    quantity: str
+    baseline: float
+    value: float
+    shift_mean: float
+    shift_sd: float
+    threshold: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Alert:
+    """A shift that its owner should know of. `key` makes its delivery idempotent."""
+
+    key: str
+    hanger: int
+    test: str
+    time: datetime
+    message: str
+    drifts: tuple[Drift, ...]
