@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
 ComplexArray: TypeAlias = NDArray[np.complex128]
 Plane: TypeAlias = Literal["transverse", "longitudinal"]
 Quantity: TypeAlias = Literal["force", "acceleration"]
@@ -173,7 +175,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class PredictedFrequency:
-    """A posterior predictive frequency beside its measurement (NaN where none was made)."""
+    """A frequency with the uncertainty of the parameters (thesis 4.14) beside its measurement."""
 
     plane: Plane
     order: int
@@ -187,8 +189,8 @@ class Posterior:
     """Samples of one model class's parameters given modal tests, and its evidence.
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
-    `sample_predictions_hz` (samples, modes) follows `predicted`, without prediction error.
-    `r_hat` compares the chains of the final population (1 is converged).
+    `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
+    runs of the sampler, the worst parameter (1 is converged).
     """
 
     model: str

@@ -1,0 +1,69 @@
+"""What a model class is: named parameters with a prior, and a map from them to frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from shm.errors import BadInput, UsageError
+from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
+
+Swap = tuple[tuple[str, ...], tuple[str, ...]]
+
+
+class Model:
+    """A model class of one hanger. A member declares its parameters and overrides two verbs.
+
+    `bounds` are the uniform priors of the parameters; `swaps` lists groups of parameters that can
+    be exchanged without changing any frequency, so that sampling may keep to one of the copies.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    bounds: ClassVar[Mapping[str, tuple[float, float]]]
+    swaps: ClassVar[Sequence[Swap]] = ()
+
+    def __init__(self, hanger: Hanger):
+        self.hanger = hanger
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(self.bounds)
+
+    @property
+    def prior(self) -> Prior:
+        lower, upper = np.array(list(self.bounds.values()), dtype=float).T
+        return Prior(self.parameter_names, lower, upper)
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        """Frequencies of parameter sets `theta` (n, parameters): shape (n, 2, modes).
+
+        The second axis is the plane, transverse and longitudinal.
+        """
+        raise TypeError(f"{type(self).__name__} does not say how its frequencies follow.")
+
+    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        """The mode shape of one parameter set (parameters,) at `x_m` (points,), largest value 1."""
+        raise TypeError(f"{type(self).__name__} does not say how its shapes follow.")
+
+    def refuse(self, test: ModalTest) -> None:
+        """Raises BadInput where this class cannot describe the conditions of `test`."""
+        if test.added_mass is not None:
+            raise BadInput(
+                f"test {test.id} has a known mass of {test.added_mass.mass_kg:g} kg clamped on, "
+                f"which model class {self.name} does not describe.",
+                remedy="Leave this test out for this model class.",
+            )
+
+    def pack(self, values: Mapping[str, float]) -> FloatArray:
+        """Named values as a parameter set (parameters,); raises UsageError for a wrong name."""
+        unknown, missing = values.keys() - self.bounds.keys(), self.bounds.keys() - values.keys()
+        if unknown or missing:
+            fault = f"unknown {sorted(unknown)}" if unknown else f"missing {sorted(missing)}"
+            raise UsageError(
+                f"parameters of model class {self.name}: {fault}.",
+                remedy=f"It takes {', '.join(self.parameter_names)}.",
+            )
+        return np.array([values[name] for name in self.parameter_names], dtype=float)

@@ -1,0 +1,79 @@
+"""Beam 1 (clamped ends) and Beam 2 (rotational end springs), thesis 2.4 and 5.1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shm.models import tensioned_beam
+from shm.models.base import Model
+from shm.values import PLANES, FloatArray, Plane
+
+
+class Beam(Model):
+    """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends."""
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deck-end and arch-end springs of `theta` (n, parameters), each (n, planes)."""
+        raise TypeError(f"{type(self).__name__} does not say which springs hold its ends.")
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        deck, arch = self.springs_n_m_rad(theta)
+        return tensioned_beam.frequencies_hz(
+            self._length_m(theta)[:, None],
+            self._tension_n(theta)[:, None],
+            np.asarray(self.hanger.bending_stiffness_n_m2),
+            np.asarray(self.hanger.mass_per_length_kg_m),
+            deck,
+            arch,
+            modes,
+        )
+
+    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        deck, arch = (
+            springs[0, PLANES.index(plane)]
+            for springs in self.springs_n_m_rad(theta[None])
+        )
+        length = float(self._length_m(theta[None])[0])
+        tension = float(self._tension_n(theta[None])[0])
+        stiffness = self.hanger.bending_stiffness_n_m2
+        xi = length * (tension / stiffness) ** 0.5
+        scale = length / stiffness
+        return tensioned_beam.mode_shape(xi, deck * scale, arch * scale, order, x_m / length)
+
+    def _length_m(self, theta: FloatArray) -> FloatArray:
+        return theta[:, self.parameter_names.index("theta_L")] * self.hanger.length_m
+
+    def _tension_n(self, theta: FloatArray) -> FloatArray:
+        return theta[:, self.parameter_names.index("theta_F")] * self.hanger.nominal_tension_n
+
+
+class Beam1(Beam):
+    """Both ends clamped: the two planes have the same frequencies."""
+
+    name = "beam1"
+    title = "Beam 1: clamped ends"
+    bounds = {"theta_F": (0.5, 5.0), "theta_L": (0.5, 1.5)}  # noqa: RUF012
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        clamped = np.full((len(theta), 2), np.inf)
+        return clamped, clamped
+
+
+class Beam2(Beam):
+    """A rotational spring at each end and plane: k1, k3 transverse, k2, k4 longitudinal."""
+
+    name = "beam2"
+    title = "Beam 2: rotational end springs"
+    bounds = {  # noqa: RUF012
+        "theta_F": (0.5, 5.0),
+        "theta_L": (0.5, 1.5),
+        "log10_k1": (5.0, 12.0),
+        "log10_k2": (5.0, 12.0),
+        "log10_k3": (5.0, 12.0),
+        "log10_k4": (5.0, 12.0),
+    }
+    swaps = ((("log10_k1",), ("log10_k3",)), (("log10_k2",), ("log10_k4",)))
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        springs = 10 ** theta[:, 2:]
+        return springs[:, :2], springs[:, 2:]

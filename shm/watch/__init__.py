@@ -1,0 +1,7 @@
+"""Watching a hanger: how far tension and end stiffness have moved, and when to say so."""
+
+from __future__ import annotations
+
+from shm.watch.drift import assess, decide
+
+__all__ = ["assess", "decide"]

@@ -1,0 +1,136 @@
+"""First form of the drift decision: the posterior of a test against the posterior of the baseline.
+
+Both posteriors are taken as independent, so that a model error which they share widens the shift
+instead of cancelling: an alert may come late, but rests on what the two tests say by themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from shm.values import Alert, Drift, FloatArray, Posterior, Thresholds
+
+TENSION = "tension"
+_END_STIFFNESS = {
+    "transverse_end_stiffness": ("log10_k1", "log10_k3"),
+    "longitudinal_end_stiffness": ("log10_k2", "log10_k4"),
+}
+_NINETY_PERCENT = 1.645
+
+
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Samples (n,) of one quantity before and after, and of its shift."""
+
+    quantity: str
+    before: FloatArray
+    after: FloatArray
+    shift: FloatArray
+    threshold: float
+
+    @property
+    def probability(self) -> float:
+        """That the shift is beyond the threshold, in the likelier direction."""
+        down, up = np.mean(self.shift < -self.threshold), np.mean(self.shift > self.threshold)
+        return float(max(down, up))
+
+
+def assess(
+    baseline: Posterior,
+    current: Posterior,
+    thresholds: Thresholds,
+    *,
+    hanger: int,
+    test: str,
+    time: datetime,
+) -> tuple[Drift, ...]:
+    """The shift of tension and, where the model class has springs, of the end stiffness.
+
+    Tension shifts are fractions of the baseline; stiffness shifts are decades of the two ends'
+    common stiffness 2/(1/k_deck + 1/k_arch), because frequencies alone cannot tell the ends apart.
+    """
+    return tuple(
+        Drift(
+            hanger=hanger,
+            test=test,
+            time=time,
+            quantity=comparison.quantity,
+            baseline=float(comparison.before.mean()),
+            value=float(comparison.after.mean()),
+            shift_mean=float(comparison.shift.mean()),
+            shift_sd=float(comparison.shift.std(ddof=1)),
+            threshold=comparison.threshold,
+            probability=comparison.probability,
+        )
+        for comparison in _comparisons(baseline, current, thresholds)
+    )
+
+
+def _comparisons(
+    baseline: Posterior, current: Posterior, thresholds: Thresholds
+) -> list[_Comparison]:
+    rng = np.random.default_rng(current.seed)
+    before, after = _paired(baseline.tension_n, current.tension_n, rng)
+    limit = thresholds.tension_shift_fraction
+    comparisons = [_Comparison(TENSION, before, after, after / before - 1, limit)]
+    limit = thresholds.stiffness_shift_decades
+    for quantity, springs in _END_STIFFNESS.items():
+        if set(springs) <= set(baseline.names) & set(current.names):
+            before, after = _paired(_common(baseline, springs), _common(current, springs), rng)
+            comparisons.append(_Comparison(quantity, before, after, after - before, limit))
+    return comparisons
+
+
+def _common(posterior: Posterior, springs: tuple[str, str]) -> FloatArray:
+    """log10 of the common stiffness of the two ends, shape (samples,)."""
+    flexibility = sum(10.0 ** -posterior.parameter(name) for name in springs)
+    return np.asarray(np.log10(2 / flexibility))
+
+
+def _paired(
+    before: FloatArray, after: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Independent pairs from the two posteriors."""
+    n = max(len(before), len(after))
+    return rng.choice(before, n), rng.choice(after, n)
+
+
+def decide(drifts: Sequence[Drift], thresholds: Thresholds) -> Alert | None:
+    """An alert where any shift is beyond its threshold with the probability asked for.
+
+    Its key names what moved and which way, so that a standing condition is one alert.
+    """
+    moved = [drift for drift in drifts if drift.probability >= thresholds.alert_probability]
+    if not moved:
+        return None
+    first = moved[0]
+    ways = [f"{drift.quantity}-{'down' if drift.shift_mean < 0 else 'up'}" for drift in moved]
+    return Alert(
+        key=f"hanger-{first.hanger}:{':'.join(ways)}",
+        hanger=first.hanger,
+        test=first.test,
+        time=first.time,
+        message=f"Hanger {first.hanger}: {'; '.join(_sentence(drift) for drift in moved)}.",
+        drifts=tuple(moved),
+    )
+
+
+def _sentence(drift: Drift) -> str:
+    """What moved, by how much (90 % interval), and how sure that is."""
+    low, high = (drift.shift_mean + s * _NINETY_PERCENT * drift.shift_sd for s in (-1, 1))
+    if drift.quantity == TENSION:
+        return (
+            f"tension moved from {drift.baseline / 1e3:.1f} to {drift.value / 1e3:.1f} kN, "
+            f"{drift.shift_mean:+.1%} (90 % interval {low:+.1%} to {high:+.1%}); probability of a "
+            f"shift beyond {drift.threshold:.1%}: {drift.probability:.3f}"
+        )
+    return (
+        f"{drift.quantity.replace('_', ' ')} moved from 10^{drift.baseline:.2f} to "
+        f"10^{drift.value:.2f} N m/rad, {drift.shift_mean:+.2f} decades (90 % interval "
+        f"{low:+.2f} to {high:+.2f}); probability of a shift beyond {drift.threshold:g} "
+        f"decades: {drift.probability:.3f}"
+    )
