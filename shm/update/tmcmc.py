@@ -6,63 +6,71 @@ coefficient of variation of the weights of 1 allows; the population is resampled
 Two things differ from the textbook. The likelihood is not raised to a power: on this problem that
 path meets a phase transition (the model error sigma collapses at some power) and its evidence is
 biased by 1 to 4. Instead a fictitious error `floor` is added to the variance of the likelihood and
-lowered from infinity (the prior) to 0 (the posterior). And the moves are t-preconditioned
-Crank-Nicolson steps (Grumitt, Karamanis and Seljak 2023), many a stage, which hold the prior and
-the heavy tails that a random walk scaled on the covariance does not.
+lowered from infinity (the prior) to 0 (the posterior). And a stage makes several moves: t-
+preconditioned Crank-Nicolson steps (Grumitt, Karamanis and Seljak 2023), which suit the heavy tails
+better than a random walk, and independent proposals that jump between the population and the
+anchors of a least-squares search.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from shm.update.mixture import Normal, TMixture
 from shm.update.problem import Points, Problem
+from shm.update.search import Anchors
 from shm.values import FloatArray, IntArray
 
 _TARGET_VARIATION = 1.0
 _TARGET_ACCEPTANCE = 0.3
-_MOVES = 8
+_ROUNDS = 3
 _DEGREES_OF_FREEDOM = 5.0
 _SMALLEST_FLOOR = 1e-9
 _LARGEST_FLOOR = 1e3
 
 
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Points of the posterior and the log evidence that their stages add up to."""
+
+    points: Points
+    log_evidence: float
+
+
 def sample(
-    problem: Problem,
-    particles: int,
-    rng: np.random.Generator,
-    on_stage: Callable[[float], None] = lambda floor: None,
-) -> Points:
-    """`particles` points of the posterior of `problem`; `on_stage` hears each stage's floor."""
+    problem: Problem, anchors: Anchors, particles: int, rng: np.random.Generator
+) -> Population:
+    """`particles` points of the posterior of `problem`."""
     points = problem.evaluate(problem.draw_prior(particles, rng))
-    floor, current, step = np.inf, np.zeros(particles), 0.6
+    floor, current, step, log_evidence = np.inf, np.zeros(particles), 0.6, 0.0
     while floor > 0:
-        floor = next_floor(problem, points, current, floor)
-        on_stage(floor)
-        weights = normalised(problem.log_likelihood(points, floor) - current)
-        centre = Normal.of(points.z, weights)
+        floor = _next_floor(problem, points, current, floor)
+        log_weights = problem.likelihood.marginal(points.predicted, floor) - current
+        log_evidence += float(np.logaddexp.reduce(log_weights) - np.log(particles))
+        weights = normalised(log_weights)
+        mover = Mover(problem, floor, Normal.of(points.z, weights), step)
         points = points.take(systematic(weights, particles, rng))
-        points, step = move(problem, points, floor, centre, step, _MOVES, rng)
-        current = problem.log_likelihood(points, floor)
-    return points
+        points = mover.move(points, anchors, rng)
+        step, current = mover.step, problem.likelihood.marginal(points.predicted, floor)
+    return Population(points, log_evidence)
 
 
-def next_floor(problem: Problem, points: Points, current: FloatArray, floor: float) -> float:
+def _next_floor(problem: Problem, points: Points, current: FloatArray, floor: float) -> float:
     """The lowest floor whose weights keep the target variation; 0 once that is in reach."""
 
-    def variation(candidate: float) -> float:
-        weights = normalised(problem.log_likelihood(points, candidate) - current)
-        return float(weights.std() / weights.mean())
+    def too_far(candidate: float) -> bool:
+        log_weights = problem.likelihood.marginal(points.predicted, candidate) - current
+        weights = normalised(log_weights)
+        return bool(weights.std() > _TARGET_VARIATION * weights.mean())
 
-    if variation(0.0) <= _TARGET_VARIATION:
+    if not too_far(0.0):
         return 0.0
     low, high = np.log(_SMALLEST_FLOOR), np.log(min(floor, _LARGEST_FLOOR))
-    for _ in range(30):
+    for _ in range(25):
         middle = (low + high) / 2
-        low, high = (
-            (low, middle) if variation(np.exp(middle)) < _TARGET_VARIATION else (middle, high)
-        )
+        low, high = (middle, high) if too_far(np.exp(middle)) else (low, middle)
     return float(np.exp(high))
 
 
@@ -78,64 +86,59 @@ def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArra
     return np.searchsorted(np.cumsum(weights), positions).clip(0, len(weights) - 1).astype(int)
 
 
-class Normal:
-    """Centre and Cholesky factor of a weighted population, to whiten the moves."""
+class Mover:
+    """Moves points so that the posterior at one floor is kept; adapts its step as it goes."""
 
-    def __init__(self, mean: FloatArray, covariance: FloatArray):
-        self.mean = mean
-        self.factor = np.linalg.cholesky(covariance)
-        self.inverse_factor = np.linalg.inv(self.factor)
+    def __init__(self, problem: Problem, floor: float, centre: Normal, step: float):
+        self.step = step
+        self._problem = problem
+        self._floor = floor
+        self._centre = centre
 
-    @classmethod
-    def of(cls, z: FloatArray, weights: FloatArray | None = None) -> Normal:
-        """The normal of a population (n, d); a small diagonal keeps a thin one regular."""
-        covariance = np.cov(z.T, aweights=weights) + 1e-10 * np.eye(z.shape[1])
-        return cls(np.average(z, axis=0, weights=weights), covariance)
+    def move(self, points: Points, anchors: Anchors, rng: np.random.Generator) -> Points:
+        """Rounds of two local steps and one jump."""
+        normals = anchors.normals(self._floor)
+        shares = np.append(np.full(len(normals), 1 / len(normals)), 1.0)
+        jumps = TMixture([*normals, self._centre], shares)
+        for _ in range(_ROUNDS):
+            points = self.walk(points, 2, rng)
+            points, _ = self._accept(points, *self._jump(points, jumps, rng), rng)
+        return points
 
-    def whiten(self, z: FloatArray) -> FloatArray:
-        """`z` (n, d) relative to the centre, in standard deviations."""
-        return np.asarray((z - self.mean) @ self.inverse_factor.T)
+    def walk(self, points: Points, steps: int, rng: np.random.Generator) -> Points:
+        """Local steps alone."""
+        for _ in range(steps):
+            points, rate = self._accept(points, *self._crank_nicolson(points, rng), rng)
+            factor = np.exp(0.5 * (rate - _TARGET_ACCEPTANCE))
+            self.step = float(np.clip(self.step * factor, 0.02, 1))
+        return points
 
-    def colour(self, y: FloatArray) -> FloatArray:
-        """The inverse of `whiten`."""
-        return np.asarray(self.mean + y @ self.factor.T)
+    def _accept(
+        self, points: Points, proposal: Points, log_ratio: FloatArray, rng: np.random.Generator
+    ) -> tuple[Points, float]:
+        """Metropolis and Hastings; gives the rate of acceptance too."""
+        before = self._problem.log_posterior(points, self._floor)
+        after = self._problem.log_posterior(proposal, self._floor)
+        accepted = np.log(rng.random(len(before))) < after - before + log_ratio
+        return points.replaced(accepted, proposal), float(accepted.mean())
 
+    def _crank_nicolson(
+        self, points: Points, rng: np.random.Generator
+    ) -> tuple[Points, FloatArray]:
+        """A step that keeps the t distribution around the centre, and its log ratio."""
+        nu, (n, d) = _DEGREES_OF_FREEDOM, points.z.shape
+        y = self._centre.whiten(points.z)
+        square = (y**2).sum(axis=1)
+        precision = rng.gamma((d + nu) / 2, 1.0, n) / ((nu + square) / 2)
+        noise = rng.standard_normal((n, d)) / np.sqrt(precision)[:, None]
+        proposed = np.sqrt(1 - self.step**2) * y + self.step * noise
+        proposed_square = (proposed**2).sum(axis=1)
+        log_ratio = (d + nu) / 2 * (np.log1p(proposed_square / nu) - np.log1p(square / nu))
+        return self._problem.evaluate(self._centre.colour(proposed)), log_ratio
 
-def move(
-    problem: Problem,
-    points: Points,
-    floor: float,
-    centre: Normal,
-    step: float,
-    moves: int,
-    rng: np.random.Generator,
-) -> tuple[Points, float]:
-    """Moves all points `moves` times, the posterior of `floor` kept; gives the adapted step too."""
-    density = _log_density(problem, points, floor)
-    for _ in range(moves):
-        proposal, log_ratio = _propose(problem, points, centre, step, rng)
-        proposed_density = _log_density(problem, proposal, floor)
-        accepted = np.log(rng.random(len(density))) < proposed_density - density + log_ratio
-        points = points.replaced(accepted, proposal)
-        density = np.where(accepted, proposed_density, density)
-        step = float(np.clip(step * np.exp(0.5 * (accepted.mean() - _TARGET_ACCEPTANCE)), 0.05, 1))
-    return points, step
-
-
-def _log_density(problem: Problem, points: Points, floor: float) -> FloatArray:
-    return problem.log_prior(points.z) + problem.log_likelihood(points, floor)
-
-
-def _propose(
-    problem: Problem, points: Points, centre: Normal, step: float, rng: np.random.Generator
-) -> tuple[Points, FloatArray]:
-    """A Crank-Nicolson step that keeps the t distribution around `centre`, and its log ratio."""
-    nu, (n, d) = _DEGREES_OF_FREEDOM, points.z.shape
-    y = centre.whiten(points.z)
-    square = (y**2).sum(axis=1)
-    precision = rng.gamma((d + nu) / 2, 1.0, n) / ((nu + square) / 2)
-    noise = rng.standard_normal((n, d)) / np.sqrt(precision)[:, None]
-    proposed = np.sqrt(1 - step**2) * y + step * noise
-    proposed_square = (proposed**2).sum(axis=1)
-    log_ratio = 0.5 * (d + nu) * (np.log1p(proposed_square / nu) - np.log1p(square / nu))
-    return problem.evaluate(centre.colour(proposed)), log_ratio
+    def _jump(
+        self, points: Points, jumps: TMixture, rng: np.random.Generator
+    ) -> tuple[Points, FloatArray]:
+        """An independent proposal and its log ratio."""
+        z = jumps.draw(len(points.z), rng)
+        return self._problem.evaluate(z), jumps.log_density(points.z) - jumps.log_density(z)

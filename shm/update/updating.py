@@ -7,27 +7,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import least_squares
 
 from shm.errors import UsageError
 from shm.models import Model
 from shm.update.importance import Weighted, weigh
-from shm.update.likelihood import Measured, log_likelihood, measured, predicted_hz
-from shm.update.problem import Points, Problem
-from shm.update.tmcmc import Normal, move, normalised, sample, systematic
-from shm.values import (
-    PLANES,
-    FloatArray,
-    ModalTest,
-    Posterior,
-    PredictedFrequency,
-    Selection,
-)
+from shm.update.likelihood import Likelihood
+from shm.update.mixture import Normal
+from shm.update.problem import Problem
+from shm.update.search import search
+from shm.update.tmcmc import Mover, Population, normalised, sample, systematic
+from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency, Selection
 
 Progress = Callable[[str, float], None]
 
+SIGMA = "sigma"
 _RUNS = 4
-_FINAL_MOVES = 5
+_FEWEST_PARTICLES = 100
+_FINAL_STEPS = 5
 _ENOUGH = 0.5
 
 
@@ -53,7 +50,7 @@ def update(
     """The posterior of `model` given all modes of `tests`.
 
     Independent runs of the sampler find the posterior (their agreement is `r_hat`), importance
-    sampling gives the evidence and the draws, and a few moves spread equal draws. `progress`
+    sampling gives the evidence and the draws, and a few steps spread equal draws. `progress`
     hears the model's name and the fraction done. Raises BadInput where a test has no modes or
     conditions that the model class cannot describe.
     """
@@ -61,28 +58,28 @@ def update(
     started = time.perf_counter()
     for test in tests:
         model.refuse(test)
-    problem = Problem(model, measured(tests, options.repeat))
+    problem = Problem(model, Likelihood(tests, options.repeat))
     rng = np.random.default_rng(options.seed)
     runs = _independent_runs(problem, options.samples, rng, progress)
-    population = np.vstack([run.z for run in runs])
-    weighted = weigh(problem, population, _ENOUGH * options.samples, rng)
-    theta = problem.theta(_draws(problem, weighted, Normal.of(population), options.samples, rng))
+    pooled = _pooled(runs, rng)
+    weighted = weigh(problem, pooled, _ENOUGH * options.samples, rng)
+    samples, predicted = _draws(problem, weighted, options.samples, rng)
+    log_likelihood = problem.likelihood.joint(predicted, samples[:, -1])
     progress(model.name, 1.0)
-    likelihood = _log_likelihood(problem, theta)
     return Posterior(
         model=model.name,
         hanger=tests[0].hanger,
-        names=problem.names,
-        samples=theta,
-        log_likelihood=likelihood,
-        most_probable=_most_probable(problem, theta[int(likelihood.argmax())]),
+        names=(*problem.prior.names, SIGMA),
+        samples=samples,
+        log_likelihood=log_likelihood,
+        most_probable=_most_probable(problem, samples[int(log_likelihood.argmax())]),
         nominal_tension_n=model.hanger.nominal_tension_n,
         log_evidence=weighted.log_evidence,
         log_evidence_sd=weighted.log_evidence_sd,
         effective_sample_size=min(weighted.effective_sample_size, options.samples),
-        r_hat=r_hat([run.z for run in runs]),
+        r_hat=r_hat([run.points.z for run in runs]),
         evaluations=problem.evaluations,
-        predicted=_predicted(problem, theta),
+        predicted=_predicted(problem.likelihood, predicted),
         tests=tuple(test.id for test in tests),
         seed=options.seed,
         seconds=time.perf_counter() - started,
@@ -91,23 +88,37 @@ def update(
 
 def _independent_runs(
     problem: Problem, samples: int, rng: np.random.Generator, progress: Progress
-) -> list[Points]:
+) -> list[Population]:
+    progress(problem.model.name, 0.0)
+    anchors = search(problem, rng)
     runs = []
-    for run in range(_RUNS):
-        progress(problem.model.name, run / (_RUNS + 1))
-        runs.append(sample(problem, max(samples // _RUNS, 10 * problem.dimension), rng))
-    progress(problem.model.name, _RUNS / (_RUNS + 1))
+    for done in range(1, _RUNS + 1):
+        runs.append(sample(problem, anchors, max(samples // _RUNS, _FEWEST_PARTICLES), rng))
+        progress(problem.model.name, done / (_RUNS + 1))
     return runs
 
 
+def _pooled(runs: Sequence[Population], rng: np.random.Generator) -> FloatArray:
+    """Points (n, d) of all runs, each by its evidence: one that missed counts less."""
+    weights = normalised(np.array([run.log_evidence for run in runs]))
+    n = sum(len(run.points.z) for run in runs)
+    chosen = [
+        run.points.z[systematic(np.ones(len(run.points.z)) / len(run.points.z), k, rng)]
+        for run, k in zip(runs, rng.multinomial(n, weights), strict=True)
+    ]
+    return np.vstack(chosen)
+
+
 def _draws(
-    problem: Problem, weighted: Weighted, centre: Normal, n: int, rng: np.random.Generator
-) -> FloatArray:
-    """Equally weighted posterior points (n, d): resampled, moved apart, unfolded."""
-    weights = normalised(weighted.log_weights)
-    points = weighted.points.take(systematic(weights, n, rng))
-    moved, _ = move(problem, points, 0.0, centre, 0.5, _FINAL_MOVES, rng)
-    return rng.permutation(problem.unfold(moved.z, rng))
+    problem: Problem, weighted: Weighted, n: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Posterior samples with sigma (n, d + 1) and what they predict (n, measurements)."""
+    points = weighted.resampled(n, rng)
+    points = Mover(problem, 0.0, Normal.of(points.z), step=0.5).walk(points, _FINAL_STEPS, rng)
+    points = points.take(rng.permutation(n))
+    sigma = problem.likelihood.draw_sigma(points.predicted, rng)
+    theta = problem.theta(problem.unfold(points.z, rng))
+    return np.column_stack([theta, sigma]), points.predicted
 
 
 def r_hat(runs: Sequence[FloatArray]) -> float:
@@ -117,40 +128,44 @@ def r_hat(runs: Sequence[FloatArray]) -> float:
     return float(np.sqrt(1 + between / within).max())
 
 
-def _log_likelihood(problem: Problem, theta: FloatArray) -> FloatArray:
-    predicted = predicted_hz(problem.model, theta[:, :-1], problem.data)
-    return log_likelihood(predicted, theta[:, -1], problem.data)
+def _most_probable(problem: Problem, best: FloatArray) -> FloatArray:
+    """The parameter set with sigma (d + 1,) of largest density, climbed to from the best sample.
 
+    The priors are uniform, so that at given sigma the climb is a bounded least-squares fit.
+    """
+    likelihood = problem.likelihood
 
-def _most_probable(problem: Problem, start: FloatArray) -> FloatArray:
-    """The parameter set (d,) of largest posterior density, climbed to from the best draw."""
-    width = problem.upper - problem.lower
-    low, high = problem.lower.copy(), problem.upper
-    low[-1] = 1e-9
+    def predict(theta: FloatArray) -> FloatArray:
+        return likelihood.predict(problem.model, theta[None])
 
-    def cost(fraction: FloatArray) -> float:
-        return -float(_log_likelihood(problem, (low + fraction * width).clip(low, high)[None])[0])
+    def scaled_misfit(theta: FloatArray) -> FloatArray:
+        noise = np.hypot(best[-1], likelihood.identification_error)
+        return np.asarray(likelihood.misfit(predict(theta))[0] / noise)
 
-    climbed = minimize(
-        cost, (start - low) / width, method="Nelder-Mead", bounds=[(0, 1)] * len(low)
+    fit = least_squares(
+        scaled_misfit,
+        best[:-1].clip(problem.prior.lower, problem.prior.upper),
+        bounds=(problem.prior.lower, problem.prior.upper),
+        x_scale=problem.prior.upper - problem.prior.lower,
+        max_nfev=30,
     )
-    return np.asarray((low + climbed.x * width).clip(low, high))
+    climbed = np.append(fit.x, likelihood.likeliest_sigma(predict(fit.x)))
+    candidates = np.array([best, np.append(fit.x, best[-1]), climbed])
+    predicted = likelihood.predict(problem.model, candidates[:, :-1])
+    return np.asarray(candidates[likelihood.joint(predicted, candidates[:, -1]).argmax()])
 
 
-def _predicted(problem: Problem, theta: FloatArray) -> tuple[PredictedFrequency, ...]:
+def _predicted(likelihood: Likelihood, predicted: FloatArray) -> tuple[PredictedFrequency, ...]:
     """Mean and standard deviation of each measured frequency's prediction, thesis (4.14)."""
-    data: Measured = problem.data
-    predicted = predicted_hz(problem.model, theta[:, :-1], data)
-    rows = zip(data.plane, data.order, predicted.T, data.frequency_hz, strict=True)
     return tuple(
         PredictedFrequency(
-            plane=PLANES[plane],
-            order=int(order) + 1,
+            plane=mode.plane,
+            order=mode.order,
             mean_hz=float(samples.mean()),
             sd_hz=float(samples.std(ddof=1)),
-            measured_hz=float(frequency),
+            measured_hz=mode.frequency_hz,
         )
-        for plane, order, samples, frequency in rows
+        for mode, samples in zip(likelihood.modes, predicted.T, strict=True)
     )
 
 

@@ -1,0 +1,264 @@
+"""Posterior and evidence against quadrature, known truth and their own claims."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import gammaincc, gammaln, logsumexp
+
+from shm.errors import BadInput, UsageError
+from shm.models import Model, build
+from shm.update import UpdateOptions, select, update
+from shm.update.likelihood import Likelihood
+from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, Plane
+
+DIAMETER = 0.130
+HANGER = Hanger(
+    id=3,
+    length_m=12.0,
+    elastic_modulus_pa=200e9,
+    area_m2=np.pi * DIAMETER**2 / 4,
+    second_moment_m4=np.pi * DIAMETER**4 / 64,
+    mass_per_length_kg_m=7800 * np.pi * DIAMETER**2 / 4,
+    nominal_tension_n=711e3,
+)
+TABLE_1_1: dict[Plane, list[float]] = {
+    "transverse": [5.82, 13.85, 26.17, 40.47, 59.3, 81.3],
+    "longitudinal": [6.09, 14.8, 27.0, 41.8, 61.5, 83.68],
+}
+
+
+def modal_test(frequencies: dict[Plane, list[float]], sd_hz: float = np.nan) -> ModalTest:
+    modes = tuple(
+        Mode(plane, order, frequency, sd_hz)
+        for plane, values in frequencies.items()
+        for order, frequency in enumerate(values, start=1)
+    )
+    return ModalTest("t1", modes, hanger=3)
+
+
+def log_marginal(square_misfit: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Log of the likelihood with sigma integrated over its prior, uniform on [0, 1], sd = 0.
+
+    int_0^1 sigma^-N exp(-S / 2 sigma^2) dsigma is an incomplete gamma function.
+    """
+    count = frequencies.size
+    half = (count - 1) / 2
+    integral = gammaln(half) + np.log(gammaincc(half, square_misfit / 2)) - np.log(2)
+    integral += half * np.log(2 / square_misfit)
+    return integral - count / 2 * np.log(2 * np.pi) - np.log(frequencies).sum()
+
+
+def grid(model: Model, frequencies: FloatArray, axes: list[FloatArray]) -> tuple[FloatArray, ...]:
+    """All points of `axes` (points, d) and their log marginal likelihood (points,)."""
+    theta = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+    found = model.frequencies_hz(theta, frequencies.shape[-1])[:, : len(frequencies)]
+    misfit = (((found - frequencies) / frequencies) ** 2).sum(axis=(1, 2))
+    return theta, log_marginal(misfit, frequencies)
+
+
+@pytest.fixture(scope="module")
+def beam1_quadrature() -> tuple[float, float, float]:
+    """Log evidence, mean and sd of theta_F of beam1 on table 1.1, by the midpoint rule."""
+    axes = [
+        0.5 + 4.5 * (np.arange(700) + 0.5) / 700,
+        0.5 + 1.0 * (np.arange(400) + 0.5) / 400,
+    ]
+    theta, values = grid(build("beam1", HANGER), np.array(list(TABLE_1_1.values())), axes)
+    weights = np.exp(values - values.max())
+    mean = np.average(theta[:, 0], weights=weights)
+    sd = np.sqrt(np.average((theta[:, 0] - mean) ** 2, weights=weights))
+    return float(logsumexp(values) - np.log(len(values))), mean, sd
+
+
+def test_beam_1_has_the_evidence_of_quadrature(beam1_quadrature) -> None:
+    posterior = update([modal_test(TABLE_1_1)], build("beam1", HANGER))
+    assert posterior.log_evidence == pytest.approx(
+        beam1_quadrature[0], abs=4 * posterior.log_evidence_sd
+    )
+    assert posterior.log_evidence_sd < 0.05
+
+
+def test_beam_1_has_the_tension_of_quadrature(beam1_quadrature) -> None:
+    posterior = update([modal_test(TABLE_1_1)], build("beam1", HANGER), UpdateOptions(4000, 2))
+    _, mean, sd = beam1_quadrature
+    tension = posterior.tension_n / HANGER.nominal_tension_n
+    assert tension.mean() == pytest.approx(mean, abs=5 * sd / np.sqrt(4000))
+    assert tension.std() == pytest.approx(sd, rel=0.08)
+
+
+def test_beam_2_has_the_evidence_of_quadrature_on_one_plane() -> None:
+    """With the transverse plane alone, k2 and k4 integrate to one: four dimensions are left."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    springs, spring_weights = 8.5 + 3.5 * nodes, weights / 2
+    frequencies = np.array([TABLE_1_1["transverse"]])
+    theta_f = 0.5 + 4.5 * (np.arange(110) + 0.5) / 110
+    theta_l = 0.5 + 1.0 * (np.arange(90) + 0.5) / 90
+    one, other = (springs[index] for index in np.triu_indices(16))
+    pair_weights = np.outer(spring_weights, spring_weights)[np.triu_indices(16)]
+    pair_weights[one != other] *= 2
+    model = build("beam2", HANGER)
+    total = []
+    for f in theta_f[theta_f < 3]:
+        theta = np.column_stack(
+            [
+                np.full(len(theta_l) * len(one), f),
+                np.repeat(theta_l, len(one)),
+                *(np.tile(k, len(theta_l)) for k in (one, one, other, other)),
+            ]
+        )
+        misfit = (((model.frequencies_hz(theta, 6)[:, :1] - frequencies) / frequencies) ** 2).sum(
+            axis=(1, 2)
+        )
+        values = log_marginal(misfit, frequencies) + np.log(np.tile(pair_weights, len(theta_l)))
+        total.append(logsumexp(values))
+    expected = logsumexp(total) - np.log(len(theta_f) * len(theta_l))
+    posterior = update([modal_test({"transverse": TABLE_1_1["transverse"]})], model)
+    assert posterior.log_evidence == pytest.approx(
+        expected, abs=4 * posterior.log_evidence_sd + 0.03
+    )
+
+
+def test_the_claimed_error_of_the_evidence_is_that_between_seeds() -> None:
+    runs = [
+        update([modal_test(TABLE_1_1)], build("beam2", HANGER), UpdateOptions(400, seed))
+        for seed in range(6)
+    ]
+    spread = np.std([run.log_evidence for run in runs], ddof=1)
+    claimed = np.mean([run.log_evidence_sd for run in runs])
+    assert claimed < 0.1
+    assert 0.3 * claimed < spread < 2.5 * claimed
+
+
+def test_the_same_seed_gives_the_same_posterior() -> None:
+    options = UpdateOptions(200, seed=7)
+    first, second = (
+        update([modal_test(TABLE_1_1)], build("beam2", HANGER), options) for _ in range(2)
+    )
+    np.testing.assert_array_equal(first.samples, second.samples)
+    assert first.log_evidence == second.log_evidence
+    other = update([modal_test(TABLE_1_1)], build("beam2", HANGER), replace(options, seed=8))
+    assert not np.array_equal(first.samples, other.samples)
+
+
+@pytest.mark.parametrize("springs", [(6.8, 7.6, 7.3, 8.2), (7.0, 7.6, 7.0, 7.6), (11, 11, 11, 11)])
+def test_a_planted_tension_is_found_however_sharp_the_data(springs: tuple[float, ...]) -> None:
+    """Frequencies good to 0.002 Hz confine the posterior to 1e-20 of the prior."""
+    model = build("beam2", HANGER)
+    names = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
+    truth = model.pack({"theta_F": 0.9, "theta_L": 1.0, **dict(zip(names, springs, strict=True))})
+    noise = 0.002 * np.random.default_rng(5).standard_normal((2, 8))
+    measured = model.frequencies_hz(truth[None], 8)[0] + noise
+    frequencies = {plane: list(measured[i]) for i, plane in enumerate(PLANES)}
+    posterior = update([modal_test(frequencies, sd_hz=0.002)], model)
+    low, high = np.quantile(posterior.tension_n, [0.005, 0.995]) / HANGER.nominal_tension_n
+    assert low < 0.9 < high
+    assert high - low < 0.02
+    for row in posterior.predicted:
+        assert row.mean_hz == pytest.approx(row.measured_hz, abs=0.012)
+
+
+def test_exchangeable_ends_are_both_found() -> None:
+    posterior = update([modal_test(TABLE_1_1)], build("beam2", HANGER), UpdateOptions(1000, 3, 10))
+    softer_deck = np.mean(posterior.parameter("log10_k1") < posterior.parameter("log10_k3"))
+    assert 0.4 < softer_deck < 0.6
+
+
+def test_convergence_figures_are_sane() -> None:
+    posterior = update([modal_test(TABLE_1_1)], build("beam2", HANGER))
+    assert posterior.samples.shape == (1000, 7)
+    assert len(np.unique(posterior.samples[:, 0])) > 800
+    assert 400 < posterior.effective_sample_size <= 1000
+    assert 1 <= posterior.r_hat < 1.2
+
+
+def test_the_most_probable_value_beats_every_sample() -> None:
+    tests = [modal_test(TABLE_1_1)]
+    model = build("beam2", HANGER)
+    posterior = update(tests, model, UpdateOptions(300))
+    best = posterior.most_probable[None]
+    likelihood = Likelihood(tests)
+    predicted = likelihood.predict(model, best[:, :-1])
+    assert likelihood.joint(predicted, best[:, -1])[0] >= posterior.log_likelihood.max()
+
+
+def test_counting_the_data_ten_times_narrows_the_tension() -> None:
+    once, ten_times = (
+        update([modal_test(TABLE_1_1)], build("beam1", HANGER), UpdateOptions(500, 1, repeat))
+        for repeat in (1, 10)
+    )
+    assert ten_times.tension_n.std() < once.tension_n.std() / 2
+
+
+def test_an_uncertain_frequency_counts_less() -> None:
+    """One mode is 20 % off; with its standard deviation stated the tension must not follow it."""
+    frequencies = {"transverse": [5.58, 13.40, 24.42, 38.75 * 1.2, 56.57]}
+    sure = modal_test(frequencies)
+    modes = tuple(replace(m, frequency_sd_hz=8.0 if m.order == 4 else 0.02) for m in sure.modes)
+    unsure = replace(sure, modes=modes)
+    model = build("beam1", HANGER)
+    widths = [update([test], model, UpdateOptions(500)).tension_n.std() for test in (sure, unsure)]
+    assert widths[1] < widths[0] / 5
+
+
+def test_selection_ranks_by_evidence_and_its_probabilities_add_to_one() -> None:
+    models = [build(name, HANGER) for name in ("beam1", "beam2")]
+    selection = select([modal_test(TABLE_1_1)], models, UpdateOptions(300))
+    first, second = selection.posteriors
+    assert selection.selected.model == "beam2"
+    assert first.log_evidence > second.log_evidence
+    assert sum(selection.probabilities) == pytest.approx(1)
+    ratio = selection.probabilities[0] / selection.probabilities[1]
+    assert np.log(ratio) == pytest.approx(first.log_evidence - second.log_evidence)
+
+
+def test_progress_is_heard_from_start_to_end() -> None:
+    heard: list[tuple[str, float]] = []
+    update(
+        [modal_test(TABLE_1_1)],
+        build("beam1", HANGER),
+        UpdateOptions(200),
+        lambda label, fraction: heard.append((label, fraction)),
+    )
+    assert heard[0] == ("beam1", 0.0)
+    assert heard[-1] == ("beam1", 1.0)
+
+
+def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:
+    model = build("beam1", HANGER)
+    with pytest.raises(BadInput, match="no measured frequency"):
+        update([ModalTest("t1", ())], model)
+    with pytest.raises(BadInput, match="known mass"):
+        update([replace(modal_test(TABLE_1_1), added_mass=AddedMass(25.0, 3.6))], model)
+    with pytest.raises(UsageError, match="no model class"):
+        select([modal_test(TABLE_1_1)], [])
+
+
+def test_the_likelihood_is_the_thesis_product_of_normals() -> None:
+    """(4.5): f_hat ~ N(f, (sigma f_hat)^2 + sd^2), N_D equal data sets."""
+    likelihood = Likelihood([modal_test({"transverse": [5.0, 12.0]}, sd_hz=0.05)], repeat=3)
+    value = likelihood.joint(np.array([[5.1, 11.8]]), np.array([0.02]))[0]
+    expected = 0.0
+    for found, seen in ((5.1, 5.0), (11.8, 12.0)):
+        variance = (0.02 * seen) ** 2 + 0.05**2
+        expected -= 1.5 * ((found - seen) ** 2 / variance + np.log(2 * np.pi * variance))
+    assert value == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("sd_hz", [np.nan, 1e-3, 0.5])
+@pytest.mark.parametrize("repeat", [1, 10])
+def test_the_model_error_is_integrated_out_exactly(sd_hz: float, repeat: int) -> None:
+    likelihood = Likelihood([modal_test(TABLE_1_1, sd_hz)], repeat)
+    predicted = np.array([list(TABLE_1_1["transverse"]) + list(TABLE_1_1["longitudinal"])])
+    predicted = predicted * (1 + 0.01 * np.sin(np.arange(12)))
+    sigma = np.exp(np.linspace(np.log(1e-7), 0, 20001))
+    joint = likelihood.joint(np.repeat(predicted, len(sigma), axis=0), sigma)
+    expected = np.log(np.trapezoid(np.exp(joint - joint.max()), sigma)) + joint.max()
+    assert likelihood.marginal(predicted)[0] == pytest.approx(expected, abs=5e-4)
+    drawn = likelihood.draw_sigma(np.repeat(predicted, 4000, axis=0), np.random.default_rng(1))
+    weights = np.exp(joint - joint.max()) * sigma
+    mean = np.average(np.log(sigma), weights=weights)
+    sd = np.sqrt(np.average((np.log(sigma) - mean) ** 2, weights=weights))
+    assert np.log(drawn).mean() == pytest.approx(mean, abs=0.1 * sd + 0.01)
