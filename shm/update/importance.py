@@ -1,10 +1,10 @@
 """The last step: adaptive importance sampling from a t mixture fitted to the sampler's population.
 
 It gives the evidence without the bias and the scatter of the stages, with the error of a plain
-mean, and independent weighted draws of the posterior. The mixture is fitted anew to its own
-weighted draws a few times (Cappe et al. 2004, population Monte Carlo) and the best one is used. A
-share of the draws comes from the prior (Hesterberg 1995, defensive mixture), so that no weight is
-unbounded.
+mean, and independent weighted draws of the posterior. The mixture is fitted anew to its own draws,
+resampled and moved, a few times (Cappe et al. 2004, population Monte Carlo); the best one is used.
+A share of the draws comes from the prior (Hesterberg 1995, defensive mixture), so that no weight
+is unbounded.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.update.mixture import TMixture
+from shm.update.mixture import Normal, TMixture
 from shm.update.problem import Points, Problem
-from shm.update.tmcmc import normalised, systematic
+from shm.update.tmcmc import Mover, normalised, systematic
 from shm.values import FloatArray
 
 _CLUSTERS = 8
@@ -25,7 +25,8 @@ _ENOUGH_ERROR = 0.05
 _BATCH = 4000
 _ADAPTATIONS = 3
 _MOST_BATCHES = 6
-_REFIT = 2000
+_REFIT = 1000
+_REFIT_STEPS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,8 @@ def _adapted(
         tried.append((mixture, weighted))
         if _suffices(weighted, enough):
             break
-        population = weighted.resampled(_REFIT, rng).z
+        mover = Mover(problem, 0.0, Normal.of(population), step=0.3)
+        population = mover.walk(weighted.resampled(_REFIT, rng), _REFIT_STEPS, rng).z
     return max(tried, key=lambda pair: pair[1].effective_sample_size)
 
 

@@ -1,0 +1,59 @@
+# Two commands do everything on a machine with Python 3.11+ and make:
+#   make demo   environment, install, the main job end to end
+#   make test   environment, install, lint, types, floors and all tests
+PYTHON ?= python3
+BIN := .venv/bin
+UV := $(BIN)/uv pip install --quiet
+INSTALL := $(UV) --no-deps --no-build-isolation --editable .
+
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: demo test lint bench docs lock clean
+
+demo: .venv/runtime
+	$(BIN)/shm demo
+
+test: lint
+	$(BIN)/python -m pytest --quiet
+
+lint: .venv/development
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: .venv/development
+	for benchmark in tests/benchmarks/*.py; do echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
+
+docs: .venv/development
+	$(BIN)/python docs/build.py
+
+# Compiles the pinned files anew from pyproject.toml; hashes only, no host names.
+lock: .venv/uv
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+		--extra build pyproject.toml --output-file requirements.txt
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+		--extra build --extra dev --constraint requirements.txt pyproject.toml \
+		--output-file requirements-dev.txt
+	echo "uv==0.13.8" | $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
+		--generate-hashes - --output-file requirements-uv.txt
+
+.venv/uv: requirements-uv.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-uv.txt
+	touch $@
+
+.venv/runtime: .venv/uv requirements.txt pyproject.toml
+	$(UV) --require-hashes --requirement requirements.txt
+	$(INSTALL)
+	touch $@
+
+.venv/development: .venv/uv requirements-dev.txt pyproject.toml
+	$(UV) --require-hashes --requirement requirements-dev.txt
+	$(INSTALL)
+	touch $@ .venv/runtime
+
+clean:
+	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

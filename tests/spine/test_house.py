@@ -1,0 +1,87 @@
+"""The house rules that tools do not check: errors, resources, file sizes, names of the outside."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from shm import errors
+from shm.resources import default_config, migrations_folder
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = [path for room in ("shm", "daemon", "cli") for path in (ROOT / room).rglob("*.py")]
+
+
+def tracked() -> list[Path]:
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode:
+        pytest.skip("not a git checkout: the tracked files are not known")
+    return [ROOT / name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_every_error_has_an_exit_code_of_the_contract() -> None:
+    classes = [c for c in vars(errors).values() if isinstance(c, type)]
+    codes = {c.__name__: c.exit_code for c in classes if issubclass(c, errors.ShmError)}
+    assert codes["UsageError"] == 2
+    assert codes["BadInput"] == codes["NotIdentifiable"] == 3
+    assert codes["NothingThere"] == 4
+    assert codes["StoreError"] == codes["SchemaOutdated"] == codes["StoreBusy"] == 5
+    assert codes["GateNotMet"] == 6
+    for name in codes:
+        assert name in (errors.__doc__ or "")
+
+
+def test_an_error_says_where_and_what_to_do() -> None:
+    error = errors.BadInput(
+        "NaN.", file="/data/a.csv", channel="acc_1", line=7, remedy="Check the cable."
+    )
+    assert str(error) == "a.csv, line 7, channel acc_1: NaN. Check the cable."
+
+
+def test_packaged_files_are_found() -> None:
+    assert (migrations_folder() / "env.py").is_file()
+    assert default_config().is_file()
+
+
+def test_no_file_is_longer_than_400_lines() -> None:
+    long = {p.name: n for p in SOURCES if (n := len(p.read_text().splitlines())) > 400}
+    assert not long
+
+
+def test_no_function_is_longer_than_50_lines() -> None:
+    long = []
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                first = node.body[1:] if ast.get_docstring(node) else node.body
+                if first and first[-1].end_lineno - first[0].lineno + 1 > 50:
+                    long.append(f"{path.name}:{node.name}")
+    assert not long
+
+
+def test_every_public_function_and_class_has_a_docstring() -> None:
+    bare = []
+    for path in SOURCES:
+        for node in ast.parse(path.read_text()).body:
+            named = isinstance(node, ast.FunctionDef | ast.ClassDef)
+            if named and not node.name.startswith("_") and not ast.get_docstring(node):
+                bare.append(f"{path.name}:{node.name}")
+    assert not bare
+
+
+def test_nothing_committed_names_a_registry_host_or_a_path_of_a_machine() -> None:
+    forbidden = re.compile(r"pypi\.org|pythonhosted|/work/|/home/\w+|/root/|file://")
+    found = [
+        f"{path.name}: {match.group()}"
+        for path in tracked()
+        if path.suffix not in {".db", ".uff"} and path != Path(__file__)
+        for match in [forbidden.search(path.read_text(encoding="utf-8", errors="replace"))]
+        if match
+    ]
+    assert not found
