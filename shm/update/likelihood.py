@@ -6,7 +6,8 @@ added to the variance: it is what the sampler lowers from infinity to 0.
 
 sigma is integrated out on a grid that is even in log sigma. The integrand is a bell there, of
 standard deviation 1/sqrt(2 N) for N data, and the trapezoidal rule with steps of 1.2 of these is
-right to 1e-5: to the sampler the model error then costs no dimension.
+right to 1e-5: to the sampler the model error then costs no dimension. The grid starts at 2e-5,
+the accuracy of a good logger's clock: below it no agreement of frequencies means anything.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from shm.models import Model
 from shm.values import PLANES, FloatArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2
-_SMALLEST_SIGMA = 1e-6
+_SMALLEST_SIGMA = 2e-5
 
 
 class Likelihood:
@@ -96,7 +97,7 @@ class Likelihood:
 
     def _grid(self) -> tuple[FloatArray, FloatArray]:
         """Nodes of log sigma, and the log of each one's share of the uniform prior."""
-        lowest = np.log(max(_SMALLEST_SIGMA, 0.05 * self.identification_error.min()))
+        lowest = np.log(_SMALLEST_SIGMA)
         step = _STEP_IN_SD / np.sqrt(2 * len(self.modes) * self.repeat)
         nodes, spacing = np.linspace(lowest, 0.0, int(-lowest / step) + 2, retstep=True)
         share = np.log(spacing) + nodes
