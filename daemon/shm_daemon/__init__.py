@@ -1,1 +1,8 @@
 """The shm daemon: spool, loop, hooks."""
+
+from shm_daemon.bell import Bell
+from shm_daemon.execution import process_pool
+from shm_daemon.hooks import CommandNotifier, HookFailed
+from shm_daemon.loop import run
+
+__all__ = ["Bell", "CommandNotifier", "HookFailed", "process_pool", "run"]

@@ -30,8 +30,7 @@ class Beam(Model):
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
         deck, arch = (
-            springs[0, PLANES.index(plane)]
-            for springs in self.springs_n_m_rad(theta[None])
+            springs[0, PLANES.index(plane)] for springs in self.springs_n_m_rad(theta[None])
         )
         length = float(self._length_m(theta[None])[0])
         tension = float(self._tension_n(theta[None])[0])

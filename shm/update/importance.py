@@ -19,14 +19,14 @@ from shm.update.problem import Points, Problem
 from shm.update.tmcmc import Mover, normalised, systematic
 from shm.values import FloatArray
 
-_CLUSTERS = 8
+_CLUSTERS = 16
 _FROM_PRIOR = 0.1
 _ENOUGH_ERROR = 0.05
 _BATCH = 4000
-_ADAPTATIONS = 3
+_ADAPTATIONS = 4
 _MOST_BATCHES = 6
-_REFIT = 1000
-_REFIT_STEPS = 4
+_REFIT = 2000
+_REFIT_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ added to the variance: it is what the sampler lowers from infinity to 0.
 
 sigma is integrated out on a grid that is even in log sigma. The integrand is a bell there, of
 standard deviation 1/sqrt(2 N) for N data, and the trapezoidal rule with steps of 1.2 of these is
-right to 1e-5: to the sampler the model error then costs no dimension. The grid starts at 2e-5,
-the accuracy of a good logger's clock: below it no agreement of frequencies means anything.
+right to 1e-5: to the sampler the model error then costs no dimension. The grid starts at 1e-4:
+below that a logger's clock, a tenth of a kelvin and the hammer's level move a frequency more than
+any model of a hanger can follow.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from shm.models import Model
 from shm.values import PLANES, FloatArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2
-_SMALLEST_SIGMA = 2e-5
+_SMALLEST_SIGMA = 1e-4
 
 
 class Likelihood:

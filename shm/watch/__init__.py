@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shm.watch.drift import assess, decide
+from shm.watch.drift import assess, decide, end_stiffness
 
-__all__ = ["assess", "decide"]
+__all__ = ["assess", "decide", "end_stiffness"]

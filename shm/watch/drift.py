@@ -78,11 +78,21 @@ def _comparisons(
     limit = thresholds.tension_shift_fraction
     comparisons = [_Comparison(TENSION, before, after, after / before - 1, limit)]
     limit = thresholds.stiffness_shift_decades
-    for quantity, springs in _END_STIFFNESS.items():
-        if set(springs) <= set(baseline.names) & set(current.names):
-            before, after = _paired(_common(baseline, springs), _common(current, springs), rng)
+    now = end_stiffness(current)
+    for quantity, earlier in end_stiffness(baseline).items():
+        if quantity in now:
+            before, after = _paired(earlier, now[quantity], rng)
             comparisons.append(_Comparison(quantity, before, after, after - before, limit))
     return comparisons
+
+
+def end_stiffness(posterior: Posterior) -> dict[str, FloatArray]:
+    """log10 of the two ends' common stiffness (samples,), for each plane that has springs."""
+    return {
+        quantity: _common(posterior, springs)
+        for quantity, springs in _END_STIFFNESS.items()
+        if set(springs) <= set(posterior.names)
+    }
 
 
 def _common(posterior: Posterior, springs: tuple[str, str]) -> FloatArray:

@@ -36,9 +36,7 @@ def test_a_clamped_beam_without_tension_gives_the_classical_roots() -> None:
         )
         for n in range(1, 13)
     ]
-    np.testing.assert_allclose(
-        wave_numbers(np.array(0.0), CLAMPED, CLAMPED, 12), roots, rtol=1e-12
-    )
+    np.testing.assert_allclose(wave_numbers(np.array(0.0), CLAMPED, CLAMPED, 12), roots, rtol=1e-12)
 
 
 def test_a_clamped_and_pinned_beam_without_tension_gives_the_classical_roots() -> None:

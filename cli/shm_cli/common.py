@@ -1,0 +1,175 @@
+"""What verbs share: options, where they print, how they show progress and read their input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import rich_click as click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from shm.bridge import load_hanger
+from shm.documents import dump, load_modes
+from shm.errors import NothingThere, UsageError
+from shm.values import Hanger, ModalTest
+
+if TYPE_CHECKING:
+    from shm.store import Store, Workspace
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+seed_option = click.option(
+    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed."
+)
+samples_option = click.option(
+    "--samples",
+    type=click.IntRange(100, 1_000_000),
+    default=1000,
+    show_default=True,
+    help="Posterior samples.",
+)
+repeat_option = click.option(
+    "--repeat",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="How often the data set counts (N_D of the thesis).",
+)
+
+
+def hanger_option(required: bool = False) -> Callable[[F], F]:
+    """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
+    return click.option(
+        "--hanger", "hanger_id", type=int, required=required, metavar="N", help="Hanger number."
+    )
+
+
+hanger_file_option = click.option(
+    "--hanger-file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="H.toml",
+    help="A [[hanger]] table, instead of a workspace.",
+)
+
+
+def show(document: object) -> None:
+    """Prints one JSON document on stdout."""
+    click.echo(dump(document))
+
+
+def show_table(table: Table) -> None:
+    """Prints a table on stdout."""
+    console = Console(highlight=False)
+    if not sys.stdout.isatty():
+        console.width = max(console.width, 120)
+    console.print(table.title, style="bold", soft_wrap=True, markup=False)
+    table.title = None
+    console.print(table)
+
+
+def table(title: str, *columns: str) -> Table:
+    """An empty table; columns after the first are aligned to the right."""
+    made = Table(title=title, header_style="bold")
+    for index, column in enumerate(columns):
+        made.add_column(column, justify="left" if index == 0 else "right")
+    return made
+
+
+def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
+    """The workspace of the command; `flags` are settings given on the command line."""
+    from shm.store import Workspace
+
+    return Workspace.open(ctx.obj, flags)
+
+
+@contextmanager
+def opened_store(ctx: click.Context) -> Iterator[tuple[Workspace, Store]]:
+    """The workspace of the command and its store, open."""
+    workspace = open_workspace(ctx)
+    with workspace.store() as store:
+        yield workspace, store
+
+
+def one_hanger(ctx: click.Context, hanger_file: Path | None, hanger_id: int | None) -> Hanger:
+    """The hanger that the options name; raises UsageError where they name none."""
+    if hanger_file is not None:
+        return load_hanger(hanger_file, hanger_id)
+    if hanger_id is None:
+        raise UsageError("which hanger?", remedy="Give --hanger N, or --hanger-file H.toml.")
+    return open_workspace(ctx).bridge.hanger(hanger_id)
+
+
+def tests_and_hanger(
+    ctx: click.Context, modes_file: Path | None, hanger_file: Path | None, hanger_id: int | None
+) -> tuple[tuple[ModalTest, ...], Hanger]:
+    """Tests of a MODES.json with their hanger, or the latest test of a hanger of the workspace."""
+    if modes_file is not None:
+        tests = load_modes(modes_file)
+        if hanger_id is None and hanger_file is None:
+            hanger_id = tests[0].hanger
+        hanger = one_hanger(ctx, hanger_file, hanger_id)
+        _say_if_another(tests[0], hanger)
+        return tests, hanger
+    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    with opened_store(ctx) as (_, store):
+        stored = store.tests(hanger.id)
+    if not stored:
+        raise NothingThere(
+            f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
+        )
+    return (stored[-1].test,), hanger
+
+
+def _say_if_another(test: ModalTest, hanger: Hanger) -> None:
+    if test.hanger not in (None, hanger.id):
+        click.echo(
+            f"Mind: the tests are of hanger {test.hanger}, the description is of hanger "
+            f"{hanger.id}.",
+            err=True,
+        )
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
+    """A bar on stderr; it is told a label and the fraction done, and draws one line a label."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        tasks: dict[str, Any] = {}
+
+        def tell(label: str, fraction: float) -> None:
+            if label not in tasks:
+                tasks[label] = bar.add_task(f"{title} {label}", total=1.0)
+            bar.update(tasks[label], completed=fraction)
+
+        yield tell
+
+
+def counting_bar() -> Progress:
+    """A bar on stderr that counts things done."""
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )

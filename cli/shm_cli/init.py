@@ -1,0 +1,51 @@
+"""`shm init`: makes a workspace."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import rich_click as click
+
+from shm.store import Workspace
+
+
+@click.command()
+@click.argument("folder", required=False, type=click.Path(file_okay=False, path_type=Path))
+@click.option(
+    "--from",
+    "config",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="BRIDGE.toml",
+    help="Copy this description instead of the commented one.",
+)
+@click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
+@click.pass_context
+def command(ctx: click.Context, folder: Path | None, config: Path | None, name: str | None) -> None:
+    """Make a workspace for a bridge.
+
+    It is a folder: bridge.toml (describe your hangers there), shm.db, spool/ (drop recordings
+    here), archive/ (raw files, never changed) and quarantine/ (refused files with the reason).
+
+    \b
+    Example: shm init arch --bridge "Arch bridge"
+    """
+    workspace = Workspace.initialise(folder or Path(ctx.obj), config)
+    if name is not None:
+        _rename(Path(workspace.bridge.source), name)
+    click.echo(
+        f"Made {workspace.folder}. Describe the bridge in {workspace.folder / 'bridge.toml'}."
+    )
+
+
+def _rename(path: Path, name: str) -> None:
+    """Puts the name into the table [bridge], comments and all else left as they are."""
+    text = path.read_text(encoding="utf-8")
+    line = f"name = {json.dumps(name, ensure_ascii=False)}"
+    head = re.compile(r"^\[bridge\][^\n]*\n(?:name\s*=[^\n]*\n)?", re.MULTILINE)
+    if head.search(text):
+        text = head.sub(lambda found: f"[bridge]\n{line}\n", text, count=1)
+    else:
+        text = f"[bridge]\n{line}\n\n{text}"
+    path.write_text(text, encoding="utf-8")

@@ -1,0 +1,141 @@
+"""The console script `shm`: finds the verb, loads it alone, and turns errors into exit codes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+import rich_click as click
+from rich.console import Console
+from rich.markup import escape
+
+from shm import __version__
+from shm.errors import ShmError
+
+UNEXPECTED = 1
+_LISTING = "shm_cli.listing"
+
+
+@dataclass(frozen=True)
+class Verb:
+    """One verb: the module that holds its `command`, and a line for the list of verbs."""
+
+    module: str
+    summary: str
+
+
+VERBS: dict[str, Verb] = {
+    "init": Verb("shm_cli.init", "Make a workspace for a bridge."),
+    "demo": Verb("shm_cli.demo", "See the whole job on a simulated bridge of 20 hangers."),
+    "ingest": Verb("shm_cli.ingest", "Take recordings in, or look into them with --peek."),
+    "daemon": Verb("shm_cli.daemon", "Watch the spool and do the whole job, unattended."),
+    "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
+    "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
+    "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
+    "select": Verb("shm_cli.select", "Compare model classes by their evidence."),
+    "report": Verb("shm_cli.report", "What an engineer files about a hanger."),
+    "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
+    "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
+    "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),
+    "validate": Verb("shm_cli.validate", "Our figures beside the thesis's, with a gate."),
+    "export": Verb("shm_cli.export", "Posterior samples for other programs."),
+    "db": Verb("shm_cli.db", "Upgrade or check the store."),
+    "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
+}
+
+
+class Verbs(click.RichGroup):
+    """Loads a verb's module only when that verb is called, so that `shm --help` is quick."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        if _LISTING in ctx.meta:
+            return click.RichCommand(name=cmd_name, help=VERBS[cmd_name].summary)
+        command: click.Command = import_module(VERBS[cmd_name].module).command
+        _take_workspace(command)
+        return command
+
+    def format_help(self, ctx: click.RichContext, formatter: click.RichHelpFormatter) -> None:  # type: ignore[override]
+        ctx.meta[_LISTING] = True
+        super().format_help(ctx, formatter)
+
+
+@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--workspace",
+    metavar="DIR",
+    envvar="SHM_WORKSPACE",
+    default=".",
+    show_default="$SHM_WORKSPACE, else the current folder",
+    help="The folder of the bridge.",
+)
+@click.option("--debug", is_flag=True, help="Show the traceback of an unexpected error.")
+@click.version_option(__version__, prog_name="shm")
+@click.pass_context
+def cli(ctx: click.Context, workspace: str, debug: bool) -> None:
+    """Tension of bridge hangers from hammer tests, with its uncertainty, unattended.
+
+    \b
+    Example: shm --workspace arch report --hanger 3
+    """
+    ctx.obj = workspace
+
+
+def _take_workspace(command: click.Command) -> None:
+    """Lets `--workspace` stand after the verb too."""
+    if isinstance(command, click.Group):
+        for member in command.commands.values():
+            _take_workspace(member)
+    elif not any(parameter.name == "workspace" for parameter in command.params):
+        command.params.append(
+            click.RichOption(
+                ["--workspace"],
+                metavar="DIR",
+                expose_value=False,
+                callback=_use_workspace,
+                help="The folder of the bridge.",
+            )
+        )
+
+
+def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | None) -> None:
+    if folder is not None:
+        ctx.obj = folder
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command line and exits with the code of the contract."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    sys.exit(run(arguments))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Runs one command; its exit code. What goes wrong is said on stderr, stdout stays clean."""
+    try:
+        result = cli.main(list(arguments), prog_name="shm", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except ShmError as error:
+        _say(f"[bold red]Error:[/] {escape(str(error))}")
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        _say("Stopped.")
+        return 130
+    except Exception as error:
+        if "--debug" in arguments:
+            raise
+        _say(f"[bold red]Unexpected {type(error).__name__}:[/] {escape(str(error))}")
+        _say("This is a fault of shm. `shm --debug ...` shows where; please report it.")
+        return UNEXPECTED
+    return result if isinstance(result, int) else 0
+
+
+def _say(text: str) -> None:
+    Console(stderr=True, highlight=False).print(text, soft_wrap=True)

@@ -1,0 +1,118 @@
+"""`shm predict`: the frequencies of one parameter set, or of a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rich_click as click
+
+from shm.errors import UsageError
+from shm.models import Model, build
+from shm.values import PLANES, FloatArray
+from shm_cli.common import (
+    hanger_file_option,
+    hanger_option,
+    json_option,
+    one_hanger,
+    show,
+    show_table,
+    table,
+)
+
+
+@click.command()
+@click.argument("model")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter.")
+@click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
+@click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
+@hanger_option()
+@hanger_file_option
+@json_option
+@click.pass_context
+def command(
+    ctx: click.Context,
+    model: str,
+    settings: tuple[str, ...],
+    sweep: str | None,
+    modes: int,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Frequencies of a model class for given parameters.
+
+    theta_F is tension over nominal tension, theta_L effective over nominal length (both 1 unless
+    set), log10_k1 to log10_k4 the end springs in N m/rad (k1, k3 transverse; k2, k4 longitudinal).
+
+    \b
+    Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
+    """
+    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id))
+    nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
+    values = nominal | dict(_pair(setting) for setting in settings)
+    if sweep is None:
+        _show_one(chosen, values, modes, as_json)
+    else:
+        _show_sweep(chosen, values, *_range(sweep), modes, as_json)
+
+
+def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:
+    frequencies = model.frequencies_hz(model.pack(values)[None], modes)[0]
+    if as_json:
+        show({"model": model.name, "parameters": values, "frequencies": _rows(frequencies)})
+        return
+    made = table(model.title, "mode", *(f"{plane} (Hz)" for plane in PLANES))
+    for order, row in enumerate(frequencies.T, start=1):
+        made.add_row(str(order), *(f"{frequency:.4f}" for frequency in row))
+    show_table(made)
+
+
+def _show_sweep(
+    model: Model, values: dict[str, float], name: str, points: FloatArray, modes: int, as_json: bool
+) -> None:
+    theta = np.array([model.pack({**values, name: float(point)}) for point in points])
+    frequencies = model.frequencies_hz(theta, modes)
+    if as_json:
+        rows: list[dict[str, Any]] = [
+            {name: float(point), "frequencies": _rows(row)}
+            for point, row in zip(points, frequencies, strict=True)
+        ]
+        show({"model": model.name, "parameters": values, "sweep": name, "points": rows})
+        return
+    heads = [f"{plane[0].upper()}{order}" for plane in PLANES for order in range(1, modes + 1)]
+    made = table(f"{model.title}: frequencies in Hz (T transverse, L longitudinal)", name, *heads)
+    for point, row in zip(points, frequencies, strict=True):
+        made.add_row(f"{point:g}", *(f"{frequency:.3f}" for frequency in row.ravel()))
+    show_table(made)
+
+
+def _rows(frequencies: FloatArray) -> list[dict[str, object]]:
+    return [
+        {"plane": plane, "order": order, "frequency_hz": float(frequency)}
+        for plane, row in zip(PLANES, frequencies, strict=True)
+        for order, frequency in enumerate(row, start=1)
+    ]
+
+
+def _pair(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise UsageError(
+            f"--set {text!r} is not NAME=VALUE.", remedy="Write --set theta_F=1.0, say."
+        ) from None
+
+
+def _range(text: str) -> tuple[str, FloatArray]:
+    name, _, limits = text.partition("=")
+    try:
+        start, stop, count = limits.split(":")
+        return name.strip(), np.linspace(float(start), float(stop), int(count))
+    except ValueError:
+        raise UsageError(
+            f"--sweep {text!r} is not NAME=FROM:TO:N.",
+            remedy="Write --sweep theta_F=0.5:2:16, say.",
+        ) from None

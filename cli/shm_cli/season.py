@@ -1,0 +1,150 @@
+"""The bridge of the demo and its season of hammer tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from shm.documents import dump, load_modes, modes_document
+from shm.read import sidecar_path, write
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.store import Store, Workspace
+from shm.values import Hanger, Posterior
+from shm_cli import thesis
+
+HANGERS = 20
+MEASURED = 3
+LOSING = 7
+LOSS = 0.08
+
+_START = datetime(2026, 3, 2, 9, tzinfo=UTC)
+_PLAN = HammerPlan(seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
+_SEED = 2026
+_TENSION_SCATTER = 0.003
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """One hammer test to come: the hanger, when, its state then, how warm it is."""
+
+    hanger: Hanger
+    time: datetime
+    state: HangerState
+    temperature_c: float
+    seed: tuple[int, int, int]
+
+    @property
+    def file_name(self) -> str:
+        suffix = "uff" if self.hanger.id % 2 else "csv"
+        return f"hanger{self.hanger.id:02d}_{self.time:%Y%m%d}.{suffix}"
+
+
+def bridge_description() -> str:
+    """`bridge.toml` of an arch bridge whose third hanger is the thesis's."""
+    lines = [
+        '[bridge]\nname = "Arch bridge of the demo"',
+        '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
+        "[settings]\nsamples = 400\nworkers = 2\n"
+        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
+    ]
+    for number in range(1, HANGERS + 1):
+        lines.append(
+            f"[[hanger]]\nid = {number}\ndiameter_m = 0.130\n"
+            f"length_m = {_length_m(number):.2f}\nelastic_modulus_pa = 200e9\n"
+            "density_kg_m3 = 7800\nnominal_tension_n = 711e3"
+        )
+    return "\n\n".join(lines) + "\n"
+
+
+def _length_m(number: int) -> float:
+    """Along a parabolic arch, scaled so that hanger 3 has the thesis's 12 m."""
+    heights = [4 * x * (1 - x) for x in (number / (HANGERS + 1), MEASURED / (HANGERS + 1))]
+    return 12.0 * heights[0] / heights[1]
+
+
+def drop_measured_baseline(workspace: Workspace) -> None:
+    """The thesis's measured frequencies of hanger 3, as a test before the season."""
+    (test,) = load_modes(thesis.PRINTINGS["table 1.1"])
+    test = replace(test, id="thesis_table_1_1", time=_START - timedelta(weeks=1))
+    _put(workspace.spool / "hanger03_measured.modes.json", dump(modes_document([test])))
+
+
+def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
+    """The season: hangers 3 and 7 every fortnight, the others at its start and end.
+
+    Hanger 3 is simulated at the most probable parameters of its measured baseline.
+    """
+    tests = []
+    for hanger in workspace.bridge.hangers:
+        often = hanger.id in (MEASURED, LOSING)
+        measured = store.posterior(hanger.id) if hanger.id == MEASURED else None
+        for week in range(0, 12, 2) if often else (0, 10):
+            tests.append(_planned(hanger, week, measured))
+    return sorted(tests, key=lambda test: test.time)
+
+
+def _planned(hanger: Hanger, week: int, measured: Posterior | None) -> PlannedTest:
+    rng = np.random.default_rng((_SEED, hanger.id))
+    state = _random_state(hanger, rng) if measured is None else _state_of(measured, hanger)
+    scatter = np.random.default_rng((_SEED, hanger.id, week)).normal(1, _TENSION_SCATTER)
+    lost = LOSS if hanger.id == LOSING and week >= 6 else 0.0
+    return PlannedTest(
+        hanger=hanger,
+        time=_START + timedelta(weeks=week, hours=hanger.id / 4),
+        state=replace(state, tension_n=state.tension_n * float(scatter) * (1 - lost)),
+        temperature_c=8.0 + 1.2 * week,
+        seed=(_SEED, hanger.id, week + 1),
+    )
+
+
+def _random_state(hanger: Hanger, rng: np.random.Generator) -> HangerState:
+    tension = hanger.nominal_tension_n * rng.uniform(0.85, 1.15)
+    k1, k2, k3, k4 = 10 ** rng.uniform(6.8, 8.0, 4)
+    return HangerState(tension, k1, k2, k3, k4, damping_ratio=0.0015)
+
+
+def _state_of(posterior: Posterior, hanger: Hanger) -> HangerState:
+    """The most probable parameters of a posterior; a class without springs is clamped."""
+    values = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    k1, k2, k3, k4 = (10 ** float(values.get(f"log10_k{end}", np.inf)) for end in (1, 2, 3, 4))
+    return HangerState(
+        float(values["theta_F"]) * hanger.nominal_tension_n,
+        k1,
+        k2,
+        k3,
+        k4,
+        damping_ratio=0.0015,
+        length_m=float(values["theta_L"]) * hanger.length_m,
+    )
+
+
+def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[PlannedTest]:
+    """Simulates each test and drops its file into the spool."""
+    kept = workspace.folder / "simulated"
+    kept.mkdir()
+    for test in tests:
+        recording = hammer_test(
+            test.hanger,
+            test.state,
+            _PLAN,
+            np.random.default_rng(test.seed),
+            time=test.time,
+            temperature_c=test.temperature_c,
+            source=test.file_name,
+        )
+        path = kept / test.file_name
+        write(recording, path)
+        for part in (sidecar_path(path), path):
+            if part.exists():
+                part.rename(workspace.spool / part.name)
+        yield test
+
+
+def _put(path: Path, text: str) -> None:
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.rename(path)

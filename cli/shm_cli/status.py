@@ -1,0 +1,71 @@
+"""`shm status`: what the workspace holds and what waits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import rich_click as click
+
+from shm.store import DeliveryState, Stage, Store, Workspace
+from shm_cli.common import json_option, opened_store, show, show_table, table
+
+
+@click.command()
+@json_option
+@click.pass_context
+def command(ctx: click.Context, as_json: bool) -> None:
+    """What the workspace holds and what waits.
+
+    \b
+    Example: shm --workspace arch status
+    """
+    with opened_store(ctx) as (workspace, store):
+        document = _status(workspace, store)
+    if as_json:
+        show(document)
+        return
+    recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
+    click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
+    click.echo(f"in the spool: {document['spool']}, in quarantine: {document['quarantine']}")
+    click.echo(
+        f"alerts: {document['alerts']}, deliveries waiting: {document['waiting_deliveries']}"
+    )
+    made = table("hangers", "hanger", "tests", "latest", "model class", "baseline since")
+    for row in document["hangers"]:
+        latest, since = row["latest_test"], row["baseline_set_at"]
+        made.add_row(
+            str(row["hanger"]),
+            str(row["tests"]),
+            f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
+            row["model"] or "none yet",
+            f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
+        )
+    show_table(made)
+
+
+def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
+    stages = Counter(recording.stage for recording in store.recordings())
+    models = store.selected_models()
+    hangers = []
+    for hanger in workspace.bridge.hangers:
+        tests, baseline = store.tests(hanger.id), store.baseline(hanger.id)
+        hangers.append(
+            {
+                "hanger": hanger.id,
+                "tests": len(tests),
+                "latest_test": tests[-1].time if tests else None,
+                "model": models.get(hanger.id),
+                "baseline_set_at": baseline.set_at if baseline else None,
+            }
+        )
+    quarantined = workspace.quarantine.folder.glob("*.reason.json")
+    return {
+        "bridge": workspace.bridge.name,
+        "recordings": {stage.value: stages[stage] for stage in Stage},
+        "spool": sum(path.is_file() for path in workspace.spool.rglob("*")),
+        "quarantine": sum(1 for _ in quarantined),
+        "alerts": len(store.alerts()),
+        "waiting_deliveries": len(store.deliveries(DeliveryState.WAITING)),
+        "hangers": hangers,
+    }

@@ -1,0 +1,26 @@
+"""What the thesis measured and found on hanger 3, as data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+HANGER_FILE = FOLDER / "hanger3.toml"
+
+PRINTINGS = {
+    "table 1.1": FOLDER / "table_1_1.modes.json",
+    "table A.4": FOLDER / "table_a_4.modes.json",
+}
+"""The same measurement, printed twice with three differing values."""
+
+EVIDENCE = {"beam1": 434.49, "beam2": 497.11}
+"""Table 5.1; its normalisation is unknown, only order and sign of differences compare."""
+
+DEVIATION_FROM_NOMINAL = {"beam1": 0.05, "beam2": -0.04}
+"""Table 6.1: most probable tension over nominal tension, less 1."""
+
+MOST_PROBABLE = {"beam1": {"theta_L": 0.97, "theta_F": 1.1}}
+"""Section 5.1."""
+
+EXACT_FIRST_FREQUENCY_HZ = {12.0: 5.58, 9.817: 7.67}
+"""First clamped-beam frequency at 711 kN by length, right where tables A.6 and A.7 are not."""

@@ -1,0 +1,102 @@
+"""`shm update`: the posterior of one model class."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rich_click as click
+
+from shm.documents import posterior_document, summary
+from shm.models import build
+from shm.update import UpdateOptions, update
+from shm.values import Posterior
+from shm_cli.common import (
+    hanger_file_option,
+    hanger_option,
+    json_option,
+    progress_bar,
+    repeat_option,
+    samples_option,
+    seed_option,
+    show,
+    show_table,
+    table,
+    tests_and_hanger,
+)
+
+modes_argument = click.argument(
+    "modes_file",
+    metavar="[MODES.json]",
+    required=False,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
+
+
+@click.command()
+@modes_argument
+@click.option("--model", default="beam2", show_default=True, help="The model class.")
+@hanger_option()
+@hanger_file_option
+@seed_option
+@samples_option
+@repeat_option
+@json_option
+@click.pass_context
+def command(
+    ctx: click.Context,
+    modes_file: Path | None,
+    model: str,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    seed: int,
+    samples: int,
+    repeat: int,
+    as_json: bool,
+) -> None:
+    """Posterior of tension and end stiffness.
+
+    The tests come from MODES.json, or are the latest of a hanger of the workspace.
+
+    \b
+    Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
+    """
+    tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    options = UpdateOptions(samples=samples, seed=seed, repeat=repeat)
+    with progress_bar("updating") as progress:
+        posterior = update(tests, build(model, hanger), options, progress)
+    if as_json:
+        show(posterior_document(posterior))
+        return
+    show_posterior(posterior)
+
+
+def show_posterior(posterior: Posterior) -> None:
+    """Parameters and predicted frequencies as tables."""
+    made = table(
+        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
+        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
+        "parameter", "mean", "sd", "5 %", "median", "95 %", "most probable",
+    )  # fmt: skip
+    tension = summary(
+        posterior.tension_n / 1e3, posterior.most_probable[0] * posterior.nominal_tension_n / 1e3
+    )
+    made.add_row("tension (kN)", *(f"{value:.1f}" for value in tension.values()))
+    for name, best in zip(posterior.names, posterior.most_probable, strict=True):
+        figures = summary(posterior.parameter(name), best)
+        made.add_row(name, *(f"{value:.4g}" for value in figures.values()))
+    show_table(made)
+    made = table("predicted frequencies", "mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
+    for row in posterior.predicted:
+        made.add_row(
+            f"{row.plane} {row.order}",
+            f"{row.measured_hz:.3f}",
+            f"{row.mean_hz:.3f}",
+            f"{row.sd_hz:.3f}",
+            f"{row.mean_hz / row.measured_hz:.4f}",
+        )
+    show_table(made)
+    click.echo(
+        f"{len(posterior.samples)} samples ({posterior.effective_sample_size:.0f} effective), "
+        f"R-hat {posterior.r_hat:.3f}, {posterior.evaluations} model evaluations, "
+        f"{posterior.seconds:.1f} s, seed {posterior.seed}"
+    )

@@ -1,0 +1,51 @@
+"""Where steps run: a pool of processes that a crash of one step cannot take along."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from importlib import import_module
+from multiprocessing.connection import wait
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def process_pool(workers: int) -> ProcessPoolExecutor:
+    """Processes that start clean, hold none of our files and locks, and die with us."""
+    for name in _ONE_THREAD:  # many threads slow small problems down and change the last digits
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([])  # imports there would hold us up until they are done
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    pool.submit(os.getpid)  # the first worker imports what it needs while we go on
+    return pool
+
+
+@contextmanager
+def children_ended() -> Iterator[None]:
+    """Ends, with the context, the processes that were begun in it."""
+    before = {child.pid for child in multiprocessing.active_children()}
+    try:
+        yield
+    finally:
+        for child in multiprocessing.active_children():
+            if child.pid not in before:
+                child.kill()
+
+
+def _begin_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the daemon, which ends us
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    import_module("shm.pipeline.steps")
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,105 @@
+"""What lies in the spool, and which of it is whole.
+
+The spool is looked through with all its subfolders. Left alone are names that begin with a dot,
+uploads under way (`.part`, `.tmp`, `.filepart`), links, and sidecars, which wait for their file.
+A file is whole once neither it nor its sidecar has changed for some seconds; an empty one, which
+some loggers make first and fill later, is given ten times as long.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from shm.read import sidecar_path
+
+_UNDER_WAY = (".part", ".tmp", ".filepart")
+_SIDECAR = ".toml"
+_PATIENCE_WITH_EMPTY = 10.0
+
+
+@dataclass(frozen=True, order=True)
+class Look:
+    """What a file looks like from outside: when and how large, it and its sidecar."""
+
+    modified_ns: int
+    size_bytes: int
+    sidecar_modified_ns: int = 0
+    sidecar_size_bytes: int = 0
+
+
+def scan(spool: Path) -> dict[Path, Look]:
+    """The files of the spool that may become recordings."""
+    looks = ((path, _look(path)) for path in _candidates(spool))
+    return {path: look for path, look in looks if look is not None}
+
+
+def _candidates(spool: Path) -> Iterator[Path]:
+    for folder, subfolders, names in os.walk(spool):
+        subfolders[:] = [name for name in subfolders if not name.startswith(".")]
+        for name in names:
+            lower = name.lower()
+            if not name.startswith(".") and not lower.endswith((*_UNDER_WAY, _SIDECAR)):
+                yield Path(folder, name)
+
+
+def _look(path: Path) -> Look | None:
+    """None for what is no regular file, or was one a moment ago."""
+    try:
+        status = path.lstat()
+    except FileNotFoundError:
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        return None
+    try:
+        sidecar = sidecar_path(path).lstat()
+    except FileNotFoundError:
+        return Look(status.st_mtime_ns, status.st_size)
+    return Look(status.st_mtime_ns, status.st_size, sidecar.st_mtime_ns, sidecar.st_size)
+
+
+class FileStabilityTracker:
+    """Tells which files have stopped changing, by looks handed in and a clock that only goes on."""
+
+    def __init__(self, stable_s: float, clock: Callable[[], float]):
+        self._stable_s, self._clock = stable_s, clock
+        self._seen: dict[Path, tuple[Look, float]] = {}
+        self._put_off: dict[Path, float] = {}
+
+    def whole(self, looks: Mapping[Path, Look]) -> list[Path]:
+        """Those of the files that are whole, the oldest first."""
+        now = self._clock()
+        known, self._seen = self._seen, {}
+        for path, look in looks.items():
+            before, since = known.get(path, (look, now))
+            self._seen[path] = look, since if before == look else now
+        self._put_off = {p: t for p, t in self._put_off.items() if p in looks and t > now}
+        ready = [path for path in looks if self._whole_at(path) <= now]
+        return sorted(ready, key=lambda path: (looks[path], path))
+
+    def put_off(self, path: Path, seconds: float) -> None:
+        """Leaves a file that could not be taken alone for a while."""
+        self._put_off[path] = self._clock() + seconds
+
+    def forget(self, path: Path) -> None:
+        """A file was taken."""
+        self._seen.pop(path, None)
+
+    @property
+    def watching(self) -> bool:
+        """Whether any file is yet to be taken."""
+        return bool(self._seen)
+
+    def seconds_to_next(self) -> float:
+        """How long until the next file may be whole; infinite without files."""
+        if not self._seen:
+            return float("inf")
+        return max(0.0, min(map(self._whole_at, self._seen)) - self._clock())
+
+    def _whole_at(self, path: Path) -> float:
+        look, since = self._seen[path]
+        patience = 1.0 if look.size_bytes else _PATIENCE_WITH_EMPTY
+        return max(since + patience * self._stable_s, self._put_off.get(path, 0.0))

@@ -1,0 +1,100 @@
+"""The contract between what was measured and who identifies modes in it.
+
+An identifier is one function of a `Measurement` that returns a `Finding`. It knows nothing of
+hits, files, planes or orders; a new one is one file and one line in `IDENTIFIERS`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.identify.options import IdentifyOptions
+from shm.values import FloatArray, FrequencyResponse, ResponsePoint
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """Something that was left out: what, how many of them, and why."""
+
+    what: str
+    count: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One hammer hit: where it begins in which record, how hard it was, whether it was used."""
+
+    record: int
+    start: int
+    start_s: float
+    peak_force_n: float
+    used: bool = True
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Poles:
+    """The poles in the band over all model orders, for a stabilisation diagram; arrays (poles,)."""
+
+    order: FloatArray
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    stable: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One test as an identifier sees it.
+
+    `decays` holds the ring-down after each used hit, each (points, samples), low-passed to the
+    band and sampled at `sampling_rate_hz`; a hit's forced part is not in it. Exponential windows of
+    `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on `frequency_response` and
+    on `decays`.
+    """
+
+    source: str
+    points: tuple[ResponsePoint, ...]
+    decays: tuple[FloatArray, ...]
+    sampling_rate_hz: float
+    frequency_response: FrequencyResponse
+    window_time_constant_s: float = math.inf
+    decay_time_constant_s: float = math.inf
+    hits: tuple[Hit, ...] = ()
+    dropped: tuple[Dropped, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMode:
+    """A mode before it has a plane and an order.
+
+    `shape` and `shape_sd` (points,): real, largest absolute value 1. Standard deviations are NaN
+    where there are too few hits to know them.
+    """
+
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: FloatArray
+    shape_sd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What an identifier found, by rising frequency, and what it dropped."""
+
+    modes: tuple[FoundMode, ...]
+    dropped: tuple[Dropped, ...]
+    poles: Poles
+
+
+class Identifier(Protocol):
+    """Finds the modes of a measurement; an empty finding is a valid answer."""
+
+    def __call__(self, measurement: Measurement, options: IdentifyOptions) -> Finding: ...

@@ -1,0 +1,59 @@
+"""What an identification may be told; every default suits a hanger hit by a soft hammer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from shm.errors import UsageError
+from shm.values import NAN
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """Options of `identify`; raises UsageError where they contradict each other.
+
+    `band_low_hz`, `band_high_hz`: modes outside are not looked for.
+    `identifier`: a name of `IDENTIFIERS`.
+    `block_rows`, `max_order`: size of the Hankel matrix in time lags and the highest model order;
+    None lets the number of channels and the length of the ring-downs decide.
+    `max_damping_ratio`: poles above are not modes of a hanger.
+    `min_presence`: share of the model orders at which a mode must show.
+    `max_frequency_sd`, `max_damping_sd`: largest standard deviations over hits, as fractions.
+    `max_frequency_spread`, `max_damping_spread`: how far they may move over the model orders, as
+    fractions; a fifth of it below three hits.
+    `min_collinearity`: smallest modal phase collinearity (1 is a real shape).
+    `min_coherence`: smallest coherence at a resonance of a measured frequency response.
+    `reference_force_n`: peak force of the reference level; NaN leaves the amplitude unknown.
+    `window_time_constant_s`: of the exponential window already in a given frequency response.
+    """
+
+    band_low_hz: float = 2.0
+    band_high_hz: float = 100.0
+    identifier: str = "ssi"
+    block_rows: int | None = None
+    max_order: int | None = None
+    max_damping_ratio: float = 0.05
+    min_presence: float = 0.4
+    max_frequency_sd: float = 0.002
+    max_damping_sd: float = 0.5
+    max_frequency_spread: float = 0.001
+    max_damping_spread: float = 0.5
+    min_collinearity: float = 0.5
+    min_coherence: float = 0.5
+    reference_force_n: float = NAN
+    window_time_constant_s: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.band_low_hz < self.band_high_hz:
+            raise UsageError(
+                f"band {self.band_low_hz:g} to {self.band_high_hz:g} Hz is empty.",
+                remedy="Give band_low_hz below band_high_hz.",
+            )
+        for name, low in (("block_rows", 5), ("max_order", 2)):
+            value = getattr(self, name)
+            if value is not None and value < low:
+                raise UsageError(
+                    f"{name} = {value} is too small.",
+                    remedy=f"Give at least {low}, or leave it out.",
+                )

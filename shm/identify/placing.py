@@ -1,0 +1,74 @@
+"""Gives found modes their plane and order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.identify.contract import FoundMode
+from shm.identify.order import PlaneModes, assign_orders
+from shm.identify.planes import planes_of, shape_points
+from shm.values import PLANES, Mode, Plane, ResponsePoint, ShapePoint
+
+
+def placed(
+    found: Sequence[FoundMode], points: Sequence[ResponsePoint], length_m: float
+) -> tuple[tuple[Mode, ...], tuple[str, ...]]:
+    """The modes with plane, order and shape by position, plane by plane, and what was decided."""
+    planes = planes_of(found, points)
+    groups = [
+        [mode for mode, own in zip(found, planes, strict=True) if own == plane] for plane in PLANES
+    ]
+    shapes = [
+        [shape_points(mode, plane, points) for mode in group]
+        for plane, group in zip(PLANES, groups, strict=True)
+    ]
+    orders = assign_orders(
+        [_plane_modes(*pair, length_m) for pair in zip(groups, shapes, strict=True)]
+    )
+    modes = tuple(
+        _mode(plane, order, mode, shape)
+        for plane, *columns in zip(PLANES, orders, groups, shapes, strict=True)
+        for order, mode, shape in zip(*columns, strict=True)
+    )
+    return modes, (*_plane_notes(points), *_order_notes(orders))
+
+
+def _plane_modes(
+    group: Sequence[FoundMode], shapes: Sequence[tuple[ShapePoint, ...]], length_m: float
+) -> PlaneModes:
+    position = np.array([point.x_m for point in shapes[0]] if shapes else [])
+    values = np.array([[point.value for point in shape] for shape in shapes])
+    values = values.reshape(len(group), len(position))
+    seen = np.all(np.isfinite(values), axis=0) & bool(np.isfinite(length_m))
+    frequency = np.array([mode.frequency_hz for mode in group])
+    return PlaneModes(frequency, position[seen] / length_m, values[:, seen])
+
+
+def _mode(plane: Plane, order: int, found: FoundMode, shape: tuple[ShapePoint, ...]) -> Mode:
+    return Mode(
+        plane=plane,
+        order=order,
+        frequency_hz=found.frequency_hz,
+        frequency_sd_hz=found.frequency_sd_hz,
+        damping_ratio=found.damping_ratio,
+        damping_sd=found.damping_sd,
+        shape=shape,
+    )
+
+
+def _plane_notes(points: Sequence[ResponsePoint]) -> list[str]:
+    if not any(point.plane for point in points):
+        return ["no channel states its plane: all modes are taken as transverse"]
+    return []
+
+
+def _order_notes(orders: Sequence[Sequence[int]]) -> list[str]:
+    notes = []
+    for plane, numbers in zip(PLANES, orders, strict=True):
+        missing = sorted(set(range(1, max(numbers, default=0))) - set(numbers))
+        if missing:
+            listed = ", ".join(str(order) for order in missing)
+            notes.append(f"{plane} order {listed} was not found; the others keep their numbers")
+    return notes

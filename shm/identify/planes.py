@@ -1,0 +1,92 @@
+"""Which plane a mode vibrates in, by its shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.identify.contract import FoundMode
+from shm.values import PLANES, FloatArray, Plane, ResponsePoint, ShapePoint
+
+CLOSE = 0.02
+"""Two modes nearer than this fraction cannot be neighbours in one plane of a hanger."""
+LEAST_SHARE = 0.2
+"""Of the energy that a mode must have in a plane to be moved there."""
+
+
+def planes_of(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> list[Plane]:
+    """The plane of each of `modes` (by rising frequency).
+
+    The plane with more energy a channel; of two close modes in one plane, the one with more energy
+    in the other plane goes there, if that plane has no mode near. All are transverse where no plane
+    is stated.
+    """
+    known = [plane for plane in PLANES if any(point.plane == plane for point in points)]
+    if len(known) < 2:
+        return [known[0] if known else "transverse"] * len(modes)
+    shares = np.array([_transverse_share(mode.shape, points) for mode in modes])
+    planes: list[Plane] = ["transverse" if share >= 0.5 else "longitudinal" for share in shares]
+    frequencies = np.array([mode.frequency_hz for mode in modes])
+    for first in range(len(modes) - 1):
+        _separate(first, planes, shares, frequencies)
+    return planes
+
+
+def _transverse_share(shape: FloatArray, points: Sequence[ResponsePoint]) -> float:
+    """Share of the energy a channel that is transverse."""
+    transverse, longitudinal = (
+        np.mean(shape[[point.plane == plane for point in points]] ** 2) for plane in PLANES
+    )
+    return float(transverse / (transverse + longitudinal))
+
+
+def _separate(first: int, planes: list[Plane], shares: FloatArray, frequencies: FloatArray) -> None:
+    """Moves one of the modes `first` and `first + 1` to the other plane where they must differ."""
+    pair = [first, first + 1]
+    if planes[first] != planes[first + 1] or not _close(frequencies[pair[0]], frequencies[pair[1]]):
+        return
+    other: Plane = PLANES[1 - PLANES.index(planes[first])]
+    share = shares if other == "transverse" else 1 - shares
+    moved = pair[int(np.argmax(share[pair]))]
+    crowded = any(
+        planes[index] == other and _close(frequencies[index], frequencies[moved])
+        for index in range(len(planes))
+    )
+    if share[moved] >= LEAST_SHARE and not crowded:
+        planes[moved] = other
+
+
+def _close(one: float, other: float) -> bool:
+    return bool(abs(one / other - 1) < CLOSE)
+
+
+def shape_points(
+    mode: FoundMode, plane: Plane, points: Sequence[ResponsePoint]
+) -> tuple[ShapePoint, ...]:
+    """The mode's shape by position: value in its plane, cross in the other, largest value 1.
+
+    Channels without a position are left out; those at one position and in one plane are averaged.
+    """
+    inside = [index for index, point in enumerate(points) if (point.plane or plane) == plane]
+    largest = mode.shape[max(inside, key=lambda index: abs(mode.shape[index]))]
+    positions = sorted({point.x_m for point in points if np.isfinite(point.x_m)})
+    return tuple(_shape_point(mode, x_m, plane, points, largest) for x_m in positions)
+
+
+def _shape_point(
+    mode: FoundMode, x_m: float, plane: Plane, points: Sequence[ResponsePoint], scale: float
+) -> ShapePoint:
+    here = np.array([point.x_m == x_m for point in points])
+    inside = here & np.array([(point.plane or plane) == plane for point in points])
+    outside = here & ~inside
+    return ShapePoint(
+        x_m=x_m,
+        value=_mean(mode.shape[inside]) / scale,
+        cross=_mean(mode.shape[outside]) / scale,
+        sd=_mean(mode.shape_sd[inside]) / abs(scale),
+    )
+
+
+def _mean(values: FloatArray) -> float:
+    return float(np.mean(values)) if len(values) else np.nan

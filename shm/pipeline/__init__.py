@@ -1,0 +1,10 @@
+"""The flow: file -> archive -> modal tests -> posterior -> drift, alert -> hooks.
+
+`intake` takes files in, `steps` holds each arrow as a function of values, `jobs` says which steps
+wait, and `flow` begins them, keeps their results and refuses what fails.
+"""
+
+from shm.pipeline.flow import Flow, utc_now
+from shm.pipeline.jobs import Clock, Notifier
+
+__all__ = ["Clock", "Flow", "Notifier", "utc_now"]

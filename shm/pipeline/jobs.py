@@ -1,0 +1,179 @@
+"""What waits, asked of the store: each job knows how to begin and who keeps its result."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from functools import partial
+from typing import Any
+
+from shm.bridge import Hook
+from shm.errors import NothingThere, ShmError
+from shm.pipeline.terms import run_step, seed_of
+from shm.store import (
+    Delivery,
+    Lineage,
+    Stage,
+    Store,
+    StoredRecording,
+    StoredTest,
+    WaitingTest,
+    Workspace,
+)
+from shm.values import Alert, Hanger
+
+Clock = Callable[[], datetime]
+Notifier = Callable[[Hook, Alert], None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to run on the executor, and what keeps its result."""
+
+    run: Callable[[], Any]
+    keep: Callable[[Any], object]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A step that waits: its name, the recordings and tests it is for, how to begin it."""
+
+    key: tuple[str, int]
+    prepare: Callable[[], Step]
+    recordings: tuple[int, ...] = ()
+    tests: tuple[int, ...] = ()
+    delivery: Delivery | None = None
+
+
+@dataclass(frozen=True)
+class Jobs:
+    """The jobs of a workspace, made from what its store says now."""
+
+    workspace: Workspace
+    store: Store
+    clock: Clock
+
+    def waiting(self, limit: int, held: Collection[int]) -> Iterator[Job]:
+        """Steps in the order in which to take them, leaving out the recordings `held`.
+
+        A hanger's first selection waits until every received file is identified, so that the
+        earliest of its tests make the baseline.
+        """
+        received = self.store.waiting_recordings(limit, excluding=held)
+        for recording in received:
+            yield Job(
+                ("identify", recording.id), partial(self._identify, recording), (recording.id,)
+            )
+        selected = self.store.selected_models()
+        waiting = self._waiting_tests(held)
+        for hanger in self.workspace.bridge.hangers:
+            if hanger.id in selected:
+                yield from self._later_tests(hanger, selected[hanger.id], waiting[hanger.id])
+            elif not received:
+                yield from self._first_tests(hanger, waiting[hanger.id])
+
+    def owed(self, notifier: Notifier, limit: int, excluding: Collection[int]) -> Iterator[Job]:
+        """Deliveries that are due."""
+        for delivery in self.store.due_deliveries(self.clock(), limit, excluding):
+            prepare = partial(self._deliver, notifier, delivery)
+            yield Job(("deliver", delivery.id), prepare, delivery=delivery)
+
+    def _waiting_tests(self, held: Collection[int]) -> defaultdict[int, list[WaitingTest]]:
+        waiting: defaultdict[int, list[WaitingTest]] = defaultdict(list)
+        for test in self.store.waiting_tests():
+            if test.recording_id not in held:
+                waiting[test.hanger].append(test)
+        return waiting
+
+    def _first_tests(self, hanger: Hanger, tests: Sequence[WaitingTest]) -> Iterator[Job]:
+        needed = self.workspace.settings.baseline_tests
+        if len(tests) >= needed:
+            first = tests[:needed]
+            yield _job("select", hanger.id, partial(self._select, hanger, first), first)
+
+    def _later_tests(
+        self, hanger: Hanger, model: str, tests: Sequence[WaitingTest]
+    ) -> Iterator[Job]:
+        for test in tests:
+            if test.stage is Stage.IDENTIFIED:
+                yield _job("update", test.id, partial(self._update, hanger, model, test), [test])
+        # Watched in the order of their times, so that an alert names the first test that shows it.
+        for test in tests[:1]:
+            if test.stage is Stage.UPDATED:
+                yield _job("watch", test.id, partial(self._watch, hanger, test), [test])
+
+    def _identify(self, recording: StoredRecording) -> Step:
+        workspace, settings = self.workspace, self.workspace.settings
+        selected = self.store.selected_models()
+        run = partial(
+            run_step,
+            "identify_file",
+            recording,
+            workspace.archive,
+            workspace.bridge,
+            settings,
+            selected,
+        )
+        band = {name: getattr(settings, name) for name in ("band_low_hz", "band_high_hz")}
+        lineage = Lineage.of([recording.file.sha256, recording.file.sidecar_as], band)
+        return Step(
+            run, lambda found: self.store.identified(recording.id, found, lineage, self.clock())
+        )
+
+    def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
+        tests = [self.store.test(test.id) for test in first]
+        names = self.workspace.settings.model_names
+        samples, seed, lineage = self._terms(hanger, names, tests)
+        plain = [test.test for test in tests]
+        run = partial(run_step, "select_model", plain, hanger, names, samples, seed)
+        return Step(
+            run, lambda found: self.store.selected(hanger.id, tests, found, lineage, self.clock())
+        )
+
+    def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
+        test = self.store.test(waiting.id)
+        samples, seed, lineage = self._terms(hanger, [model], [test])
+        run = partial(run_step, "update_test", test.test, hanger, model, samples, seed)
+        return Step(run, lambda found: self.store.updated(test, found, lineage, self.clock()))
+
+    def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
+        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id)
+        if baseline is None:
+            raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
+        current = self.store.posterior_of(test)
+        hooks = [hook.name for hook in self.workspace.bridge.hooks]
+        run = partial(run_step, "watch_test", baseline, current, hanger, test.test.id, test.time)
+        return Step(
+            run,
+            lambda found: self.store.watched(
+                test, baseline, found[0], found[1], hooks, self.clock()
+            ),
+        )
+
+    def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
+        hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}
+        run = partial(_notify, notifier, hooks.get(delivery.hook), delivery)
+        return Step(run, lambda _: self.store.delivered(delivery, self.clock()))
+
+    def _terms(
+        self, hanger: Hanger, models: Sequence[str], tests: Sequence[StoredTest]
+    ) -> tuple[int, int, Lineage]:
+        """Samples, seed and lineage of an update; the seed depends on what is updated alone."""
+        settings = self.workspace.settings
+        samples, seed = settings.samples, seed_of(settings.seed, [test.key for test in tests])
+        terms = {"models": list(models), "samples": samples, "seed": seed}
+        inputs = [[test.key, asdict(test.lineage)] for test in tests]
+        return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
+
+
+def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[WaitingTest]) -> Job:
+    recordings = tuple(dict.fromkeys(test.recording_id for test in tests))
+    return Job((kind, number), prepare, recordings, tuple(test.id for test in tests))
+
+
+def _notify(notifier: Notifier, hook: Hook | None, delivery: Delivery) -> None:
+    if hook is None:
+        raise ShmError(f"no hook {delivery.hook} in bridge.toml.", remedy="Describe it again.")
+    notifier(hook, delivery.alert)

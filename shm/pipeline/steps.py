@@ -1,0 +1,118 @@
+"""The steps of the flow: functions of plain values that run wherever the executor puts them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from shm.bridge import Bridge
+from shm.documents import format_time, load_modes
+from shm.errors import BadInput
+from shm.identify import IdentifyOptions, identify
+from shm.models import build
+from shm.pipeline.terms import competing
+from shm.read import read
+from shm.settings import Settings
+from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
+from shm.store.archive import MODES_SUFFIX
+from shm.update import UpdateOptions, select, update
+from shm.values import Alert, Drift, Hanger, ModalTest, Posterior, Selection
+from shm.watch import assess, decide
+
+
+def identify_file(
+    recording: StoredRecording,
+    archive: Archive,
+    bridge: Bridge,
+    settings: Settings,
+    selected: Mapping[int, str],
+) -> tuple[IdentifiedTest, ...]:
+    """The modal tests in a received file; raises BadInput where it cannot be used.
+
+    `selected` names the model class of each hanger that has one: it must be able to describe the
+    test, and so must every competing class where none is selected yet.
+    """
+    _refuse_size(recording.file.size_bytes, settings.max_file_bytes)
+    latest = recording.received_at + timedelta(seconds=settings.future_tolerance_seconds)
+    with archive.opened(recording.file) as path:
+        if path.name.lower().endswith(MODES_SUFFIX):
+            found = _tests_in(path)
+        else:
+            found = (_test_in(path, bridge, settings, latest),)
+    for item in found:
+        hanger = _hanger(item.test.hanger, bridge)
+        _refuse_future(item.test.time, latest, f"test {item.test.id}")
+        for model in competing(hanger, settings, selected):
+            model.refuse(item.test)
+    return found
+
+
+def _refuse_size(size_bytes: int, limit_bytes: int) -> None:
+    if size_bytes == 0:
+        raise BadInput("the file is empty.", remedy="Check the logger and send the file again.")
+    if size_bytes > limit_bytes:
+        raise BadInput(
+            f"{size_bytes} bytes are more than the {limit_bytes} of setting max_file_bytes.",
+            remedy="Send it in parts, or raise the setting.",
+        )
+
+
+def _tests_in(path: Path) -> tuple[IdentifiedTest, ...]:
+    tests = load_modes(path)
+    for name, times in Counter(test.id for test in tests).items():
+        if times > 1:
+            raise BadInput(f"test id {name} is given {times} times.", remedy="Give each its own.")
+    return tuple(IdentifiedTest(test, position) for position, test in enumerate(tests))
+
+
+def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -> IdentifiedTest:
+    record = read(path)
+    hanger = _hanger(record.hanger, bridge)
+    _refuse_future(record.time, latest, "the recording")
+    options = IdentifyOptions(band_low_hz=settings.band_low_hz, band_high_hz=settings.band_high_hz)
+    result = identify([record], options, test_id=path.stem, length_m=hanger.length_m)
+    dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
+    return IdentifiedTest(result.test, 0, result.frequency_response, (*result.notes, *dropped))
+
+
+def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
+    if hanger_id is None:
+        raise BadInput(
+            "the file names no hanger.", remedy="Give `hanger` in its header or its sidecar."
+        )
+    return bridge.hanger(hanger_id)
+
+
+def _refuse_future(time: datetime | None, latest: datetime, what: str) -> None:
+    if time is not None and time > latest:
+        raise BadInput(
+            f"{what} claims the time {format_time(time)}, ahead of the clock.",
+            remedy="Correct its `time`, or the clock of the logger.",
+        )
+
+
+def select_model(
+    tests: Sequence[ModalTest], hanger: Hanger, names: Sequence[str], samples: int, seed: int
+) -> Selection:
+    """The competing classes of a hanger, compared on its first tests."""
+    models = [build(name, hanger) for name in names]
+    return select(tests, models, UpdateOptions(samples=samples, seed=seed))
+
+
+def update_test(test: ModalTest, hanger: Hanger, name: str, samples: int, seed: int) -> Posterior:
+    """The posterior of one test in the selected class."""
+    return update([test], build(name, hanger), UpdateOptions(samples=samples, seed=seed))
+
+
+def watch_test(
+    baseline: Baseline, current: Posterior, hanger: Hanger, test: str, time: datetime
+) -> tuple[tuple[Drift, ...], Alert | None]:
+    """How far a test lies from the baseline, and the alert that this calls for."""
+    limits = hanger.thresholds
+    drifts = assess(baseline.posterior, current, limits, hanger=hanger.id, test=test, time=time)
+    alert = decide(drifts, limits)
+    # A new baseline makes a standing condition a new one.
+    return drifts, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")

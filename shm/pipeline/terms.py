@@ -1,0 +1,57 @@
+"""What the steps agree on: which classes compete, which seed, how a refusal reads, how to run one.
+
+Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from shm.errors import BadInput, ShmError
+from shm.models import Model, build
+from shm.settings import Settings
+from shm.store import StoredRecording
+from shm.values import Hanger
+
+
+def run_step(name: str, *arguments: Any) -> Any:
+    """Runs a step of `shm.pipeline.steps`, which is imported in the process that computes."""
+    return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
+
+
+def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
+    names = (selected[hanger.id],) if hanger.id in selected else settings.model_names
+    return tuple(build(name, hanger) for name in names)
+
+
+def seed_of(seed: int, keys: Sequence[str]) -> int:
+    """The seed of one result: the same in whatever order and wherever it is computed."""
+    text = "\n".join([str(seed), *sorted(keys)])
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4])
+
+
+def reason_document(
+    error: BaseException, recording: StoredRecording, time: datetime
+) -> dict[str, Any]:
+    """Why a file is refused: which file, line and channel, what is wrong, what to do."""
+    reason: dict[str, Any] = {
+        "schema": "shm.reason/1",
+        "file": recording.file.file_name,
+        "line": None,
+        "channel": None,
+        "message": f"internal error: {error!r}.",
+        "remedy": "Report this with the log, then drop the file again.",
+        "time": time,
+        "sha256": recording.file.sha256,
+    }
+    if isinstance(error, ShmError):
+        reason |= {"message": error.message, "remedy": error.remedy}
+    if isinstance(error, BadInput):
+        file = Path(error.file).name or recording.file.file_name
+        reason |= {"file": file, "line": error.line, "channel": error.channel or None}
+    return reason

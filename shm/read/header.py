@@ -1,0 +1,183 @@
+"""What a file and its sidecar say about a recording, each entry with the place where it says so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date, datetime
+from pathlib import Path
+
+from shm.documents import parse_time
+from shm.errors import BadInput
+from shm.read.units import KNOWN, SI, Unit, unit_of
+from shm.values import NAN, PLANES, Plane, Quantity
+
+KEYS = ("hanger", "time", "temperature_c", "sampling_rate_hz")
+CHANNEL_KEYS = ("unit", "x_m", "plane")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A value as written, and where."""
+
+    value: object
+    file: Path
+    line: int | None = None
+
+    @property
+    def text(self) -> str:
+        return str(self.value).strip()
+
+    def refusal(self, what: str, remedy: str, channel: str = "") -> BadInput:
+        return BadInput(what, file=self.file, line=self.line, channel=channel, remedy=remedy)
+
+
+@dataclass(frozen=True)
+class Header:
+    """Entries of the whole recording and of each channel, in the order of the channels."""
+
+    file: Path
+    channels: Mapping[str, Mapping[str, Entry]]
+    entries: Mapping[str, Entry] = field(default_factory=dict)
+
+    def overridden_by(self, other: Header) -> Header:
+        """This header with what `other` says in its place."""
+        channels = {
+            name: {**own, **other.channels.get(name, {})} for name, own in self.channels.items()
+        }
+        return Header(self.file, channels, {**self.entries, **other.entries})
+
+    @property
+    def hanger(self) -> int | None:
+        entry = self._given("hanger")
+        if entry is None:
+            return None
+        number = _number(entry, "hanger", "Give the hanger's number, as in hanger: 3.")
+        if not number.is_integer() or number < 0:
+            raise entry.refusal(
+                f"hanger = {entry.text} is not a whole number.", "Give the hanger's number."
+            )
+        return int(number)
+
+    @property
+    def time(self) -> datetime | None:
+        entry = self._given("time")
+        if entry is None:
+            return None
+        try:
+            text = entry.value.isoformat() if isinstance(entry.value, date) else entry.text
+            return parse_time(text)
+        except (ValueError, OverflowError):
+            raise entry.refusal(
+                f"time = {entry.text!r} is not an ISO 8601 time.", "Write 2026-05-01T10:00:00Z."
+            ) from None
+
+    @property
+    def temperature_c(self) -> float:
+        entry = self._given("temperature_c")
+        remedy = "Give degrees Celsius, or leave it out."
+        return NAN if entry is None else _number(entry, "temperature_c", remedy)
+
+    @property
+    def sampling_rate_hz(self) -> float:
+        """NaN where nothing says it."""
+        entry = self._given("sampling_rate_hz")
+        if entry is None:
+            return NAN
+        remedy = "Give the samples a second, as in sampling_rate_hz: 512."
+        rate = _number(entry, "sampling_rate_hz", remedy)
+        if not rate > 0:
+            raise entry.refusal(f"sampling_rate_hz = {entry.text} is not positive.", remedy)
+        return rate
+
+    def quantity_and_unit(self, name: str) -> tuple[Quantity, Unit]:
+        """What a channel measures, by its unit; by its name, in SI, where no unit is given."""
+        entry = self.channels[name].get("unit")
+        named = quantity_named(name)
+        if entry is None or not entry.text:
+            if named is None:
+                raise BadInput(
+                    "neither its name nor a unit says what it measures.",
+                    file=self.file,
+                    channel=name,
+                    remedy=f"Name it force or acc_1, or give its unit: {KNOWN}.",
+                )
+            return named, Unit(named, 1.0)
+        unit = unit_of(entry.text)
+        if unit is None or named not in (None, unit.quantity):
+            what = f"the unit {entry.text!r} is not one of {named or 'force or acceleration'}."
+            raise entry.refusal(what, f"Give one of {KNOWN}.", name)
+        return unit.quantity, unit
+
+    def unit_text(self, name: str) -> str:
+        """The unit as written; the SI unit of what the name says where none is written."""
+        entry = self.channels[name].get("unit")
+        named = quantity_named(name)
+        if entry is not None and entry.text:
+            return entry.text
+        return SI[named] if named else ""
+
+    def x_m(self, name: str) -> float:
+        entry = self.channels[name].get("x_m")
+        if entry is None or not entry.text:
+            return NAN
+        return _number(entry, "x_m", "Give metres from the deck end, or leave it empty.", name)
+
+    def plane(self, name: str) -> Plane | None:
+        entry = self.channels[name].get("plane")
+        if entry is None or not entry.text:
+            return None
+        for plane in PLANES:
+            if entry.text.lower() == plane:
+                return plane
+        raise entry.refusal(
+            f"plane = {entry.text!r} is unknown.", f"Give {' or '.join(PLANES)}.", name
+        )
+
+    def _given(self, key: str) -> Entry | None:
+        entry = self.entries.get(key)
+        return entry if entry is not None and entry.text else None
+
+
+def quantity_named(name: str) -> Quantity | None:
+    """What a channel measures by its name: force..., hammer..., acc..."""
+    lowered = name.lower()
+    if lowered.startswith(("force", "hammer")):
+        return "force"
+    return "acceleration" if lowered.startswith("acc") else None
+
+
+def spread(
+    key: str, values: Sequence[Entry], names: Sequence[str], where: Entry
+) -> dict[str, Entry]:
+    """The values of a list, one a channel, by channel name.
+
+    One value alone, and a list as long as the accelerations, goes to the accelerations, except
+    that units must be given for all channels.
+    """
+    if len(values) == len(names):
+        return dict(zip(names, values, strict=True))
+    accelerations = [name for name in names if quantity_named(name) != "force"]
+    if key == "plane" and len(values) == 1:
+        return dict.fromkeys(accelerations, values[0])
+    if key != "unit" and len(values) == len(accelerations):
+        return dict(zip(accelerations, values, strict=True))
+    raise where.refusal(
+        f"{key} has {len(values)} values for {len(names)} channels.",
+        f"Give one a channel, in this order: {', '.join(names)}.",
+    )
+
+
+def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
+    """A finite number, or NaN where it is written as such."""
+    text = entry.text
+    if "," in text and "." not in text:
+        text = text.replace(",", ".")
+    try:
+        number = float(text)
+    except ValueError:
+        raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel) from None
+    if math.isinf(number):
+        raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel)
+    return number

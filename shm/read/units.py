@@ -1,0 +1,53 @@
+"""Units of force and acceleration, and their factors to N and m/s^2."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from shm.values import Quantity
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a unit measures, and how many N or m/s^2 it is."""
+
+    quantity: Quantity
+    si: float
+
+
+_STANDARD_GRAVITY = 9.80665
+_METRE_PER_S2 = Unit("acceleration", 1.0)
+_UNITS: dict[str, Unit] = {
+    "n": Unit("force", 1.0),
+    "kn": Unit("force", 1e3),
+    "lbf": Unit("force", 4.4482216152605),
+    "m/s2": _METRE_PER_S2,
+    "m/s/s": _METRE_PER_S2,
+    "m/sec2": _METRE_PER_S2,
+    "mm/s2": Unit("acceleration", 1e-3),
+    "g": Unit("acceleration", _STANDARD_GRAVITY),
+    "mg": Unit("acceleration", 1e-3 * _STANDARD_GRAVITY),
+}
+KNOWN = "N, kN, lbf for forces; m/s2, mm/s2, g for accelerations"
+SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
+
+
+def unit_of(text: str) -> Unit | None:
+    """The unit that a text means, None where it is not known."""
+    return _UNITS.get(re.sub(r"[\s\[\]()^*]", "", text.lower().replace("²", "2")))
+
+
+def accelerance_si(numerator: str, denominator: str) -> float | None:
+    """Factor to m/s^2/N of response over force; "" means SI; None where a unit is not known.
+
+    The numerator may also hold the whole fraction, as in "(m/s2)/N".
+    """
+    if not denominator and unit_of(numerator) is None and "/" in numerator:
+        numerator, _, denominator = numerator.rpartition("/")
+    above = unit_of(numerator or SI["acceleration"])
+    below = unit_of(denominator or SI["force"])
+    if above is None or below is None:
+        return None
+    right = above.quantity == "acceleration" and below.quantity == "force"
+    return above.si / below.si if right else None

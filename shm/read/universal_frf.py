@@ -1,0 +1,195 @@
+"""Frequency responses of a UFF file and `FrequencyResponse`, each made from the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read import assemble, universal_marks
+from shm.read.base import Peek, PeekChannel
+from shm.read.header import Header
+from shm.read.sidecar import with_sidecar
+from shm.read.units import accelerance_si
+from shm.read.universal_sets import COHERENCE, FREQUENCY_RESPONSE, Content, FunctionSet
+from shm.values import ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+
+_ACCELERATION, _EXCITATION, _FREQUENCY, _EVEN = 12, 13, 18, 1
+_UNIT = "m/s2/N"
+_STEP = "frequency_step_hz"
+_OFF_GRID = 0.01
+_SAME_STEP = 1e-4
+
+
+def response_sets(content: Content) -> list[FunctionSet]:
+    return [found for found in content.functions if found.function == FREQUENCY_RESPONSE]
+
+
+def frequency_response(content: Content, path: Path) -> FrequencyResponse:
+    """The accelerances of a file, roving sensor or roving hammer; raises BadInput."""
+    sets = response_sets(content)
+    header = _header(sets, content, path)
+    skipped, frequency = _frequencies(sets, path)
+    accelerance = np.array(
+        [_accelerance(found, name, path) for name, found in zip(header.channels, sets, strict=True)]
+    )
+    return FrequencyResponse(
+        str(path),
+        tuple(ResponsePoint(n, header.plane(n), header.x_m(n)) for n in header.channels),
+        frequency,
+        np.pad(accelerance, ((0, 0), (skipped, 0)), constant_values=np.nan),
+        _coherence(sets, content, skipped),
+        header.hanger,
+        header.time,
+        header.temperature_c,
+    )
+
+
+def peek(content: Content, file_format: str, path: Path) -> Peek:
+    sets = response_sets(content)
+    header = _header(sets, content, path)
+    channels = tuple(
+        PeekChannel(name, "acceleration", _UNIT, header.plane(name), header.x_m(name))
+        for name in header.channels
+    )
+    return Peek(
+        source=str(path),
+        format=file_format,
+        channels=channels,
+        samples=sets[0].points,
+        hanger=header.hanger,
+        time=header.time,
+        temperature_c=header.temperature_c,
+    )
+
+
+def sets_of(response: FrequencyResponse) -> list[dict[str, Any]]:
+    """The data sets of frequency responses, and their coherences, for pyuff."""
+    places = [point.x_m for point in response.points]
+    nodes = universal_marks.number_nodes(places)
+    sets = universal_marks.node_set(places, nodes)
+    for index, node in enumerate(nodes):
+        own = _set(response, index, node)
+        sets.append({**own, "func_type": FREQUENCY_RESPONSE, "data": response.accelerance[index]})
+        if response.coherence is not None:
+            share = {"ordinate_axis_units_lab": "NONE", "ordinate_spec_data_type": 0}
+            data = response.coherence[index].copy()
+            sets.append({**own, **share, "func_type": COHERENCE, "data": data})
+    return sets
+
+
+def _set(response: FrequencyResponse, index: int, node: int) -> dict[str, Any]:
+    point = response.points[index]
+    step = float(response.frequency_hz[1] - response.frequency_hz[0])
+    return {
+        **universal_marks.id_lines(response, point.name, {_STEP: step}),
+        "type": 58,
+        "rsp_ent_name": point.name[:10],
+        "rsp_node": node,
+        "rsp_dir": universal_marks.direction(point.plane),
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spacing": _EVEN,
+        "abscissa_spec_data_type": _FREQUENCY,
+        "abscissa_axis_lab": "Frequency",
+        "abscissa_axis_units_lab": "Hz",
+        "ordinate_spec_data_type": _ACCELERATION,
+        "ordinate_axis_lab": "Acceleration",
+        "ordinate_axis_units_lab": "m/s2",
+        "orddenom_spec_data_type": _EXCITATION,
+        "orddenom_axis_lab": "Force",
+        "orddenom_axis_units_lab": "N",
+        "x": response.frequency_hz,
+    }
+
+
+def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header:
+    """The points: where the response was measured or, where that stays, where was hit."""
+    responses, references = (
+        {found.response[1:] for found in sets},
+        {found.reference[1:] for found in sets},
+    )
+    if len(responses) > 1 and len(references) > 1:
+        raise BadInput(
+            f"{len(references)} hammer points and {len(responses)} sensors in one file.",
+            file=path,
+            remedy="Export the responses to one hammer point, or of one sensor, to one file.",
+        )
+    roving_hammer = len(references) > 1
+    channels = {}
+    for number, found in enumerate(sets, start=1):
+        name = found.lines[0] if universal_marks.facts(found) else f"point_{number}"
+        _, node, direction = found.reference if roving_hammer else found.response
+        said = universal_marks.channel_entries(found, node, direction, content, path)
+        channels[name] = {key: entry for key, entry in said.items() if key != "unit"}
+    if len(channels) < len(sets):
+        raise BadInput(
+            "several frequency responses have one name.",
+            file=path,
+            remedy="Give each its own first id line.",
+        )
+    return with_sidecar(Header(path, channels, universal_marks.entries(sets[0], path)), path)
+
+
+def _frequencies(sets: Sequence[FunctionSet], path: Path) -> tuple[int, FloatArray]:
+    """How many lines the file leaves out below its first, and all frequencies from 0, in Hz."""
+    first = sets[0]
+    for found in sets:
+        if (found.points, found.first, found.step) != (first.points, first.first, first.step):
+            raise BadInput(
+                f"{found.title} has other frequencies than {first.title}.",
+                file=path,
+                remedy="Export all responses over the same lines.",
+            )
+    step = _step(first)
+    skipped = first.first / step if step > 0 else math.nan
+    if not 0 <= skipped < 1e6 or abs(skipped - round(skipped)) > _OFF_GRID:
+        raise BadInput(
+            "its frequencies do not lie on an even grid from 0.",
+            file=path,
+            remedy="Export lines at whole multiples of one step.",
+        )
+    lines = np.arange(round(skipped) + first.points, dtype=float)
+    return round(skipped), step * lines
+
+
+def _step(found: FunctionSet) -> float:
+    """The step in Hz, with all its digits where the file is ours."""
+    try:
+        own = float(universal_marks.facts(found).get(_STEP, math.nan))
+    except ValueError:
+        return found.step
+    return own if abs(own - found.step) < _SAME_STEP * found.step else found.step
+
+
+def _accelerance(found: FunctionSet, name: str, path: Path) -> ComplexArray:
+    factor = accelerance_si(found.unit, found.denominator_unit)
+    if factor is None or (not found.unit and found.quantity != _ACCELERATION):
+        raise BadInput(
+            f"{found.title} is {found.label or 'a response'} in {found.unit or 'no unit'} over"
+            f" {found.denominator_unit or 'no unit'}, not an acceleration over a force.",
+            file=path,
+            channel=name,
+            remedy="Export accelerances, in m/s2 or g over N, kN or lbf.",
+        )
+    direction = universal_marks.sign(found.response[2], found.reference[2])
+    values: ComplexArray = np.asarray(found.data, dtype=complex) * complex(factor * direction)
+    assemble.refuse_implausible(np.abs(values), name, path)
+    return values
+
+
+def _coherence(sets: Sequence[FunctionSet], content: Content, skipped: int) -> FloatArray | None:
+    """Coherences (points, lines) where the file holds one for each response, else None."""
+    known = {
+        (found.response, found.reference): np.real(np.asarray(found.data))
+        for found in content.functions
+        if found.function == COHERENCE and found.points == sets[0].points
+    }
+    rows = [known.get((found.response, found.reference)) for found in sets]
+    if any(row is None for row in rows):
+        return None
+    return np.pad(np.array(rows, float), ((0, 0), (skipped, 0)), constant_values=np.nan)

@@ -1,0 +1,214 @@
+"""The door to pyuff: data sets in and out, with nothing believed that a damaged file may hold.
+
+pyuff reads many damaged files without a word and says little where it fails, so lengths, steps
+and values are checked here. Type 58: https://www.ceas3.uc.edu/sdrluff/ (Function at nodal DOF).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyuff
+
+from shm.errors import BadInput
+from shm.read.content import bytes_of
+from shm.values import ComplexArray, FloatArray
+
+TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
+_FUNCTION = 58
+_NODES = (15, 2411)
+_START = re.compile(rb"\A\s*-1[ \t]*\r?\n\s*\d+")
+_MARK = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
+_EXPORT_AGAIN = "Export or send it again."
+_IEEE_754 = 2
+_INCREMENT_DIGITS = 6
+_MOST_UNEVEN = 0.01
+_LARGEST_NODE = 1e10
+_LEAST_STEP, _LARGEST_STEP = 1e-9, 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionSet:
+    """A data set of type 58. `data` (points,) is None where only headers were read.
+
+    `first` and `step` (0 where unknown) are those of the abscissa, in s or Hz; directions are 1 to
+    3 for x to z, negative against the axis.
+    """
+
+    number: int
+    function: int
+    lines: tuple[str, ...]
+    response: tuple[str, int, int]
+    reference: tuple[str, int, int]
+    points: int
+    first: float
+    step: float
+    quantity: int
+    label: str
+    unit: str
+    denominator_unit: str
+    data: FloatArray | ComplexArray | None
+
+    @property
+    def title(self) -> str:
+        return f"data set {self.number}"
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """The functions of a file and the places (x, y, z) of its nodes, in m."""
+
+    functions: tuple[FunctionSet, ...]
+    nodes: dict[int, tuple[float, float, float]]
+
+
+def recognises(head: bytes) -> bool:
+    return _START.match(head) is not None
+
+
+def load(path: Path, *, headers_only: bool) -> Content:
+    """All functions and nodes of a file; raises BadInput naming the data set and its line."""
+    raw = bytes_of(path)
+    if not raw.rstrip().endswith(b"-1"):
+        raise BadInput(
+            "the file ends within a data set.",
+            file=path,
+            line=raw.count(b"\n") + 1,
+            remedy=_EXPORT_AGAIN,
+        )
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        return _content(path, raw, headers_only)
+
+
+def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
+    """Writes data sets to a new file, in ASCII (what pyuff writes as binary cannot be read)."""
+    file = pyuff.UFF(str(path))
+    file.write_sets(list(sets), mode="add")
+
+
+def _content(path: Path, raw: bytes, headers_only: bool) -> Content:
+    file = _opened(path)
+    functions: list[FunctionSet] = []
+    nodes: dict[int, tuple[float, float, float]] = {}
+    for index, kind in enumerate(int(kind) for kind in file.get_set_types()):
+        if kind == _FUNCTION:
+            found = _read_set(file, index, path, raw, headers_only)
+            functions.append(_function(found, index + 1, path, raw))
+        elif kind in _NODES:
+            nodes.update(_nodes(_read_set(file, index, path, raw, headers_only)))
+    return Content(tuple(functions), nodes)
+
+
+def _opened(path: Path) -> Any:
+    try:
+        return pyuff.UFF(str(path))
+    except Exception as error:
+        raise BadInput(
+            "its data sets cannot be told apart.", file=path, remedy=_EXPORT_AGAIN
+        ) from error
+
+
+def _read_set(file: Any, index: int, path: Path, raw: bytes, headers_only: bool) -> dict[str, Any]:
+    try:
+        found: dict[str, Any] = file.read_sets([index], header_only=headers_only)
+    except Exception as error:
+        what = "cannot be read: a header or a number in it is damaged"
+        raise _refusal(what, index + 1, path, raw) from error
+    if found.get("abscissa_spacing") == 0 and found["x"] is None:
+        return _read_set(file, index, path, raw, headers_only=False)
+    if found.get("binary") and found["fp_format"] != _IEEE_754:
+        raise _refusal("holds numbers that are not IEEE 754", index + 1, path, raw)
+    return found
+
+
+def _refusal(what: str, number: int, path: Path, raw: bytes) -> BadInput:
+    return BadInput(
+        f"data set {number} {what}.",
+        file=path,
+        line=_line_of_set(number, raw),
+        remedy=_EXPORT_AGAIN,
+    )
+
+
+def _line_of_set(number: int, raw: bytes) -> int | None:
+    """The line at which a data set begins, where the file is text."""
+    marks = [match.start() for match in _MARK.finditer(raw)]
+    if b"\x00" in raw or len(marks) < 2 * number - 1:
+        return None
+    return raw.count(b"\n", 0, marks[2 * (number - 1)]) + 1
+
+
+def _nodes(found: dict[str, Any]) -> dict[int, tuple[float, float, float]]:
+    keys = ("node_nums", "x", "y", "z")
+    columns = [np.asarray(found[key], dtype=float).ravel() for key in keys]
+    rows = zip(*columns, strict=False)
+    return {
+        int(node): (float(x), float(y), float(z))
+        for node, x, y, z in rows
+        if abs(node) < _LARGEST_NODE
+    }
+
+
+def _function(found: dict[str, Any], number: int, path: Path, raw: bytes) -> FunctionSet:
+    points, data = int(found["num_pts"]), found["data"]
+    if data is not None and len(data) != points:
+        what = f"holds {len(data)} values where its header says {points}"
+        raise _refusal(what, number, path, raw)
+    first, step = _abscissa(found, number, path, raw)
+    return FunctionSet(
+        number=number,
+        function=_kind(found),
+        lines=tuple(_plain(found[f"id{line}"]) for line in range(1, 6)),
+        response=(_plain(found["rsp_ent_name"]), found["rsp_node"], found["rsp_dir"]),
+        reference=(_plain(found["ref_ent_name"]), found["ref_node"], found["ref_dir"]),
+        points=points,
+        first=first,
+        step=step,
+        quantity=found["ordinate_spec_data_type"],
+        label=_plain(found["ordinate_axis_lab"]),
+        unit=_plain(found["ordinate_axis_units_lab"]),
+        denominator_unit=_plain(found["orddenom_axis_units_lab"]),
+        data=data,
+    )
+
+
+def _kind(found: dict[str, Any]) -> int:
+    """The function's type; a general function over time is a time response."""
+    kind = int(found["func_type"])
+    return TIME_RESPONSE if kind == 0 and found["abscissa_spec_data_type"] == 17 else kind
+
+
+def _plain(text: str) -> str:
+    return "" if text.strip().upper() == "NONE" else text.strip()
+
+
+def _abscissa(found: dict[str, Any], number: int, path: Path, raw: bytes) -> tuple[float, float]:
+    """First value and step, the latter checked where the file lists every value."""
+    if found["abscissa_spacing"] != 0:
+        return float(found["abscissa_min"]), _whole(float(found["abscissa_inc"]))
+    x = np.asarray(found["x"], dtype=float)
+    step = (x[-1] - x[0]) / (len(x) - 1) if len(x) > 1 else math.nan
+    off = np.abs(x - x[0] - step * np.arange(len(x)))
+    if not (step > 0 and off.max() < max(_MOST_UNEVEN * step, 1e-5 * abs(x[-1]))):
+        raise _refusal("has an uneven abscissa", number, path, raw)
+    return float(x[0]), _whole(float(step))
+
+
+def _whole(step: float) -> float:
+    """The step whose inverse is whole, where the six digits of the file cannot tell them apart.
+
+    0 where the step cannot be one.
+    """
+    if not _LEAST_STEP < step < _LARGEST_STEP:
+        return 0.0
+    whole = 1 / max(1, round(1 / step))
+    last_digit = 10.0 ** (math.floor(math.log10(step)) + 1 - _INCREMENT_DIGITS)
+    return whole if abs(whole - step) <= 0.51 * last_digit else step

@@ -1,0 +1,154 @@
+"""Time histories of a UFF file and recordings, each made from the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read import assemble, universal_marks
+from shm.read.base import Peek
+from shm.read.header import Header
+from shm.read.sidecar import with_sidecar
+from shm.read.units import SI, unit_of
+from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet
+from shm.values import NAN, FloatArray, Quantity, Recording
+
+_QUANTITIES: dict[int, Quantity] = {9: "force", 12: "acceleration", 13: "force"}
+_CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
+_TIME, _EVEN, _DOUBLE = 17, 1, 4
+
+
+def time_sets(content: Content) -> list[FunctionSet]:
+    """The sets that hold a force or an acceleration over time."""
+    histories = [found for found in content.functions if found.function == TIME_RESPONSE]
+    return [found for found in histories if quantity(found) is not None]
+
+
+def quantity(found: FunctionSet) -> Quantity | None:
+    """What a set measures, by its unit or else by its type; None for anything else."""
+    unit = unit_of(found.unit)
+    return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
+
+
+def recording(content: Content, path: Path) -> Recording:
+    sets = time_sets(content)
+    assemble.refuse_quantities([q for q in map(quantity, sets) if q], path)
+    _refuse_different(sets, path)
+    values = np.array([universal_marks.sign(found.response[2]) * _real(found) for found in sets])
+    header = _header(sets, content, path)
+    return assemble.recording(header, values, path, _rate(sets))
+
+
+def peek(content: Content, file_format: str, path: Path) -> Peek:
+    sets = time_sets(content)
+    left_out = [found for found in content.functions if found not in sets]
+    remarks = [
+        f"{found.title} ({found.label or 'of another kind'}) is neither force nor acceleration"
+        " over time; left out."
+        for found in left_out
+    ]
+    samples = sets[0].points if sets else 0
+    return assemble.peeked(
+        _header(sets, content, path), file_format, samples, lambda: _rate(sets), path, remarks
+    )
+
+
+def sets_of(recording: Recording) -> list[dict[str, Any]]:
+    """The data sets of a recording for pyuff."""
+    places = [channel.x_m for channel in recording.channels]
+    nodes = universal_marks.number_nodes(places)
+    rate = recording.sampling_rate_hz
+    sets = universal_marks.node_set(places, nodes)
+    for channel, node in zip(recording.channels, nodes, strict=True):
+        lines = universal_marks.id_lines(recording, channel.name, {"sampling_rate_hz": rate})
+        sets.append(
+            {
+                **lines,
+                "type": 58,
+                "func_type": TIME_RESPONSE,
+                "rsp_ent_name": channel.name[:10],
+                "rsp_node": node,
+                "rsp_dir": universal_marks.direction(channel.plane),
+                "ref_node": 0,
+                "ref_dir": 0,
+                "ord_data_type": _DOUBLE,
+                "abscissa_spacing": _EVEN,
+                "abscissa_spec_data_type": _TIME,
+                "abscissa_axis_lab": "Time",
+                "abscissa_axis_units_lab": "s",
+                "ordinate_spec_data_type": _CODES[channel.quantity],
+                "ordinate_axis_lab": channel.quantity.title(),
+                "ordinate_axis_units_lab": SI[channel.quantity],
+                "orddenom_spec_data_type": 0,
+                "x": np.arange(len(channel.values)) / rate,
+                "data": channel.values.copy(),
+            }
+        )
+    return sets
+
+
+def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header:
+    if not sets:
+        return with_sidecar(Header(path, {}), path)
+    channels = {
+        name: universal_marks.channel_entries(found, *found.response[1:], content, path)
+        for name, found in zip(_names(sets, path), sets, strict=True)
+    }
+    return with_sidecar(Header(path, channels, universal_marks.entries(sets[0], path)), path)
+
+
+def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
+    """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
+    own = [found.lines[0] for found in sets if universal_marks.facts(found)]
+    if len(own) == len(sets):
+        _refuse_doubles(own, sets, path)
+        return own
+    _refuse_doubles([_sensor(found) for found in sets if found.response[1] != 0], sets, path)
+    forces, accelerations = count(2), count(1)
+    names = []
+    for found in sets:
+        if quantity(found) == "acceleration":
+            names.append(f"acc_{next(accelerations)}")
+        else:
+            names.append(f"force_{next(forces)}" if "force" in names else "force")
+    return names
+
+
+def _sensor(found: FunctionSet) -> tuple[object, ...]:
+    """What tells one sensor from another; loggers give one node to several accelerometers."""
+    title = "" if quantity(found) == "force" else found.lines[0]
+    return quantity(found), *found.response[1:], title
+
+
+def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
+    if len(set(keys)) < len(keys):
+        raise BadInput(
+            f"{len(sets)} time histories, several of one sensor.",
+            file=path,
+            remedy="Put each recording, with one or many hits, into a file of its own.",
+        )
+
+
+def _refuse_different(sets: Sequence[FunctionSet], path: Path) -> None:
+    first = sets[0]
+    for found in sets[1:]:
+        if (found.points, found.step) != (first.points, first.step):
+            raise BadInput(
+                f"{found.title} has {found.points} samples every {found.step:g} s, {first.title}"
+                f" {first.points} every {first.step:g} s.",
+                file=path,
+                remedy="Export all channels of one recording with one length and rate.",
+            )
+
+
+def _real(found: FunctionSet) -> FloatArray:
+    return np.real(np.asarray(found.data)).astype(float)
+
+
+def _rate(sets: Sequence[FunctionSet]) -> float:
+    return 1 / sets[0].step if sets and sets[0].step > 0 else NAN

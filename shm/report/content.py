@@ -1,0 +1,135 @@
+"""What a report is made from: one frozen value, complete at birth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+
+from shm.values import (
+    NAN,
+    Alert,
+    Drift,
+    FloatArray,
+    FrequencyResponse,
+    Hanger,
+    ModalTest,
+    Posterior,
+    PredictedFrequency,
+    Selection,
+)
+from shm.watch import end_stiffness
+
+NORMAL_90 = 1.6448536269514722
+"""Half width of the central 90 % of a normal distribution, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean with its central 90 % interval."""
+
+    mean: float
+    low: float
+    high: float
+
+    @classmethod
+    def of_samples(cls, samples: FloatArray) -> Interval:
+        """From equally weighted draws, shape (samples,)."""
+        low, high = np.quantile(samples, [0.05, 0.95])
+        return cls(float(samples.mean()), float(low), float(high))
+
+    @classmethod
+    def normal(cls, mean: float, sd: float) -> Interval:
+        """From a mean and a standard deviation, taken as normal."""
+        return cls(mean, mean - NORMAL_90 * sd, mean + NORMAL_90 * sd)
+
+    def scaled(self, factor: float) -> Interval:
+        """The same quantity in a unit 1/`factor` as large."""
+        return Interval(self.mean * factor, self.low * factor, self.high * factor)
+
+    @property
+    def width(self) -> float:
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class TrendRow:
+    """One test in the history of a hanger.
+
+    `stiffness` holds log10 of the end stiffness of each plane, as the watch compares it: the common
+    stiffness of both ends, which frequencies alone cannot tell apart.
+    """
+
+    test: str
+    model: str
+    tension_n: Interval
+    stiffness: Mapping[str, Interval] = field(default_factory=dict)
+    time: datetime | None = None
+    temperature_c: float = NAN
+
+
+def trend_row(posterior: Posterior, test: ModalTest) -> TrendRow:
+    """The row of one test and its posterior."""
+    return TrendRow(
+        test=test.id,
+        model=posterior.model,
+        tension_n=Interval.of_samples(posterior.tension_n),
+        stiffness={
+            name: Interval.of_samples(samples) for name, samples in end_stiffness(posterior).items()
+        },
+        time=test.time,
+        temperature_c=test.temperature_c,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class HangerReport:
+    """All that a report of one hanger says.
+
+    `posterior` and `frequency_response` are those of the latest test, the last of `tests`, which
+    stand oldest first like `trend`. `drifts` are those of the latest test, `alerts` all of the
+    hanger. `lineage` names where the numbers come from: checksums, settings, files.
+    """
+
+    bridge: str
+    hanger: Hanger
+    tests: tuple[ModalTest, ...]
+    posterior: Posterior
+    generated_at: datetime
+    version: str
+    trend: tuple[TrendRow, ...] = ()
+    baseline: Posterior | None = None
+    selection: Selection | None = None
+    drifts: tuple[Drift, ...] = ()
+    alerts: tuple[Alert, ...] = ()
+    frequency_response: FrequencyResponse | None = None
+    lineage: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def latest(self) -> ModalTest:
+        return self.tests[-1]
+
+    @property
+    def predicted(self) -> tuple[PredictedFrequency, ...]:
+        """The predictions for the latest test, where the posterior is of several."""
+        measured = {(mode.plane, mode.order): mode.frequency_hz for mode in self.latest.modes}
+        return tuple(
+            row
+            for row in self.posterior.predicted
+            if math.isnan(row.measured_hz)
+            or math.isclose(row.measured_hz, measured.get((row.plane, row.order), NAN))
+        )
+
+    @property
+    def tension_n(self) -> Interval:
+        return Interval.of_samples(self.posterior.tension_n)
+
+    @property
+    def baseline_tension_n(self) -> Interval | None:
+        """The baseline's tension; None where no earlier test forms one."""
+        if self.baseline is None or self.baseline.tests == self.posterior.tests:
+            return None
+        return Interval.of_samples(self.baseline.tension_n)

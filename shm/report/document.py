@@ -1,0 +1,48 @@
+"""The report as a JSON document (`shm.report/1`)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from shm import documents
+from shm.report.content import HangerReport
+from shm.report.summary import advice, status, summary
+from shm.values import FrequencyResponse
+
+REPORT_SCHEMA = "shm.report/1"
+
+
+def json(data: HangerReport) -> dict[str, Any]:
+    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    return {
+        "schema": REPORT_SCHEMA,
+        "bridge": data.bridge,
+        "hanger": asdict(data.hanger),
+        "status": status(data).name.lower(),
+        "summary": summary(data),
+        "advice": list(advice(data)),
+        "test": documents.test_document(data.latest),
+        "posterior": documents.posterior_document(data.posterior),
+        "baseline": documents.posterior_document(data.baseline) if data.baseline else None,
+        "selection": documents.selection_document(data.selection) if data.selection else None,
+        "trend": [asdict(row) for row in data.trend],
+        "drifts": [documents.drift_document(drift) for drift in data.drifts],
+        "alerts": [documents.alert_document(alert) for alert in data.alerts],
+        "frequency_response": _response(data.frequency_response),
+        "lineage": dict(data.lineage),
+        "version": data.version,
+        "generated_at": data.generated_at,
+    }
+
+
+def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:
+    """What was measured, without the lines: those stand in the archived recording."""
+    if response is None:
+        return None
+    return {
+        "source": response.source,
+        "points": [asdict(point) for point in response.points],
+        "lines": len(response.frequency_hz),
+        "highest_frequency_hz": float(response.frequency_hz[-1]),
+    }

@@ -1,0 +1,66 @@
+"""What all figures share: size, colours that the colour-blind tell apart, quiet axes."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+
+from shm.values import Plane
+
+INK = "#1d2330"
+GRID = "#d5d9e0"
+BLUE = "#0072b2"
+ORANGE = "#d55e00"
+GREEN = "#009e73"
+PURPLE = "#9b4f96"
+RED = "#b00020"
+# Okabe and Ito (2008), darkened where small marks need it; names are the page's CSS variables.
+PALETTE = {
+    "ink": INK,
+    "grid": GRID,
+    "blue": BLUE,
+    "orange": ORANGE,
+    "green": GREEN,
+    "purple": PURPLE,
+    "red": RED,
+}
+SERIES = (BLUE, ORANGE, GREEN, PURPLE)
+PLANE_COLOURS: dict[Plane, str] = {"transverse": BLUE, "longitudinal": ORANGE}
+PLANE_MARKERS: dict[Plane, str] = {"transverse": "o", "longitudinal": "s"}
+
+_WIDTH_INCHES = 7.4
+_SMALL = 9.0
+
+
+def new_figure(height_inches: float = 3.4) -> Figure:
+    """An empty figure of the page's width, with no pyplot behind it."""
+    return Figure(figsize=(_WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
+
+
+def dress(axes: Axes, x_label: str, y_label: str) -> None:
+    """Labels, grid and spines."""
+    axes.set_facecolor("none")
+    axes.set_xlabel(x_label, fontsize=_SMALL, color=INK)
+    axes.set_ylabel(y_label, fontsize=_SMALL, color=INK)
+    axes.tick_params(which="both", labelsize=_SMALL, colors=INK)
+    axes.grid(True, color=GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side, spine in axes.spines.items():
+        spine.set_color(INK)
+        spine.set_visible(side in ("left", "bottom"))
+
+
+def legend_above(axes: Axes, columns: int = 4) -> Legend:
+    """A legend over the plot, where it hides no data."""
+    return axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        fontsize=_SMALL,
+        labelcolor=INK,
+        frameon=False,
+        borderaxespad=0.2,
+        handlelength=1.6,
+        columnspacing=1.4,
+    )

@@ -1,0 +1,93 @@
+"""Trend of the tension over time, with credible band, baseline, thresholds and alerts."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shm.report import words
+from shm.report.content import HangerReport
+from shm.report.figures import style, timeline
+from shm.report.figures.member import Member
+
+
+def _draw(data: HangerReport) -> Figure | None:
+    rows = timeline.dated(data)
+    if not rows:
+        return None
+    figure = style.new_figure()
+    axes = figure.subplots()
+    style.dress(axes, "time of the test (UTC)", "tension (kN)")
+    timeline.band(
+        axes,
+        [(row.time, words.kilonewtons(row.row.tension_n)) for row in rows],
+        style.BLUE,
+        "tension, 90 % band",
+    )
+    _levels(axes, data)
+    _alerts(axes, data, rows)
+    timeline.dress_time(axes, [row.time for row in rows])
+    style.legend_above(axes, columns=5)
+    return figure
+
+
+def _levels(axes: Axes, data: HangerReport) -> None:
+    axes.axhline(
+        data.hanger.nominal_tension_n / 1e3, color=style.INK, linestyle=":", label="nominal"
+    )
+    if data.baseline is None:
+        return
+    baseline = float(data.baseline.tension_n.mean()) / 1e3
+    fraction = data.hanger.thresholds.tension_shift_fraction
+    axes.axhline(baseline, color=style.GREEN, linestyle="--", label="baseline")
+    for sign, label in ((1, "threshold"), (-1, "_")):
+        axes.axhline(
+            baseline * (1 + sign * fraction),
+            color=style.RED,
+            linestyle="-.",
+            linewidth=1.1,
+            label=label,
+        )
+
+
+def _alerts(axes: Axes, data: HangerReport, rows: list[timeline.Dated]) -> None:
+    alerted = {alert.test for alert in data.alerts}
+    marked = [row for row in rows if row.row.test in alerted]
+    if marked:
+        axes.plot(
+            timeline.positions([row.time for row in marked]),
+            [row.row.tension_n.mean / 1e3 for row in marked],
+            linestyle="none",
+            marker="v",
+            markersize=11,
+            markerfacecolor="none",
+            markeredgecolor=style.RED,
+            markeredgewidth=1.8,
+            label="alert",
+        )
+
+
+def _caption(data: HangerReport) -> str:
+    undated = len(data.trend) - len(timeline.dated(data))
+    left_out = f" {undated} tests without a time are left out." if undated else ""
+    percent = 100 * data.hanger.thresholds.tension_shift_fraction
+    return (
+        "Tension by each test: mean and 90 % credible band. Dotted: nominal; dashed: baseline; "
+        f"dash-dotted: thresholds, {percent:.3g} % either side of the baseline; "
+        f"triangles: alerts.{left_out}"
+    )
+
+
+def _alt(data: HangerReport) -> str:
+    rows = timeline.dated(data)
+    first, last = rows[0], rows[-1]
+    return f"Tension over {len(rows)} tests, {_at(first)} at first, {_at(last)} at last."
+
+
+def _at(row: timeline.Dated) -> str:
+    return (
+        f"{words.with_interval(words.kilonewtons(row.row.tension_n), 'kN')} on {row.time:%Y-%m-%d}"
+    )
+
+
+FIGURE = Member("trend", "Trend of the tension", _draw, _caption, _alt)

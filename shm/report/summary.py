@@ -1,0 +1,205 @@
+"""The paragraph that an engineer reads first: tension, what changed, which model, what next."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+import numpy as np
+
+from shm.report import words
+from shm.report.content import HangerReport, Interval
+from shm.values import Drift, PredictedFrequency
+
+_CONVERGED_R_HAT = 1.1
+_WATCH_PROBABILITY = 0.5
+
+
+class Status(Enum):
+    """The state of a hanger in a word."""
+
+    ALERT = "Alert"
+    WATCH = "Watch"
+    STEADY = "No change"
+    FIRST = "First test"
+
+
+def status(data: HangerReport) -> Status:
+    """The state that the drifts of the latest test give."""
+    highest = max((drift.probability for drift in data.drifts), default=math.nan)
+    if highest >= data.hanger.thresholds.alert_probability:
+        return Status.ALERT
+    if highest >= _WATCH_PROBABILITY:
+        return Status.WATCH
+    return Status.FIRST if data.baseline_tension_n is None else Status.STEADY
+
+
+def summary(data: HangerReport) -> str:
+    """One paragraph in plain words."""
+    sentences = (
+        _tension(data),
+        _against_nominal(data),
+        _against_baseline(data),
+        _change(data),
+        _model(data),
+        *advice(data),
+    )
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def advice(data: HangerReport) -> tuple[str, ...]:
+    """What to do next, most urgent first; never empty."""
+    found = [text for text in (_urgent(data), _sampling(data), _width(data)) if text]
+    if math.isnan(data.latest.temperature_c):
+        found.append("Record the temperature with the next test: it moves the tension.")
+    return tuple(found) or ("Nothing needs doing before the next planned test.",)
+
+
+def tension_change(data: HangerReport) -> Interval | None:
+    """Relative change of the tension since the baseline; None where there is no earlier test.
+
+    As the watch found it; else of two independent estimates, standard deviations in squares.
+    """
+    then, now = data.baseline_tension_n, data.tension_n
+    if then is None:
+        return None
+    for drift in data.drifts:
+        if drift.quantity == "tension":
+            return Interval.normal(drift.shift_mean, drift.shift_sd)
+    shift = (now.mean - then.mean) / then.mean
+    half = math.hypot(now.width, now.mean / then.mean * then.width) / 2 / then.mean
+    return Interval(shift, shift - half, shift + half)
+
+
+def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
+    """Predicted over measured frequency less one, in percent, of the modes that were measured."""
+    return [
+        100 * (mode.mean_hz / mode.measured_hz - 1)
+        for mode in predicted
+        if math.isfinite(mode.measured_hz)
+    ]
+
+
+def _tension(data: HangerReport) -> str:
+    name = words.hanger_name(data.hanger.id, data.hanger.name)
+    tension = words.with_interval(words.kilonewtons(data.tension_n), "kN")
+    when = words.moment(data.latest.time)
+    return (
+        f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
+        f"({when}, {words.temperature(data.latest.temperature_c)})."
+    )
+
+
+def _against_nominal(data: HangerReport) -> str:
+    nominal = data.hanger.nominal_tension_n
+    shift = data.tension_n.scaled(1 / nominal)
+    fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
+    return f"Against the nominal {nominal / 1e3:.0f} kN that is {words.signed_percent(fraction)}."
+
+
+def _against_baseline(data: HangerReport) -> str:
+    then, change = data.baseline_tension_n, tension_change(data)
+    if then is None or change is None or data.baseline is None:
+        return "There is no earlier test to compare with: this one is the baseline."
+    tension = words.mean(words.kilonewtons(then))
+    tests = _tests(data.baseline.tests)
+    return f"Against the baseline of {tension} kN ({tests}) it is {words.signed_percent(change)}."
+
+
+def _tests(tests: tuple[str, ...]) -> str:
+    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
+
+
+def _change(data: HangerReport) -> str:
+    if not data.drifts:
+        return ""
+    level = data.hanger.thresholds.alert_probability
+    shifted = [drift for drift in data.drifts if drift.probability >= level]
+    if shifted:
+        return " ".join(_shift(drift) for drift in shifted)
+    top = max(data.drifts, key=lambda drift: drift.probability)
+    return (
+        f"No quantity has surely moved beyond its threshold: the likeliest is "
+        f"{words.quantity(top.quantity)}, with probability {words.probability(top.probability)} "
+        f"of a shift beyond {threshold(top)}."
+    )
+
+
+def _shift(drift: Drift) -> str:
+    verb = "risen" if drift.shift_mean > 0 else "fallen"
+    amount = Interval.normal(abs(drift.shift_mean), drift.shift_sd)
+    size = "" if drift.quantity == "tension" else f" by {words.with_interval(amount, 'decades')}"
+    return (
+        f"The {words.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
+        f"beyond its threshold of {threshold(drift)} is {words.probability(drift.probability)}."
+    )
+
+
+def threshold(drift: Drift) -> str:
+    """The threshold with its unit."""
+    if drift.quantity == "tension":
+        return f"{100 * drift.threshold:.3g} %"
+    return f"{drift.threshold:.3g} decades"
+
+
+def _model(data: HangerReport) -> str:
+    residuals = residuals_percent(data.predicted)
+    if not residuals:
+        return f"{_chosen(data)}."
+    rms = float(np.sqrt(np.mean(np.square(residuals))))
+    count = "one measured mode" if len(residuals) == 1 else f"{len(residuals)} measured modes"
+    return (
+        f"{_chosen(data)}; over {count} it misses the frequencies by {rms:.2f} % (rms), "
+        f"at most by {max(map(abs, residuals)):.2f} %."
+    )
+
+
+def _chosen(data: HangerReport) -> str:
+    model = data.posterior.model
+    if data.selection is None or len(data.selection.posteriors) < 2:
+        return f"The model class is {model}"
+    names = [posterior.model for posterior in data.selection.posteriors]
+    if model not in names:
+        return f"The model class is {model}"
+    share = data.selection.probabilities[names.index(model)]
+    best = "the most probable" if names[0] == model else f"not the most probable ({names[0]} is)"
+    return (
+        f"The model class is {model}, {best} of {', '.join(names)} "
+        f"(probability {words.probability(share)})"
+    )
+
+
+def _urgent(data: HangerReport) -> str:
+    match status(data):
+        case Status.ALERT:
+            return (
+                "Repeat the hammer test within days; if the shift stays, inspect both ends of "
+                "the hanger and test its neighbours."
+            )
+        case Status.WATCH:
+            return "Test this hanger again soon: a shift is likelier than not."
+        case Status.FIRST:
+            return "Repeat the test at another temperature to make the baseline firm."
+        case Status.STEADY:
+            return ""
+
+
+def _sampling(data: HangerReport) -> str:
+    if not data.posterior.r_hat > _CONVERGED_R_HAT:
+        return ""
+    return (
+        f"The sampling has not settled (R-hat {data.posterior.r_hat:.2f}): raise the number of "
+        f"samples before relying on the interval."
+    )
+
+
+def _width(data: HangerReport) -> str:
+    half = data.tension_n.width / 2 / data.tension_n.mean
+    threshold_fraction = data.hanger.thresholds.tension_shift_fraction
+    if half <= threshold_fraction:
+        return ""
+    return (
+        f"The interval (half width {100 * half:.1f} %) is wider than the threshold of "
+        f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
+        f"to see smaller shifts."
+    )

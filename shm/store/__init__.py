@@ -1,0 +1,49 @@
+"""Keeps every noun of the flow: tables, verbs, the archive of raw files, schema upgrade."""
+
+from shm.store.archive import Archive, Quarantine
+from shm.store.export import samples_npz, samples_table
+from shm.store.queries import WaitingTest
+from shm.store.rows import (
+    Baseline,
+    Delivery,
+    DeliveryState,
+    Event,
+    IdentifiedTest,
+    Lineage,
+    Outcome,
+    Receipt,
+    ReceivedFile,
+    Stage,
+    StoredAlert,
+    StoredPosterior,
+    StoredRecording,
+    StoredSelection,
+    StoredTest,
+)
+from shm.store.store import Store
+from shm.store.workspace import Workspace
+
+__all__ = [
+    "Archive",
+    "Baseline",
+    "Delivery",
+    "DeliveryState",
+    "Event",
+    "IdentifiedTest",
+    "Lineage",
+    "Outcome",
+    "Quarantine",
+    "Receipt",
+    "ReceivedFile",
+    "Stage",
+    "Store",
+    "StoredAlert",
+    "StoredPosterior",
+    "StoredRecording",
+    "StoredSelection",
+    "StoredTest",
+    "WaitingTest",
+    "Workspace",
+    "samples_npz",
+    "samples_table",
+]

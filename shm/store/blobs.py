@@ -1,0 +1,146 @@
+"""Arrays as compressed npz bytes (never pickle) and values back from their documents."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from shm.documents import MODES_SCHEMA, parse_modes, parse_time
+from shm.values import (
+    NAN,
+    Alert,
+    Drift,
+    FrequencyResponse,
+    ModalTest,
+    Posterior,
+    PredictedFrequency,
+    ResponsePoint,
+)
+
+_POSTERIOR_PLAIN = ("model", "hanger", "seed", "evaluations")
+_POSTERIOR_NUMBERS = (
+    "nominal_tension_n",
+    "log_evidence",
+    "log_evidence_sd",
+    "effective_sample_size",
+    "r_hat",
+    "seconds",
+)
+_POSTERIOR_ARRAYS = ("samples", "log_likelihood", "most_probable")
+
+
+def pack(**arrays: Any) -> bytes:
+    """Named arrays as npz bytes."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def unpack(blob: bytes) -> dict[str, Any]:
+    """The named arrays of npz bytes; refuses pickled objects."""
+    with np.load(io.BytesIO(blob), allow_pickle=False) as archive:
+        return dict(archive)
+
+
+# ---------------------------------------------------------------- frequency responses
+
+
+def pack_response(response: FrequencyResponse) -> bytes:
+    """A frequency response as npz bytes, in single precision: it is kept to be looked at."""
+    arrays: dict[str, Any] = {
+        "frequency_hz": response.frequency_hz,
+        "accelerance": response.accelerance.astype(np.complex64),
+        "point_names": np.array([point.name for point in response.points], dtype=np.str_),
+        "point_planes": np.array([point.plane or "" for point in response.points], dtype=np.str_),
+        "point_x_m": np.array([point.x_m for point in response.points], dtype=float),
+    }
+    if response.coherence is not None:
+        arrays["coherence"] = response.coherence.astype(np.float32)
+    return pack(**arrays)
+
+
+def unpack_response(blob: bytes, source: str, test: ModalTest) -> FrequencyResponse:
+    """The frequency response of `test` back from its bytes."""
+    arrays = unpack(blob)
+    points = zip(arrays["point_names"], arrays["point_planes"], arrays["point_x_m"], strict=True)
+    coherence = arrays.get("coherence")
+    return FrequencyResponse(
+        source=source,
+        points=tuple(ResponsePoint(str(n), str(p) or None, float(x)) for n, p, x in points),  # type: ignore[arg-type]
+        frequency_hz=arrays["frequency_hz"],
+        accelerance=arrays["accelerance"].astype(np.complex128),
+        coherence=None if coherence is None else coherence.astype(float),
+        hanger=test.hanger,
+        time=test.time,
+        temperature_c=test.temperature_c,
+    )
+
+
+# ---------------------------------------------------------------- tests
+
+
+def test_from_document(document: Mapping[str, Any], hanger: int) -> ModalTest:
+    """A test back from its entry of a modal-tests document."""
+    return parse_modes({"schema": MODES_SCHEMA, "hanger": hanger, "tests": [document]})[0]
+
+
+# ---------------------------------------------------------------- posteriors
+
+
+def pack_samples(posterior: Posterior) -> bytes:
+    """The arrays of a posterior as npz bytes, in full precision."""
+    return pack(**{name: getattr(posterior, name) for name in _POSTERIOR_ARRAYS})
+
+
+def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
+    """A posterior, complete with samples, back from its document and bytes."""
+    arrays = unpack(blob)
+    values: dict[str, Any] = {name: document[name] for name in _POSTERIOR_PLAIN}
+    values |= {name: _number(document[name]) for name in _POSTERIOR_NUMBERS}
+    values |= {name: arrays[name] for name in _POSTERIOR_ARRAYS}
+    return Posterior(
+        names=tuple(document["parameters"]),
+        predicted=tuple(_predicted(entry) for entry in document["predicted"]),
+        tests=tuple(document["tests"]),
+        **values,
+    )
+
+
+def _predicted(entry: Mapping[str, Any]) -> PredictedFrequency:
+    frequency = entry["frequency_hz"]
+    return PredictedFrequency(
+        plane=entry["plane"],
+        order=entry["order"],
+        mean_hz=_number(frequency["mean"]),
+        sd_hz=_number(frequency["sd"]),
+        measured_hz=_number(entry["measured_hz"]),
+    )
+
+
+def _number(value: float | None) -> float:
+    return NAN if value is None else float(value)
+
+
+# ---------------------------------------------------------------- alerts
+
+
+def alert_from_document(document: Mapping[str, Any]) -> Alert:
+    """An alert back from its document."""
+    return Alert(
+        **{name: document[name] for name in ("key", "hanger", "test", "message")},
+        time=parse_time(document["time"]),
+        drifts=tuple(_drift(entry) for entry in document["drifts"]),
+    )
+
+
+def _drift(entry: Mapping[str, Any]) -> Drift:
+    values = {field.name: entry[field.name] for field in fields(Drift)}
+    numbers = {name: _number(values[name]) for name in _DRIFT_NUMBERS}
+    return Drift(**{**values, **numbers, "time": parse_time(entry["time"])})
+
+
+_DRIFT_NUMBERS = ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")

@@ -1,0 +1,169 @@
+"""Verbs on received files: take in, refuse, look up."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import NothingThere
+from shm.store.database import Database, insert
+from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
+from shm.store.tables import events, recordings, tests
+
+
+class Files(Database):
+    """The part of the store that keeps account of the files."""
+
+    def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
+        """Enters a file that is safe in the archive. The same bytes are never entered twice."""
+        with self.writing() as connection:
+            known = _by_checksum(connection, file.sha256)
+            outcome = _outcome(known, file)
+            if known is None:
+                row_id = _enter(connection, file, at)
+            else:
+                row_id = known.id
+                _notice(connection, known, file, outcome, at)
+            return Receipt(outcome, _recording(_by_id(connection, row_id)))
+
+    def refuse(
+        self,
+        recording_id: int,
+        reason: Mapping[str, Any],
+        at: datetime,
+        test_ids: Collection[int] = (),
+    ) -> None:
+        """Ends a recording with a reason; of its tests only those named, the others go on."""
+        with self.writing() as connection:
+            row = _by_id(connection, recording_id)
+            connection.execute(
+                sa.update(recordings)
+                .where(recordings.c.id == recording_id)
+                .values(stage=Stage.REFUSED, reason=dict(reason))
+            )
+            connection.execute(
+                sa.update(tests).where(tests.c.id.in_(test_ids)).values(stage=Stage.REFUSED)
+            )
+            message = str(reason.get("message", ""))
+            _write_event(connection, at, "refused", row.id, row.file_name, message)
+
+    def recording(self, recording_id: int) -> StoredRecording:
+        """Raises NothingThere."""
+        with self.reading() as connection:
+            return _recording(_by_id(connection, recording_id))
+
+    def recording_of(self, sha256: str) -> StoredRecording | None:
+        """The recording with these bytes, if it was received."""
+        with self.reading() as connection:
+            row = _by_checksum(connection, sha256)
+        return None if row is None else _recording(row)
+
+    def recordings(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
+        """All recordings, or those at one stage, as they came in."""
+        query = sa.select(recordings).order_by(recordings.c.id)
+        if stage is not None:
+            query = query.where(recordings.c.stage == stage)
+        return self._recordings(query)
+
+    def waiting_recordings(
+        self, limit: int, excluding: Collection[int] = ()
+    ) -> tuple[StoredRecording, ...]:
+        """The first recordings that are received and not yet identified."""
+        waiting = recordings.c.stage == Stage.RECEIVED
+        query = sa.select(recordings).where(waiting, recordings.c.id.not_in(excluding))
+        return self._recordings(query.order_by(recordings.c.id).limit(limit))
+
+    def stage_counts(self) -> dict[Stage, int]:
+        """How many recordings stand at each stage; every stage is named."""
+        query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
+        with self.reading() as connection:
+            counted = {Stage(row[0]): int(row[1]) for row in connection.execute(query)}
+        return {stage: counted.get(stage, 0) for stage in Stage}
+
+    def events(self, kind: str | None = None) -> tuple[Event, ...]:
+        """What was noticed on the way, oldest first; `kind` is duplicate, reopened or refused."""
+        query = sa.select(events).order_by(events.c.id)
+        if kind is not None:
+            query = query.where(events.c.kind == kind)
+        with self.reading() as connection:
+            rows = connection.execute(query).all()
+        return tuple(Event(r.at, r.kind, r.file_name, r.message, r.recording_id) for r in rows)
+
+    def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
+        with self.reading() as connection:
+            return tuple(_recording(row) for row in connection.execute(query))
+
+
+def _by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
+    query = sa.select(recordings).where(recordings.c.sha256 == sha256)
+    return connection.execute(query).one_or_none()
+
+
+def _by_id(connection: Connection, recording_id: int) -> Row[Any]:
+    query = sa.select(recordings).where(recordings.c.id == recording_id)
+    row = connection.execute(query).one_or_none()
+    if row is None:
+        raise NothingThere(f"no recording {recording_id}.", remedy="See `shm status`.")
+    return row
+
+
+def _recording(row: Row[Any]) -> StoredRecording:
+    file = ReceivedFile(
+        row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
+    )
+    return StoredRecording(row.id, file, row.received_at, Stage(row.stage), row.hanger, row.reason)
+
+
+def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:
+    if known is None:
+        return Outcome.NEW
+    if known.arrival == file.arrival:
+        return Outcome.RESUMED
+    return Outcome.REOPENED if known.stage == Stage.REFUSED else Outcome.DUPLICATE
+
+
+def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
+    values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
+    return insert(connection, recordings, values)
+
+
+def _notice(
+    connection: Connection, known: Row[Any], file: ReceivedFile, outcome: Outcome, at: datetime
+) -> None:
+    if outcome is Outcome.RESUMED:
+        return
+    message = "dropped again after its refusal; tried again."
+    if outcome is Outcome.REOPENED:
+        _reopen(connection, known.id, file)
+    else:
+        message = f"the same file as {known.file_name}; not stored twice."
+        if file.sidecar_as not in (None, known.sidecar_as):
+            message += " Its sidecar differs: the first one holds."
+    _write_event(connection, at, outcome, known.id, file.file_name, message)
+
+
+def _reopen(connection: Connection, recording_id: int, file: ReceivedFile) -> None:
+    """A refused file starts anew; results it had before the refusal stay."""
+    refused = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.REFUSED)
+    connection.execute(sa.delete(tests).where(refused))
+    connection.execute(
+        sa.update(recordings)
+        .where(recordings.c.id == recording_id)
+        .values({**vars(file), "stage": Stage.RECEIVED, "reason": None})
+    )
+
+
+def _write_event(
+    connection: Connection,
+    at: datetime,
+    kind: str,
+    recording_id: int,
+    file_name: str,
+    message: str,
+) -> None:
+    about = {"recording_id": recording_id, "file_name": file_name}
+    insert(connection, events, {"at": at, "kind": kind, "message": message, **about})

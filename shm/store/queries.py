@@ -1,0 +1,205 @@
+"""Questions about tests, posteriors, selections and baselines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Row
+
+from shm.errors import NothingThere
+from shm.store.blobs import posterior_from, test_from_document, unpack_response
+from shm.store.database import Database
+from shm.store.rows import (
+    Baseline,
+    Lineage,
+    Stage,
+    StoredPosterior,
+    StoredSelection,
+    StoredTest,
+)
+from shm.store.tables import (
+    baselines,
+    posterior_tests,
+    posteriors,
+    recordings,
+    selection_entries,
+    selections,
+    tests,
+)
+from shm.values import FrequencyResponse, Posterior, Selection
+
+_tests = sa.select(tests, recordings.c.sha256).join(recordings)
+_losers = sa.select(selection_entries.c.posterior_id).where(selection_entries.c.rank > 0)
+
+
+@dataclass(frozen=True)
+class WaitingTest:
+    """A test on its way, without its contents."""
+
+    id: int
+    recording_id: int
+    hanger: int
+    stage: Stage
+
+
+class Queries(Database):
+    """The part of the store that answers."""
+
+    def waiting_tests(self) -> tuple[WaitingTest, ...]:
+        """Tests identified or updated, not yet watched: by hanger, then by time."""
+        columns = (tests.c.id, tests.c.recording_id, tests.c.hanger, tests.c.stage)
+        query = sa.select(*columns).where(tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]))
+        ordered = query.order_by(tests.c.hanger, tests.c.time, tests.c.id)
+        with self.reading() as connection:
+            rows = connection.execute(ordered).all()
+        return tuple(WaitingTest(r.id, r.recording_id, r.hanger, Stage(r.stage)) for r in rows)
+
+    def test(self, test_id: int) -> StoredTest:
+        """One test by its row number; raises NothingThere."""
+        found = self._tests(_tests.where(tests.c.id == test_id))
+        if not found:
+            raise NothingThere(f"no test {test_id}.", remedy="See `shm status`.")
+        return found[0]
+
+    def tests(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
+        """The tests of a hanger, or of all, by time; those refused are left out."""
+        query = _tests.where(tests.c.stage != Stage.REFUSED)
+        if hanger is not None:
+            query = query.where(tests.c.hanger == hanger)
+        return self._tests(query.order_by(tests.c.time, tests.c.id))
+
+    def frequency_response(self, test: StoredTest) -> FrequencyResponse | None:
+        """What the modes of a test were identified from; None where a file gave the modes."""
+        query = (
+            sa.select(tests.c.frequency_response, recordings.c.file_name)
+            .join(recordings)
+            .where(tests.c.id == test.id)
+        )
+        with self.reading() as connection:
+            blob, file_name = connection.execute(query).one()
+        return None if blob is None else unpack_response(blob, file_name, test.test)
+
+    def posteriors(self, hanger: int) -> tuple[StoredPosterior, ...]:
+        """The posteriors of a hanger in its selected class, by time."""
+        query = sa.select(posteriors).where(
+            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_losers)
+        )
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(posteriors.c.time, posteriors.c.id)).all()
+        return tuple(_stored_posterior(row) for row in rows)
+
+    def posterior(self, hanger: int, test: str | None = None) -> Posterior:
+        """The latest posterior of a hanger, or that of one test; raises NothingThere."""
+        query = sa.select(posteriors).where(
+            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_losers)
+        )
+        if test is not None:
+            query = query.where(posteriors.c.id.in_(_of_test(test)))
+        latest = query.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
+        with self.reading() as connection:
+            row = connection.execute(latest).one_or_none()
+        if row is None:
+            what = f"hanger {hanger}" + (f", test {test}" if test else "")
+            raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
+        return _posterior(row)
+
+    def posterior_of(self, test: StoredTest) -> Posterior:
+        """The posterior of a test known by its row; raises NothingThere."""
+        return self.posterior(test.hanger, test.test.id)
+
+    def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
+        """Each test of a hanger that has a posterior, with it, by time."""
+        newest = (
+            sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
+            .where(posterior_tests.c.posterior_id.not_in(_losers))
+            .group_by(posterior_tests.c.test_id)
+        )
+        stored = {row.id: row.posterior for row in self.posteriors(hanger)}
+        with self.reading() as connection:
+            newest_of = {row[0]: row[1] for row in connection.execute(newest)}
+        return tuple(
+            (test, stored[newest_of[test.id]])
+            for test in self.tests(hanger)
+            if newest_of.get(test.id) in stored
+        )
+
+    def selection(self, hanger: int) -> StoredSelection | None:
+        """The selection in force."""
+        query = sa.select(selections).where(selections.c.hanger == hanger)
+        with self.reading() as connection:
+            row = connection.execute(query.order_by(selections.c.id.desc()).limit(1)).one_or_none()
+            if row is None:
+                return None
+            entries = (
+                sa.select(posteriors, selection_entries.c.probability)
+                .join(selection_entries)
+                .where(selection_entries.c.selection_id == row.id)
+                .order_by(selection_entries.c.rank)
+            )
+            ranked = connection.execute(entries).all()
+        selection = Selection(
+            tuple(_posterior(entry) for entry in ranked),
+            tuple(entry.probability for entry in ranked),
+        )
+        return StoredSelection(row.id, selection, row.selected_at)
+
+    def selected_models(self) -> dict[int, str]:
+        """The name of the selected class of each hanger that has one."""
+        query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
+        with self.reading() as connection:
+            return {row.hanger: row.model for row in connection.execute(query)}
+
+    def baseline(self, hanger: int) -> Baseline | None:
+        """The baseline in force, with its posterior."""
+        query = (
+            sa.select(posteriors, *(baselines.c[name].label(f"b_{name}") for name in _BASELINE))
+            .join(baselines)
+            .where(baselines.c.hanger == hanger)
+            .order_by(baselines.c.id.desc())
+            .limit(1)
+        )
+        with self.reading() as connection:
+            row = connection.execute(query).one_or_none()
+        if row is None:
+            return None
+        return Baseline(row.b_id, hanger, _posterior(row), row.b_set_at, row.b_who, row.b_why)
+
+    def _tests(self, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
+        with self.reading() as connection:
+            return tuple(_test(row) for row in connection.execute(query))
+
+
+_BASELINE = ("id", "set_at", "who", "why")
+
+
+def _of_test(name: str) -> sa.Select[Any]:
+    joined = posterior_tests.join(tests)
+    return sa.select(posterior_tests.c.posterior_id).select_from(joined).where(tests.c.name == name)
+
+
+def _lineage(row: Row[Any]) -> Lineage:
+    return Lineage(row.input_sha256, row.settings_sha256, row.version)
+
+
+def _test(row: Row[Any]) -> StoredTest:
+    return StoredTest(
+        id=row.id,
+        recording_id=row.recording_id,
+        key=f"{row.sha256}/{row.position}",
+        hanger=row.hanger,
+        time=row.time,
+        stage=Stage(row.stage),
+        test=test_from_document(row.document, row.hanger),
+        notes=tuple(row.notes),
+        lineage=_lineage(row),
+    )
+
+
+def _posterior(row: Row[Any]) -> Posterior:
+    return posterior_from(row.document, row.samples)
+
+
+def _stored_posterior(row: Row[Any]) -> StoredPosterior:
+    return StoredPosterior(row.id, _posterior(row), row.time, _lineage(row))

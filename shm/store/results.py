@@ -1,0 +1,195 @@
+"""Verbs on tests and posteriors: each result and its "done" are one transaction."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection
+
+from shm.documents import posterior_document, test_document
+from shm.store.blobs import pack_response, pack_samples
+from shm.store.database import Database, insert
+from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredTest
+from shm.store.tables import (
+    baselines,
+    posterior_tests,
+    posteriors,
+    recordings,
+    selection_entries,
+    selections,
+    tests,
+)
+from shm.values import Posterior, Selection
+
+_PROGRESS = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+
+
+class Results(Database):
+    """The part of the store that keeps what was computed."""
+
+    def identified(
+        self,
+        recording_id: int,
+        found: Sequence[IdentifiedTest],
+        lineage: Lineage,
+        at: datetime,
+    ) -> None:
+        """Keeps the tests of a recording; does nothing where another process was first."""
+        with self.writing() as connection:
+            query = sa.select(recordings).where(recordings.c.id == recording_id)
+            recording = connection.execute(query).one()
+            if recording.stage != Stage.RECEIVED:
+                return
+            kept = _positions(connection, recording_id)
+            for item in (item for item in found if item.position not in kept):
+                values = _test_values(connection, item, recording.sha256, recording.received_at)
+                row = {**values, **vars(lineage), "recording_id": recording_id}
+                insert(connection, tests, {**row, "identified_at": at})
+            hanger = found[0].test.hanger
+            by_id = recordings.c.id == recording_id
+            connection.execute(sa.update(recordings).where(by_id).values(hanger=hanger))
+            _advance_recordings(connection, [recording_id])
+
+    def selected(
+        self,
+        hanger: int,
+        chosen: Sequence[StoredTest],
+        selection: Selection,
+        lineage: Lineage,
+        at: datetime,
+    ) -> None:
+        """Keeps the competing posteriors; the most probable is the hanger's baseline."""
+        with self.writing() as connection:
+            if not all_at(connection, chosen, Stage.IDENTIFIED) or _has(connection, hanger):
+                return
+            ids = [
+                _insert_posterior(connection, hanger, posterior, chosen, lineage, at)
+                for posterior in selection.posteriors
+            ]
+            _insert_selection(connection, hanger, selection, ids, at)
+            why = {"who": "shm", "why": f"the first {len(chosen)} test(s)"}
+            insert(
+                connection,
+                baselines,
+                {"hanger": hanger, "posterior_id": ids[0], "set_at": at, **why},
+            )
+            move(connection, chosen, Stage.WATCHED)
+
+    def updated(
+        self, test: StoredTest, posterior: Posterior, lineage: Lineage, at: datetime
+    ) -> None:
+        """Keeps the posterior of one test; does nothing where another process was first."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.IDENTIFIED):
+                _insert_posterior(connection, test.hanger, posterior, [test], lineage, at)
+                move(connection, [test], Stage.UPDATED)
+
+
+def move(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> None:
+    """Brings tests to a stage, and their recordings along."""
+    chosen = list(chosen)
+    ids = [test.id for test in chosen]
+    connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=stage))
+    _advance_recordings(connection, {test.recording_id for test in chosen})
+
+
+def _advance_recordings(connection: Connection, ids: Collection[int]) -> None:
+    """A recording stands where the least advanced of its tests stands."""
+    for recording_id in ids:
+        query = sa.select(tests.c.stage).where(tests.c.recording_id == recording_id)
+        least = min(
+            _PROGRESS.index(Stage(stage))
+            for stage in connection.scalars(query)
+            if stage != Stage.REFUSED
+        )
+        stage = Stage.DONE if _PROGRESS[least] is Stage.WATCHED else _PROGRESS[least]
+        connection.execute(
+            sa.update(recordings)
+            .where(recordings.c.id == recording_id, recordings.c.stage != Stage.REFUSED)
+            .values(stage=stage)
+        )
+
+
+def _positions(connection: Connection, recording_id: int) -> set[int]:
+    query = sa.select(tests.c.position).where(tests.c.recording_id == recording_id)
+    return set(connection.scalars(query))
+
+
+def _test_values(
+    connection: Connection, item: IdentifiedTest, sha256: str, received_at: datetime
+) -> dict[str, Any]:
+    name = _free_name(connection, item, sha256)
+    response = item.frequency_response
+    return {
+        "position": item.position,
+        "name": name,
+        "hanger": item.test.hanger,
+        "time": item.test.time or received_at,
+        "stage": Stage.IDENTIFIED,
+        "document": test_document(replace(item.test, id=name)),
+        "frequency_response": None if response is None else pack_response(response),
+        "notes": list(item.notes),
+    }
+
+
+def _free_name(connection: Connection, item: IdentifiedTest, sha256: str) -> str:
+    """The test's own name or, where its hanger has one such, that name and its file's checksum."""
+    query = sa.select(tests.c.id).where(
+        tests.c.hanger == item.test.hanger, tests.c.name == item.test.id
+    )
+    taken = connection.execute(query).first() is not None
+    return f"{item.test.id}-{sha256[:8]}-{item.position}" if taken else item.test.id
+
+
+def all_at(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> bool:
+    """Whether tests still stand at a stage: another process may have been first."""
+    query = sa.select(tests.c.stage).where(tests.c.id.in_([test.id for test in chosen]))
+    return all(found == stage for found in connection.scalars(query))
+
+
+def _has(connection: Connection, hanger: int) -> bool:
+    query = sa.select(selections.c.id).where(selections.c.hanger == hanger)
+    return connection.execute(query).first() is not None
+
+
+def _insert_posterior(
+    connection: Connection,
+    hanger: int,
+    posterior: Posterior,
+    chosen: Sequence[StoredTest],
+    lineage: Lineage,
+    at: datetime,
+) -> int:
+    values: Mapping[str, Any] = {
+        **vars(lineage),
+        "hanger": hanger,
+        "model": posterior.model,
+        "time": max(test.time for test in chosen),
+        "document": posterior_document(posterior),
+        "samples": pack_samples(posterior),
+        "log_evidence": posterior.log_evidence,
+        "log_evidence_sd": posterior.log_evidence_sd,
+        "seed": posterior.seed,
+        "updated_at": at,
+    }
+    posterior_id = insert(connection, posteriors, values)
+    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
+    connection.execute(sa.insert(posterior_tests), pairs)
+    return posterior_id
+
+
+def _insert_selection(
+    connection: Connection, hanger: int, selection: Selection, ids: Sequence[int], at: datetime
+) -> None:
+    model = selection.selected.model
+    row = {"hanger": hanger, "model": model, "selected_at": at}
+    selection_id = insert(connection, selections, row)
+    entries = [
+        {"selection_id": selection_id, "posterior_id": id_, "rank": rank, "probability": p}
+        for rank, (id_, p) in enumerate(zip(ids, selection.probabilities, strict=True))
+    ]
+    connection.execute(sa.insert(selection_entries), entries)

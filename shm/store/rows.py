@@ -1,0 +1,187 @@
+"""What the store hands out beside the nouns of `shm.values`: frozen rows, complete at birth."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+import shm
+from shm.documents import dump
+from shm.values import Alert, FrequencyResponse, ModalTest, Posterior, Selection
+
+
+class Stage(StrEnum):
+    """How far a recording or a test has come. A recording stands where its last test stands."""
+
+    RECEIVED = "received"
+    IDENTIFIED = "identified"
+    UPDATED = "updated"
+    WATCHED = "watched"
+    DONE = "done"
+    REFUSED = "refused"
+
+
+class Outcome(StrEnum):
+    """What came of receiving a file."""
+
+    NEW = "new"
+    RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
+    DUPLICATE = "duplicate"  # the same bytes dropped again
+    REOPENED = "reopened"  # refused before, dropped again: tried again
+
+
+class DeliveryState(StrEnum):
+    """What has become of a delivery."""
+
+    WAITING = "waiting"
+    DELIVERED = "delivered"
+    GIVEN_UP = "given up"
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """Where a result comes from: checksums of its input and settings, and the version."""
+
+    input_sha256: str
+    settings_sha256: str
+    version: str
+
+    @classmethod
+    def of(cls, inputs: object, settings: object) -> Lineage:
+        """The lineage of a result computed now from JSON-able `inputs` and `settings`."""
+        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__)
+
+
+def checksum_of(document: object) -> str:
+    """SHA-256 of a document's JSON text, as 64 hexadecimal digits."""
+    return hashlib.sha256(dump(document).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class ReceivedFile:
+    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive."""
+
+    sha256: str
+    file_name: str
+    size_bytes: int
+    arrival: str
+    archived_as: str | None = None
+    sidecar_as: str | None = None
+
+
+@dataclass(frozen=True)
+class StoredRecording:
+    """A file that was taken in and how far it has come; `reason` says why it was refused."""
+
+    id: int
+    file: ReceivedFile
+    received_at: datetime
+    stage: Stage
+    hanger: int | None = None
+    reason: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """What came of taking a file in."""
+
+    outcome: Outcome
+    recording: StoredRecording
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedTest:
+    """A test to be stored: its place in its file, its frequency response, what was dropped."""
+
+    test: ModalTest
+    position: int = 0
+    frequency_response: FrequencyResponse | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class StoredTest:
+    """`time` is the test's own or, where it has none, the time of receipt.
+
+    `key` is the file's checksum and the test's place in it: the same wherever and whenever the
+    file is ingested.
+    """
+
+    id: int
+    recording_id: int
+    key: str
+    hanger: int
+    time: datetime
+    stage: Stage
+    test: ModalTest
+    notes: tuple[str, ...]
+    lineage: Lineage
+
+
+@dataclass(frozen=True, eq=False)
+class StoredPosterior:
+    """A posterior with the time of its latest test and where it comes from."""
+
+    id: int
+    posterior: Posterior
+    time: datetime
+    lineage: Lineage
+
+
+@dataclass(frozen=True, eq=False)
+class StoredSelection:
+    """A comparison of model classes and when it was made."""
+
+    id: int
+    selection: Selection
+    selected_at: datetime
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """The posterior that later tests of a hanger are compared with; who set it, when and why."""
+
+    id: int
+    hanger: int
+    posterior: Posterior
+    set_at: datetime
+    who: str
+    why: str
+
+
+@dataclass(frozen=True)
+class StoredAlert:
+    """An alert and when it was raised."""
+
+    id: int
+    alert: Alert
+    raised_at: datetime
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """One alert on its way to one hook: the outbox."""
+
+    id: int
+    alert: Alert
+    hook: str
+    state: DeliveryState
+    attempts: int
+    next_attempt_at: datetime
+    last_error: str = ""
+    ended_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something noticed on the way: a duplicate, a file reopened or refused."""
+
+    at: datetime
+    kind: str
+    file_name: str
+    message: str
+    recording_id: int | None = field(default=None)

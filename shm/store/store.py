@@ -1,0 +1,58 @@
+"""The store: one class whose verbs are grouped by what they are about."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from shm.errors import NothingThere
+from shm.store import schema
+from shm.store.database import make_engine
+from shm.store.files import Files
+from shm.store.queries import Queries
+from shm.store.results import Results
+from shm.store.watching import Watching
+
+
+class Store(Files, Results, Queries, Watching):
+    """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
+
+    @classmethod
+    def open(cls, location: str | Path) -> Self:
+        """An existing store, by file or URL; raises NothingThere, SchemaOutdated or StoreError."""
+        _must_exist(location)
+        engine = make_engine(location)
+        schema.check(engine)
+        return cls(engine)
+
+    @classmethod
+    def create(cls, location: str | Path) -> Self:
+        """Makes the tables where there are none, and opens the store."""
+        engine = make_engine(location)
+        schema.upgrade(engine)
+        return cls(engine)
+
+    @staticmethod
+    def upgrade(location: str | Path) -> None:
+        """Brings an existing store to the present schema."""
+        _must_exist(location)
+        engine = make_engine(location)
+        schema.upgrade(engine)
+        engine.dispose()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _must_exist(location: str | Path) -> None:
+    if "://" not in str(location) and not Path(location).is_file():
+        raise NothingThere(f"there is no store at {location}.", remedy="Make one with `shm init`.")

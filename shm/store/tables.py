@@ -1,0 +1,187 @@
+"""The tables. Every change here needs a migration in `migrations/versions` and a new `SCHEMA`."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from shm.store.columns import Document, Number, UtcTime
+
+SCHEMA = "0001"
+
+metadata = sa.MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+
+def _id() -> sa.Column[int]:
+    return sa.Column("id", sa.Integer, primary_key=True)
+
+
+def _to(table: str, *, nullable: bool = False) -> sa.Column[int]:
+    return sa.Column(f"{table[:-1]}_id", sa.ForeignKey(f"{table}.id"), nullable=nullable)
+
+
+def _lineage() -> tuple[sa.Column[str], ...]:
+    return (
+        sa.Column("input_sha256", sa.String(64), nullable=False),
+        sa.Column("settings_sha256", sa.String(64), nullable=False),
+        sa.Column("version", sa.String(32), nullable=False),
+    )
+
+
+# A raw file that was received. `arrival` marks the spool entry it came as, so that a receipt cut
+# short by a crash is not mistaken for the same file dropped twice.
+recordings = sa.Table(
+    "recordings",
+    metadata,
+    _id(),
+    sa.Column("sha256", sa.String(64), nullable=False, unique=True),
+    sa.Column("file_name", sa.Text, nullable=False),
+    sa.Column("size_bytes", sa.BigInteger, nullable=False),
+    sa.Column("archived_as", sa.Text),
+    sa.Column("sidecar_as", sa.Text),
+    sa.Column("arrival", sa.Text, nullable=False),
+    sa.Column("received_at", UtcTime, nullable=False),
+    sa.Column("hanger", sa.Integer),
+    sa.Column("stage", sa.String(16), nullable=False, index=True),
+    sa.Column("reason", Document),
+)
+
+# One modal test. `time` is the test's own or, where it has none, the time of receipt.
+tests = sa.Table(
+    "tests",
+    metadata,
+    _id(),
+    _to("recordings"),
+    sa.Column("position", sa.Integer, nullable=False),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("hanger", sa.Integer, nullable=False),
+    sa.Column("time", UtcTime, nullable=False),
+    sa.Column("stage", sa.String(16), nullable=False, index=True),
+    sa.Column("document", Document, nullable=False),
+    sa.Column("frequency_response", sa.LargeBinary),
+    sa.Column("notes", Document, nullable=False),
+    *_lineage(),
+    sa.Column("identified_at", UtcTime, nullable=False),
+    sa.UniqueConstraint("hanger", "name"),
+    sa.Index(None, "recording_id"),
+)
+
+# Parameters of one model class given one or several tests; `time` is that of the latest of them.
+posteriors = sa.Table(
+    "posteriors",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("model", sa.String(64), nullable=False),
+    sa.Column("time", UtcTime, nullable=False),
+    sa.Column("document", Document, nullable=False),
+    sa.Column("samples", sa.LargeBinary, nullable=False),
+    sa.Column("log_evidence", Number),
+    sa.Column("log_evidence_sd", Number),
+    sa.Column("seed", sa.BigInteger, nullable=False),
+    *_lineage(),
+    sa.Column("updated_at", UtcTime, nullable=False),
+)
+
+posterior_tests = sa.Table(
+    "posterior_tests",
+    metadata,
+    sa.Column("posterior_id", sa.ForeignKey("posteriors.id"), primary_key=True),
+    sa.Column("test_id", sa.ForeignKey("tests.id"), primary_key=True),
+    sa.Index(None, "test_id"),
+)
+
+# The model classes that competed for a hanger; the newest row of a hanger holds.
+selections = sa.Table(
+    "selections",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("model", sa.String(64), nullable=False),
+    sa.Column("selected_at", UtcTime, nullable=False),
+)
+
+selection_entries = sa.Table(
+    "selection_entries",
+    metadata,
+    sa.Column("selection_id", sa.ForeignKey("selections.id"), primary_key=True),
+    sa.Column("posterior_id", sa.ForeignKey("posteriors.id"), primary_key=True),
+    sa.Column("rank", sa.Integer, nullable=False),
+    sa.Column("probability", Number),
+)
+
+# What later tests of a hanger are compared with; the newest row of a hanger holds.
+baselines = sa.Table(
+    "baselines",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    _to("posteriors"),
+    sa.Column("set_at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+)
+
+drifts = sa.Table(
+    "drifts",
+    metadata,
+    _id(),
+    _to("tests"),
+    _to("baselines"),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("time", UtcTime, nullable=False),
+    sa.Column("quantity", sa.String(64), nullable=False),
+    *(
+        sa.Column(name, Number)
+        for name in ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")
+    ),
+    sa.UniqueConstraint("test_id", "baseline_id", "quantity"),
+)
+
+alerts = sa.Table(
+    "alerts",
+    metadata,
+    _id(),
+    sa.Column("key", sa.String(255), nullable=False, unique=True),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    _to("tests"),
+    _to("baselines"),
+    sa.Column("time", UtcTime, nullable=False),
+    sa.Column("raised_at", UtcTime, nullable=False),
+    sa.Column("message", sa.Text, nullable=False),
+    sa.Column("document", Document, nullable=False),
+)
+
+# The outbox: what has yet to be told to which hook, and how that went.
+deliveries = sa.Table(
+    "deliveries",
+    metadata,
+    _id(),
+    _to("alerts"),
+    sa.Column("hook", sa.String(255), nullable=False),
+    sa.Column("state", sa.String(16), nullable=False),
+    sa.Column("attempts", sa.Integer, nullable=False),
+    sa.Column("next_attempt_at", UtcTime, nullable=False),
+    sa.Column("last_error", sa.Text, nullable=False),
+    sa.Column("ended_at", UtcTime),
+    sa.UniqueConstraint("alert_id", "hook"),
+    sa.Index(None, "state", "next_attempt_at"),
+)
+
+# Things noticed on the way that change no result: the same file twice, a refused file tried again.
+events = sa.Table(
+    "events",
+    metadata,
+    _id(),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("kind", sa.String(32), nullable=False),
+    _to("recordings", nullable=True),
+    sa.Column("file_name", sa.Text, nullable=False),
+    sa.Column("message", sa.Text, nullable=False),
+)

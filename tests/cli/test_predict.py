@@ -1,0 +1,94 @@
+"""`shm predict`: names as in the thesis, one set or a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.bridge import load_hanger
+from shm.models import build
+from shm.store import Workspace
+from tests.cli.conftest import Shm
+
+STIFF = [part for k in range(1, 5) for part in ("--set", f"log10_k{k}=12")]
+
+
+def test_the_document_holds_the_frequencies_of_the_model(shm: Shm, hanger_file: Path) -> None:
+    ended = shm(
+        "predict", "beam1", "--hanger-file", hanger_file, "--set", "theta_F=1.1",
+        "--set", "theta_L=0.97", "--modes", 4, "--json",
+    )  # fmt: skip
+    assert ended.code == 0
+    assert ended.document["model"] == "beam1"
+    rows = ended.document["frequencies"]
+    assert [(row["plane"], row["order"]) for row in rows] == [
+        (plane, order) for plane in ("transverse", "longitudinal") for order in (1, 2, 3, 4)
+    ]
+    exact = build("beam1", load_hanger(hanger_file)).frequencies_hz(np.array([[1.1, 0.97]]), 4)[0]
+    assert [row["frequency_hz"] for row in rows] == pytest.approx(exact.ravel())
+
+
+def test_tension_and_length_are_nominal_unless_set(shm: Shm, hanger_file: Path) -> None:
+    given = shm(
+        "predict", "beam1", "--hanger-file", hanger_file, "--set", "theta_F=1",
+        "--set", "theta_L=1", "--json",
+    )  # fmt: skip
+    assert (
+        shm("predict", "beam1", "--hanger-file", hanger_file, "--json").document == given.document
+    )
+
+
+def test_a_spring_that_is_not_set_is_named(shm: Shm, hanger_file: Path) -> None:
+    ended = shm("predict", "beam2", "--hanger-file", hanger_file, *STIFF[2:])
+    assert ended.code == 2
+    assert "log10_k1" in ended.err
+
+
+def test_a_sweep_gives_a_row_for_each_value(shm: Shm, hanger_file: Path) -> None:
+    ended = shm(
+        "predict", "beam2", "--hanger-file", hanger_file, *STIFF,
+        "--sweep", "theta_F=0.5:2:4", "--json",
+    )  # fmt: skip
+    points = ended.document["points"]
+    assert [point["theta_F"] for point in points] == [0.5, 1.0, 1.5, 2.0]
+    first = [point["frequencies"][0]["frequency_hz"] for point in points]
+    assert first == sorted(first)
+
+
+def test_a_hanger_of_the_workspace_serves_as_well(
+    shm: Shm, hanger_file: Path, bridge: Workspace
+) -> None:
+    of_file = shm("predict", "beam1", "--hanger-file", hanger_file, "--json")
+    of_bridge = shm("--workspace", bridge.folder, "predict", "beam1", "--hanger", 4, "--json")
+    assert of_file.document == of_bridge.document
+
+
+def test_the_table_names_planes_and_units(shm: Shm, hanger_file: Path) -> None:
+    told = shm("predict", "beam1", "--hanger-file", hanger_file).out
+    assert "transverse (Hz)" in told
+    assert "5.58" in told
+
+
+def test_the_table_of_a_sweep_has_a_column_a_mode(shm: Shm, hanger_file: Path) -> None:
+    told = shm("predict", "beam1", "--hanger-file", hanger_file, "--sweep", "theta_L=0.9:1:2").out
+    assert "T1" in told
+    assert "L6" in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["beam9"], "beam1, beam2"),
+        (["beam1", "--set", "theta_F"], "NAME=VALUE"),
+        (["beam1", "--set", "theta_X=1"], "unknown ['theta_X']"),
+        (["beam1", "--sweep", "theta_F=1:2"], "NAME=FROM:TO:N"),
+    ],
+)
+def test_a_wrong_parameter_is_a_usage_error_that_says_how(
+    shm: Shm, hanger_file: Path, arguments: list[str], said: str
+) -> None:
+    ended = shm("predict", *arguments, "--hanger-file", hanger_file)
+    assert ended.code == 2
+    assert said in ended.err

@@ -1,0 +1,116 @@
+"""`shm update` and `shm select`: the documents of DESIGN, from files alone or from a workspace."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from shm.store import Workspace
+from tests.cli.conftest import Shm
+
+QUANTILES = {"mean", "sd", "q05", "q50", "q95", "map"}
+QUICK = ("--samples", 100)
+
+
+def call(modes_file: Path, hanger_file: Path, *more: object) -> tuple[object, ...]:
+    known = ("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", "--seed", 5)
+    return (*known, *QUICK, "--json", *more)
+
+
+def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    ended = shm(*call(modes_file, hanger_file))
+    assert ended.code == 0, ended.err
+    document = ended.document
+    assert set(document) >= {
+        "model", "tension_n", "parameters", "log_evidence", "log_evidence_sd", "probability",
+        "samples", "effective_sample_size", "r_hat", "predicted", "seconds", "seed",
+    }  # fmt: skip
+    assert set(document["tension_n"]) == QUANTILES
+    assert set(document["parameters"]) == {"theta_F", "theta_L", "sigma"}
+    assert document["tension_n"]["mean"] == pytest.approx(0.9 * 711e3, rel=0.05)
+    assert (document["model"], document["seed"], document["samples"]) == ("beam1", 5, 100)
+    assert document["predicted"][0]["measured_hz"] > 0
+    again = shm(*call(modes_file, hanger_file)).document
+    assert {**again, "seconds": 0} == {**document, "seconds": 0}
+
+
+def test_a_data_set_counted_ten_times_weighs_more(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    once, tenfold = (
+        shm(*call(modes_file, hanger_file, "--repeat", repeat)).document for repeat in (1, 10)
+    )
+    assert tenfold["log_evidence"] > once["log_evidence"] + 10
+
+
+def test_select_ranks_the_models_and_their_probabilities_add_to_one(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    ended = shm(
+        "select", modes_file, "--hanger-file", hanger_file, "--models", "beam1, beam1",
+        *QUICK, "--json",
+    )  # fmt: skip
+    document = ended.document
+    assert document["selected"] == document["models"][0]["model"]
+    assert sum(model["probability"] for model in document["models"]) == pytest.approx(1)
+
+
+def test_the_tables_name_units_and_intervals(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
+    updated = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
+    assert "tension (kN)" in updated.out
+    assert "R-hat" in updated.out
+    selected = shm("select", modes_file, "--hanger-file", hanger_file, "--models", "beam1", *QUICK)
+    assert "90 % interval (kN)" in selected.out
+
+
+def test_the_latest_test_of_a_hanger_of_the_workspace_is_taken(shm: Shm, bridge: Workspace) -> None:
+    ended = shm(
+        "--workspace", bridge.folder, "update", "--hanger", 3, "--model", "beam1", *QUICK, "--json"
+    )
+    assert ended.document["tests"] == ["t2"]
+    assert ended.document["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.05)
+
+
+def test_a_file_may_name_its_hanger_of_the_workspace(
+    shm: Shm, bridge: Workspace, modes_file: Path
+) -> None:
+    ended = shm(
+        "--workspace", bridge.folder, "update", modes_file, "--model", "beam1", *QUICK, "--json"
+    )
+    assert ended.code == 0, ended.err
+    assert ended.document["hanger"] == 3
+
+
+def test_a_description_of_another_hanger_is_remarked(
+    shm: Shm, hanger_file: Path, modes_file: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.modes.json"
+    other.write_text(json.dumps({**json.loads(modes_file.read_text()), "hanger": 7}))
+    ended = shm("update", other, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
+    assert ended.code == 0
+    assert "the tests are of hanger 7, the description is of hanger 3" in ended.err
+
+
+def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:
+    ended = shm("--workspace", bridge.folder, "select", "--hanger", 4)
+    assert ended.code == 4
+    assert "shm ingest" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [("", "not JSON"), ('{"schema": "shm.modes/1", "tests": []}', "missing or empty")],
+)
+def test_a_wrong_file_is_bad_input(
+    shm: Shm, tmp_path: Path, hanger_file: Path, content: str, said: str
+) -> None:
+    path = tmp_path / "wrong.modes.json"
+    path.write_text(content)
+    ended = shm("update", path, "--hanger-file", hanger_file)
+    assert ended.code == 3
+    assert said in ended.err
+    assert "wrong.modes.json" in ended.err

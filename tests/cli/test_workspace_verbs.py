@@ -1,0 +1,181 @@
+"""Verbs on a workspace: init, status, report, drift, alerts, export, db."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.store import Workspace
+from tests.cli.conftest import Shm
+
+
+def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -> None:
+    folder = tmp_path / "arch"
+    assert shm("init", folder).code == 0
+    ended = shm("--workspace", folder, "status", "--json")
+    assert ended.code == 0
+    assert ended.document["recordings"]["done"] == 0
+
+
+def test_init_takes_the_folder_of_the_global_option(shm: Shm, tmp_path: Path) -> None:
+    assert shm("--workspace", tmp_path / "arch", "init").code == 0
+    assert (tmp_path / "arch" / "bridge.toml").is_file()
+
+
+@pytest.mark.parametrize("name", ['Arch "of" Döm', "back\\slash \\1", "plain"])
+def test_init_writes_the_name_of_the_bridge_and_leaves_the_rest(
+    shm: Shm, tmp_path: Path, name: str
+) -> None:
+    shm("init", tmp_path / "a")
+    shm("init", tmp_path / "b", "--bridge", name)
+    plain, named = (tomllib.loads((tmp_path / n / "bridge.toml").read_text()) for n in "ab")
+    assert named["bridge"]["name"] == name
+    assert {**named, "bridge": None} == {**plain, "bridge": None}
+
+
+def test_a_description_without_a_bridge_table_gets_one(
+    shm: Shm, tmp_path: Path, hanger_file: Path
+) -> None:
+    shm("init", tmp_path / "a", "--from", hanger_file, "--bridge", "Arch")
+    described = tomllib.loads((tmp_path / "a" / "bridge.toml").read_text())
+    assert described["bridge"]["name"] == "Arch"
+    assert described["hanger"][0]["id"] == 3
+
+
+def test_a_workspace_is_not_made_twice(shm: Shm, empty: Workspace) -> None:
+    ended = shm("init", empty.folder)
+    assert ended.code == 2
+    assert "workspace already" in ended.err
+
+
+def test_status_counts_tests_and_alerts_of_each_hanger(shm: Shm, bridge: Workspace) -> None:
+    document = shm("--workspace", bridge.folder, "status", "--json").document
+    assert document["recordings"]["done"] == 3
+    assert document["alerts"] == 1
+    three, four = document["hangers"]
+    assert (three["hanger"], three["tests"], three["model"]) == (3, 3, "beam1")
+    assert three["latest_test"] == "2026-05-03T10:00:00Z"
+    assert (four["tests"], four["latest_test"]) == (0, None)
+    told = shm("--workspace", bridge.folder, "status").out
+    assert "Test bridge: recordings: 3 done" in told
+
+
+def test_the_report_comes_as_text_html_or_json(shm: Shm, bridge: Workspace) -> None:
+    call = ("--workspace", bridge.folder, "report", "--hanger", 3)
+    assert shm(*call).out.startswith("Hanger 3, Test bridge: Alert")
+    assert shm(*call, "--format", "html").out.lstrip().startswith("<!doctype html>")
+    document = shm(*call, "--json").document
+    assert document == {
+        **shm(*call, "--format", "json").document,
+        "generated_at": document["generated_at"],
+    }
+    assert document["schema"] == "shm.report/1"
+    assert [row["test"] for row in document["trend"]] == ["t0", "t1", "t2"]
+    assert document["posterior"]["tests"] == ["t2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("r.html", "<!doctype"), ("r.json", "{"), ("r.txt", "Hanger 3")]
+)
+def test_the_suffix_of_the_file_chooses_the_form_of_the_report(
+    shm: Shm, bridge: Workspace, tmp_path: Path, name: str, start: str
+) -> None:
+    out = tmp_path / name
+    ended = shm("--workspace", bridge.folder, "report", "--hanger", 3, "--out", out)
+    assert (ended.code, ended.out) == (0, "")
+    assert str(out) in ended.err
+    assert out.read_text().lstrip().startswith(start)
+
+
+@pytest.mark.parametrize("verb", ["report", "drift", "alerts", "export"])
+def test_a_hanger_that_the_bridge_lacks_is_bad_input(
+    shm: Shm, bridge: Workspace, tmp_path: Path, verb: str
+) -> None:
+    out = ["--out", tmp_path / "x.csv"] if verb == "export" else []
+    ended = shm("--workspace", bridge.folder, verb, "--hanger", 9, *out)
+    assert ended.code == 3
+    assert "known: 3, 4" in ended.err
+
+
+@pytest.mark.parametrize("verb", ["report", "drift", "export"])
+def test_a_hanger_without_tests_has_nothing_yet(
+    shm: Shm, bridge: Workspace, tmp_path: Path, verb: str
+) -> None:
+    out = ["--out", tmp_path / "x.csv"] if verb == "export" else []
+    assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
+
+
+def test_drift_shows_the_latest_shift_or_all(shm: Shm, bridge: Workspace) -> None:
+    call = ("--workspace", bridge.folder, "drift", "--hanger", 3)
+    (latest,) = shm(*call, "--json").document["drifts"]
+    assert (latest["test"], latest["quantity"]) == ("t2", "tension")
+    assert latest["shift_mean"] == pytest.approx(-0.2, abs=0.1)
+    assert latest["probability"] > 0.95
+    assert [row["test"] for row in shm(*call, "--all", "--json").document["drifts"]] == ["t1", "t2"]
+    assert "probability beyond" in shm(*call).out
+
+
+def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) -> None:
+    call = ("--workspace", bridge.folder, "alerts")
+    (row,) = shm(*call, "--json").document["alerts"]
+    assert row["alert"]["schema"] == "shm.alert/1"
+    assert (row["alert"]["test"], row["deliveries"]) == ("t2", [])
+    assert "tension moved" in shm(*call, "--hanger", 3).out.replace("\n", " ")
+    assert shm(*call, "--hanger", 4).out.strip() == "No alert has been raised."
+
+
+def test_posterior_samples_are_exported_alike_as_csv_and_npz(
+    shm: Shm, bridge: Workspace, tmp_path: Path
+) -> None:
+    call = ("--workspace", bridge.folder, "export", "--hanger", 3, "--test", "t0", "--out")
+    assert shm(*call, tmp_path / "s.csv").code == 0
+    assert shm(*call, tmp_path / "s.npz").code == 0
+    with (tmp_path / "s.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    table = np.array(rows, dtype=float)
+    assert head == ["theta_F", "theta_L", "sigma", "tension_n", "log_likelihood"]
+    with np.load(tmp_path / "s.npz") as columns:
+        for name, column in zip(head, table.T, strict=True):
+            assert np.array_equal(columns[name], column)
+    assert table[:, 3] == pytest.approx(table[:, 0] * 711e3)
+
+
+def test_an_export_of_an_unknown_kind_is_a_usage_error(
+    shm: Shm, bridge: Workspace, tmp_path: Path
+) -> None:
+    ended = shm("--workspace", bridge.folder, "export", "--hanger", 3, "--out", tmp_path / "s.xls")
+    assert ended.code == 2
+    assert ".csv or .npz" in ended.err
+
+
+def test_an_old_store_is_mended_by_db_upgrade(shm: Shm, empty: Workspace) -> None:
+    empty.database.write_bytes(b"")
+    call = ("--workspace", empty.folder, "db")
+    assert shm(*call, "check").code == 5
+    assert shm(*call, "upgrade").code == 0
+    ended = shm(*call, "check")
+    assert ended.code == 0
+    assert "holds 0 recordings" in ended.out
+
+
+def test_a_workspace_without_a_store_says_so(shm: Shm, empty: Workspace) -> None:
+    empty.database.unlink()
+    assert shm("--workspace", empty.folder, "db", "check").code == 4
+
+
+def test_a_wrong_description_names_the_key(shm: Shm, empty: Workspace) -> None:
+    path = empty.folder / "bridge.toml"
+    path.write_text(path.read_text().replace("length_m = 12.0", "length_m = -1"))
+    ended = shm("--workspace", empty.folder, "status", "--json")
+    assert (ended.code, ended.out) == (3, "")
+    assert "length_m = -1" in ended.err
+
+
+def test_json_of_every_reading_verb_is_one_document(shm: Shm, bridge: Workspace) -> None:
+    for verb in (["status"], ["drift"], ["alerts"], ["report", "--hanger", 3]):
+        assert isinstance(json.loads(shm("--workspace", bridge.folder, *verb, "--json").out), dict)

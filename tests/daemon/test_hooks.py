@@ -1,0 +1,122 @@
+"""Hooks: a fixed command, JSON on standard input, a bare environment, a time limit."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from shm.bridge import Hook
+from shm_daemon import CommandNotifier, HookFailed
+from tests.helpers.nouns import an_alert
+
+ENVIRONMENT = {"PATH": os.environ["PATH"], "HOME": "/home/owner", "SHM_SECRET": "token"}
+
+
+def python(code: str, *arguments: str) -> Hook:
+    return Hook("mail", (sys.executable, "-c", code, *arguments))
+
+
+def a_notifier(tmp_path: Path, timeout_s: float = 20.0) -> CommandNotifier:
+    return CommandNotifier(tmp_path, timeout_s, ENVIRONMENT)
+
+
+def test_a_hook_gets_the_alert_on_its_standard_input(tmp_path: Path) -> None:
+    code = "import sys; open('told.json', 'w').write(sys.stdin.read())"
+    a_notifier(tmp_path)(python(code), an_alert())
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["schema"] == "shm.alert/1"
+    assert told["key"] == "hanger-3:tension-down"
+    assert told["time"] == "2026-05-01T12:00:00Z"
+    assert told["drifts"][0]["quantity"] == "tension"
+
+
+def test_a_hooks_environment_is_bare_and_names_the_alert(tmp_path: Path) -> None:
+    code = "import json, os; json.dump(dict(os.environ), open('env.json', 'w'))"
+    a_notifier(tmp_path)(python(code), an_alert())
+    seen = json.loads((tmp_path / "env.json").read_text())
+    assert seen.pop("SHM_ALERT_KEY") == "hanger-3:tension-down"
+    seen.pop("LC_CTYPE", None)  # the interpreter's own doing
+    assert seen == {"PATH": ENVIRONMENT["PATH"], "HOME": "/home/owner"}
+
+
+def test_arguments_are_never_read_by_a_shell(tmp_path: Path) -> None:
+    argument = "$(touch oops); `touch oops` | touch oops"
+    code = "import sys; open('argument', 'w').write(sys.argv[1])"
+    a_notifier(tmp_path)(python(code, argument), an_alert())
+    assert (tmp_path / "argument").read_text() == argument
+    assert not (tmp_path / "oops").exists()
+
+
+def test_a_hook_that_fails_says_why(tmp_path: Path) -> None:
+    with pytest.raises(HookFailed, match="exit code 3: mail server is away"):
+        a_notifier(tmp_path)(
+            python("import sys; print('mail server is away', file=sys.stderr); sys.exit(3)"),
+            an_alert(),
+        )
+
+
+def test_a_talkative_hook_does_not_fill_the_memory(tmp_path: Path) -> None:
+    code = "import sys; sys.stderr.write('x' * 10_000_000 + 'end'); sys.exit(1)"
+    with pytest.raises(HookFailed) as caught:
+        a_notifier(tmp_path)(python(code), an_alert())
+    assert caught.value.message.endswith("xend")
+    assert len(caught.value.message) < 600
+
+
+@pytest.mark.parametrize("command", [("/no/such/program",), ("/",)])
+def test_a_hook_that_cannot_be_run_says_so(tmp_path: Path, command: tuple[str, ...]) -> None:
+    with pytest.raises(HookFailed, match="cannot be run"):
+        a_notifier(tmp_path)(Hook("mail", command), an_alert())
+
+
+def test_a_hook_that_does_not_listen_has_not_failed(tmp_path: Path) -> None:
+    a_notifier(tmp_path)(Hook("mail", ("true",)), an_alert())
+
+
+def test_a_hook_that_hangs_is_ended_with_all_its_children(tmp_path: Path) -> None:
+    code = (
+        "import subprocess, time; child = subprocess.Popen(['sleep', '60']);"
+        "open('child', 'w').write(str(child.pid)); time.sleep(60)"
+    )
+    began = time.monotonic()
+    with pytest.raises(HookFailed, match="ended after 1 s"):
+        a_notifier(tmp_path, timeout_s=1.0)(python(code), an_alert())
+    assert time.monotonic() - began < 10
+    assert is_gone(int((tmp_path / "child").read_text()))
+
+
+def test_closing_ends_running_hooks_and_begins_no_more(tmp_path: Path) -> None:
+    notifier, failures = a_notifier(tmp_path), []
+
+    def deliver() -> None:
+        try:
+            notifier(python("open('begun', 'w'); import time; time.sleep(60)"), an_alert())
+        except HookFailed as error:
+            failures.append(error.message)
+
+    thread = threading.Thread(target=deliver)
+    thread.start()
+    while not (tmp_path / "begun").exists():
+        time.sleep(0.01)
+    notifier.close()
+    thread.join(10)
+    assert not thread.is_alive()
+    assert "exit code -9" in failures[0]
+    with pytest.raises(HookFailed, match="ending"):
+        notifier(Hook("mail", ("true",)), an_alert())
+
+
+def is_gone(pid: int) -> bool:
+    """Whether a process has ended, given a moment; one that nobody has buried yet counts."""
+    for _ in range(100):
+        status = Path(f"/proc/{pid}/stat")
+        if not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z":
+            return True
+        time.sleep(0.05)
+    return False

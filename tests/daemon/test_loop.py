@@ -1,0 +1,246 @@
+"""The loop in this process: what it takes, what it waits out, when it ends."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from shm.errors import ShmError, StoreBusy, StoreError
+from shm.pipeline import Flow, steps
+from shm.store import Archive, Stage, Store, Workspace
+from shm_daemon import Bell, run
+from tests.helpers import quick_update
+from tests.helpers.flows import Postman
+from tests.helpers.workspaces import make_workspace, put, write_test
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr(steps, "update", quick_update.update)
+    monkeypatch.setattr(steps, "select", quick_update.select)
+
+
+@pytest.fixture
+def serve(workspace: Workspace) -> Iterator[Callable[..., Bell]]:
+    """Begins a daemon in a thread; it is stopped at the end."""
+    bells, threads = [], []
+
+    def begin(where: Workspace = workspace, **options: object) -> Bell:
+        bell = Bell()
+        options = {"make_executor": ThreadPoolExecutor, "bell": bell, **options}
+        thread = threading.Thread(target=run, args=(where,), kwargs=options)
+        bells.append(bell)
+        threads.append(thread)
+        thread.start()
+        return bell
+
+    yield begin
+    for bell in bells:
+        bell.stop()
+    for thread in threads:
+        thread.join(20)
+        assert not thread.is_alive()
+
+
+def run_once(workspace: Workspace, **options: object) -> None:
+    run(workspace, once=True, **{"make_executor": ThreadPoolExecutor, **options})  # type: ignore[arg-type]
+
+
+def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def counts(workspace: Workspace) -> dict[Stage, int]:
+    with workspace.store() as store:
+        return {stage: count for stage, count in store.stage_counts().items() if count}
+
+
+def test_files_dropped_while_it_runs_are_done(
+    workspace: Workspace, serve: Callable[..., Bell]
+) -> None:
+    serve()
+    for day in range(3):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+    until(lambda: counts(workspace) == {Stage.DONE: 3})
+    assert list(workspace.spool.iterdir()) == []
+
+
+def test_a_file_being_written_is_not_taken_before_it_is_whole(
+    tmp_path: Path, serve: Callable[..., Bell]
+) -> None:
+    workspace = make_workspace(tmp_path / "slow", settings={"spool_stable_seconds": 0.5})
+    test = workspace.folder / "t.modes.json"
+    write_test(test, workspace)
+    content = test.read_bytes()
+    serve(workspace)
+    with (workspace.spool / "t.modes.json").open("wb") as file:
+        for start in range(0, len(content), len(content) // 8):
+            file.write(content[start : start + len(content) // 8])
+            file.flush()
+            time.sleep(0.1)
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
+
+
+def test_once_takes_everything_with_its_subfolders_and_ends(workspace: Workspace) -> None:
+    (workspace.spool / "logger").mkdir()
+    write_test(workspace.spool / "logger" / "a.modes.json", workspace)
+    put(workspace.spool / "empty.csv", "")
+    run_once(workspace)
+    assert counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: 1}
+    assert list(workspace.spool.rglob("*")) == [workspace.spool / "logger"]
+
+
+def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:
+    hook = ["sh", "-c", "cat > told.json"]
+    workspace = make_workspace(tmp_path / "told", hooks={"mail": hook})
+    for day, tension in enumerate((1.0, 0.8)):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day, tension=tension)
+    run_once(workspace)
+    assert "tension moved" in (workspace.folder / "told.json").read_text()
+
+
+def test_a_hook_that_hangs_does_not_hold_up_the_files(
+    tmp_path: Path, serve: Callable[..., Bell]
+) -> None:
+    workspace = make_workspace(tmp_path / "hangs", hooks={"mail": ["sleep", "600"]})
+    for day, tension in enumerate((1.0, 0.8)):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day, tension=tension)
+    bell = serve(workspace)
+    until(lambda: counts(workspace) == {Stage.DONE: 2})
+    write_test(workspace.spool / "later.modes.json", workspace, day=9)
+    until(lambda: counts(workspace) == {Stage.DONE: 3})
+    bell.stop()  # ends the hook too; the fixture checks that the daemon ends soon
+
+
+def test_two_daemons_do_not_serve_one_workspace(
+    workspace: Workspace, serve: Callable[..., Bell], caplog: pytest.LogCaptureFixture
+) -> None:
+    serve()
+    until(lambda: "watching" in caplog.text)
+    with pytest.raises(StoreBusy, match="already ingests"):
+        run_once(workspace)
+
+
+def test_a_changed_description_is_taken_over(
+    workspace: Workspace, serve: Callable[..., Bell], caplog: pytest.LogCaptureFixture
+) -> None:
+    serve()
+    write_test(workspace.spool / "a.modes.json", workspace, hanger=4)
+    until(lambda: counts(workspace) == {Stage.REFUSED: 1})
+    description = workspace.folder / "bridge.toml"
+    good = description.read_text()
+    description.write_text("not toml")
+    until(lambda: "is not taken over" in caplog.text)
+    description.write_text(good.replace("id = 3", "id = 4"))
+    until(lambda: "has changed and is taken over" in caplog.text)
+    write_test(workspace.spool / "a.modes.json", workspace, hanger=4)
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
+
+
+def test_a_file_that_cannot_be_taken_holds_up_nobody(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    receive, seen = Flow.receive, []
+
+    def fail_on_a(self: Flow, path: Path) -> object:
+        seen.append(path.name)
+        if path.name.startswith("a") and seen.count(path.name) == 1:
+            raise ShmError("changed while it was read.", retry_after_s=0.2)
+        if path.name.startswith("b") and seen.count(path.name) == 1:
+            raise FileNotFoundError(path)
+        return receive(self, path)
+
+    monkeypatch.setattr(Flow, "receive", fail_on_a)
+    monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
+    for name in "abc":
+        write_test(workspace.spool / f"{name}.modes.json", workspace, day=ord(name))
+    run_once(workspace)
+    assert seen.index("c.modes.json") < seen.index("a.modes.json", 1)
+    assert counts(workspace) == {Stage.DONE: 3}
+
+
+def test_a_store_that_cannot_be_used_for_now_is_waited_for(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    keep, full = Archive.keep, [True, True]
+
+    def full_twice(self: Archive, source: Path) -> object:
+        if full:
+            full.pop()
+            raise StoreError("the disk is full.", remedy="Free some.", retry_after_s=0.1)
+        return keep(self, source)
+
+    monkeypatch.setattr(Archive, "keep", full_twice)
+    write_test(workspace.spool / "a.modes.json", workspace)
+    run_once(workspace)
+    assert caplog.text.count("the disk is full. Free some.") == 2
+    assert counts(workspace) == {Stage.DONE: 1}
+
+
+def test_a_store_that_waiting_cannot_mend_ends_the_daemon(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(self: Store, *args: object) -> None:
+        raise StoreError("is damaged.", remedy="Restore it from a backup.")
+
+    monkeypatch.setattr(Store, "receive", damaged)
+    write_test(workspace.spool / "a.modes.json", workspace)
+    with pytest.raises(StoreError, match="damaged"):
+        run_once(workspace)
+    assert (workspace.spool / "a.modes.json").exists()
+    monkeypatch.undo()
+    with workspace.lock():  # was let go of
+        pass
+
+
+class Mortal(ThreadPoolExecutor):
+    """A pool whose workers die once, on the first job."""
+
+    lives = 1
+
+    def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
+        if Mortal.lives:
+            Mortal.lives -= 1
+            raise BrokenExecutor("a worker died")
+        return super().submit(fn, *args, **kwargs)
+
+
+def test_dead_workers_are_replaced(workspace: Workspace, caplog: pytest.LogCaptureFixture) -> None:
+    Mortal.lives = 1
+    write_test(workspace.spool / "a.modes.json", workspace)
+    run_once(workspace, make_executor=Mortal)
+    assert "beginning new ones" in caplog.text
+    assert counts(workspace) == {Stage.DONE: 1}
+
+
+def test_a_description_that_names_no_class_is_refused_at_the_start(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "wrong", settings={"models": "beam9"})
+    with pytest.raises(ShmError, match="beam9"):
+        run_once(workspace)
+
+
+def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
+    workspace = make_workspace(
+        tmp_path / "later", hooks={"mail": ["true"]}, settings={"hook_backoff_seconds": 3600.0}
+    )
+    for day, tension in enumerate((1.0, 0.8)):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day, tension=tension)
+    run_once(workspace, notifier=Postman(failures=9))
+    with workspace.store() as store:
+        assert [each.attempts for each in store.deliveries()] == [1]
+
+
+def test_a_missing_store_is_told(workspace: Workspace) -> None:
+    workspace.database.unlink()
+    with pytest.raises(ShmError, match="shm init"):
+        run_once(workspace)

@@ -1,0 +1,78 @@
+"""The daemon as its owner begins it: a process of its own, ended by signals."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from shm.store import Stage, Workspace
+from shm_daemon.__main__ import main
+from tests.helpers.daemons import quick_daemon, real_daemon
+from tests.helpers.workspaces import write_test
+
+
+def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
+
+
+def at_work(workspace: Workspace) -> bool:
+    """Whether a step has reached a worker, which has its file open."""
+    return any((workspace.folder / "archive" / ".open").glob("*"))
+
+
+def done(workspace: Workspace) -> int:
+    with workspace.store() as store:
+        return store.stage_counts()[Stage.DONE]
+
+
+def processes_of(workspace: Workspace) -> list[int]:
+    """Living processes whose environment names the workspace: the daemon and all it began."""
+    mark, found = f"SHM_TEST={workspace.folder}".encode(), []
+    for folder in Path("/proc").iterdir():
+        try:
+            environment = (folder / "environ").read_bytes() if folder.name.isdigit() else b""
+        except OSError:
+            continue
+        if mark in environment:
+            found.append(int(folder.name))
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc to find processes")
+def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SHM_TEST", str(workspace.folder))
+    for day in range(6):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+    daemon = real_daemon(workspace.folder)
+    until(lambda: at_work(workspace))
+    daemon.terminate()
+    assert daemon.wait(10) == 0
+    until(lambda: not processes_of(workspace), 10)
+    log = (workspace.folder / "daemon.log").read_text()
+    assert "ended" in log
+    assert "Traceback" not in log
+
+    daemon = real_daemon(workspace.folder)
+    until(lambda: len(processes_of(workspace)) > 2)  # itself, a helper, a worker
+    daemon.kill()
+    assert daemon.wait(10) == -9
+    until(lambda: not processes_of(workspace), 20)
+
+    quick_daemon(workspace.folder, once=True).join(60)
+    assert done(workspace) == 6
+
+
+@pytest.mark.parametrize(("arguments", "code"), [([], 2), (["/no/such/workspace"], 3)])
+def test_a_wrong_call_says_what_to_do(
+    arguments: list[str], code: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert main(arguments) == code
+    assert "workspace" in caplog.text.lower()

@@ -1,0 +1,92 @@
+"""Small nouns for tests: a posterior, a test, a drift, an alert, cheap and plausible."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from shm.store import ReceivedFile
+from shm.values import (
+    Alert,
+    Drift,
+    FrequencyResponse,
+    ModalTest,
+    Mode,
+    Posterior,
+    PredictedFrequency,
+    ResponsePoint,
+    ShapePoint,
+)
+
+NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
+
+
+def a_file(number: int = 1, **changes: object) -> ReceivedFile:
+    values: dict[str, object] = {
+        "sha256": f"{number:064x}",
+        "file_name": f"h3-{number}.csv",
+        "size_bytes": 10,
+        "arrival": f"entry-{number}",
+        "archived_as": f"00/{number:064x}.csv",
+        **changes,
+    }
+    return ReceivedFile(**values)  # type: ignore[arg-type]
+
+
+def a_test(name: str = "t1", days: float = 0.0, **changes: object) -> ModalTest:
+    values: dict[str, object] = {
+        "id": name,
+        "hanger": 3,
+        "time": NOW + timedelta(days=days),
+        "temperature_c": 11.5,
+        "modes": (
+            Mode("transverse", 1, 5.8, 0.006, shape=(ShapePoint(1.2, 0.31, sd=0.01),)),
+            Mode("longitudinal", 1, 5.9),
+        ),
+        **changes,
+    }
+    return ModalTest(**values)  # type: ignore[arg-type]
+
+
+def a_posterior(model: str = "beam1", tests: tuple[str, ...] = ("t1",), seed: int = 7) -> Posterior:
+    rng = np.random.default_rng(seed)
+    return Posterior(
+        model=model,
+        hanger=3,
+        names=("theta_F", "sigma"),
+        samples=rng.normal([1.0, 0.01], [0.02, 0.001], (50, 2)),
+        log_likelihood=rng.normal(size=50),
+        most_probable=np.array([1.0, 0.01]),
+        nominal_tension_n=711e3,
+        log_evidence=-12.5,
+        log_evidence_sd=float("nan"),
+        effective_sample_size=48.0,
+        r_hat=1.01,
+        evaluations=2000,
+        predicted=(PredictedFrequency("transverse", 1, 5.8, 0.01, float("nan")),),
+        tests=tests,
+        seed=seed,
+        seconds=0.25,
+    )
+
+
+def a_response(points: int = 2, lines: int = 5) -> FrequencyResponse:
+    rng = np.random.default_rng(1)
+    shape = (points, lines)
+    return FrequencyResponse(
+        source="h3-1.csv",
+        points=(ResponsePoint("acc_1", "transverse", 1.2), ResponsePoint("acc_2")),
+        frequency_hz=np.linspace(0, 100, lines),
+        accelerance=rng.normal(size=shape) + 1j * rng.normal(size=shape),
+        coherence=rng.uniform(size=shape),
+        hanger=3,
+    )
+
+
+def a_drift(test: str = "t2", probability: float = 0.99) -> Drift:
+    return Drift(3, test, NOW, "tension", 711e3, 650e3, -0.08, 0.01, 0.05, probability)
+
+
+def an_alert(key: str = "hanger-3:tension-down", test: str = "t2") -> Alert:
+    return Alert(key, 3, test, NOW, "Hanger 3: tension moved.", (a_drift(test),))

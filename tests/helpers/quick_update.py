@@ -1,0 +1,55 @@
+"""A stand-in for the sampler where the flow, not the posterior, is tested: quick, seeded alike.
+
+Tension is looked up from the mean measured frequency; the scatter is one percent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.models import Model
+from shm.update import UpdateOptions
+from shm.values import Hanger, ModalTest, Posterior, Selection
+from tests.helpers.workspaces import modes_of
+
+_TENSIONS = (0.5, 0.8, 1.0, 1.2, 1.5)
+
+
+def update(tests: Sequence[ModalTest], model: Model, options: UpdateOptions) -> Posterior:
+    rng = np.random.default_rng(options.seed)
+    measured = np.mean([mode.frequency_hz for test in tests for mode in test.modes])
+    centre = np.interp(measured, [_mean_hz(model.hanger, t) for t in _TENSIONS], _TENSIONS)
+    samples = np.column_stack(
+        [rng.normal(centre, 0.01, options.samples), rng.uniform(0, 0.01, options.samples)]
+    )
+    return Posterior(
+        model=model.name,
+        hanger=tests[0].hanger,
+        names=("theta_F", "sigma"),
+        samples=samples,
+        log_likelihood=rng.normal(size=options.samples),
+        most_probable=np.array([centre, 0.005]),
+        nominal_tension_n=model.hanger.nominal_tension_n,
+        log_evidence=0.0,
+        log_evidence_sd=0.1,
+        effective_sample_size=float(options.samples),
+        r_hat=1.0,
+        evaluations=options.samples,
+        predicted=(),
+        tests=tuple(test.id for test in tests),
+        seed=options.seed,
+        seconds=0.0,
+    )
+
+
+def _mean_hz(hanger: Hanger, tension: float) -> float:
+    return float(np.mean([mode.frequency_hz for mode in modes_of(hanger, tension)]))
+
+
+def select(
+    tests: Sequence[ModalTest], models: Sequence[Model], options: UpdateOptions
+) -> Selection:
+    posteriors = tuple(update(tests, model, options) for model in models)
+    return Selection(posteriors, (1 / len(models),) * len(models))

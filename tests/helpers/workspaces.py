@@ -1,0 +1,81 @@
+"""Workspaces and modal-tests files for tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from shm.documents import dump, modes_document
+from shm.models import build
+from shm.store import Workspace
+from shm.values import PLANES, Hanger, ModalTest, Mode
+
+START = datetime(2026, 5, 1, 10, 0, tzinfo=UTC)
+QUICK = {"models": "beam1", "samples": 100, "spool_scan_seconds": 0.05, "spool_stable_seconds": 0.0}
+
+
+def make_workspace(
+    folder: Path,
+    *,
+    hangers: Sequence[int] = (3,),
+    settings: Mapping[str, object] | None = None,
+    hooks: Mapping[str, Sequence[str]] | None = None,
+) -> Workspace:
+    """A workspace whose hangers are all like hanger 3 of the thesis."""
+    lines = ['[bridge]\nname = "Test bridge"']
+    for number in hangers:
+        lines.append(
+            f"[[hanger]]\nid = {number}\ndiameter_m = 0.130\nlength_m = 12.0\n"
+            "elastic_modulus_pa = 200e9\ndensity_kg_m3 = 7800\nnominal_tension_n = 711e3"
+        )
+    for name, command in (hooks or {}).items():
+        lines.append(f"[[hook]]\nname = {json.dumps(name)}\ncommand = {json.dumps(list(command))}")
+    values = {**QUICK, **(settings or {})}
+    lines.append("[settings]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in values.items()))
+    config = folder.with_name(f"{folder.name}.toml")
+    config.write_text("\n\n".join(lines) + "\n")
+    return Workspace.initialise(folder, config)
+
+
+def modes_of(hanger: Hanger, tension: float, modes: int = 2) -> tuple[Mode, ...]:
+    """The first modes of a clamped beam, in both planes, at a fraction of the nominal tension."""
+    model = build("beam1", hanger)
+    theta = np.array([[tension if name == "theta_F" else 1.0 for name in model.parameter_names]])
+    frequencies = model.frequencies_hz(theta, modes)[0]
+    return tuple(
+        Mode(plane, order + 1, float(frequencies[row, order]))
+        for row, plane in enumerate(PLANES)
+        for order in range(modes)
+    )
+
+
+def write_test(
+    path: Path,
+    workspace: Workspace,
+    *,
+    hanger: int = 3,
+    day: float = 0.0,
+    tension: float = 1.0,
+    name: str = "",
+) -> ModalTest:
+    """Writes a `*.modes.json` of one test, whole at once, and returns the test."""
+    described = workspace.bridge.hangers[0]
+    test = ModalTest(
+        id=name or path.name.removesuffix(".modes.json"),
+        modes=modes_of(described, tension),
+        hanger=hanger,
+        time=START + timedelta(days=day),
+    )
+    put(path, dump(modes_document([test])))
+    return test
+
+
+def put(path: Path, content: str | bytes) -> None:
+    """Writes a file and gives it its name at the end, as a careful uploader does."""
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
+    temporary.rename(path)

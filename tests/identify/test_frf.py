@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shm.identify import IdentifyOptions, identify
+from shm.identify.frf import END_LEVEL, AveragedResponse, HitRecord, averaged_response
+from shm.identify.hits import find_pulses
+from shm.values import FrequencyResponse, Recording, ResponsePoint
+from tests.identify.signals import Planted, Sensor, recording
+
+RATE_HZ = 1024.0
+MODES = (Planted(12.0, 0.02, (1.0,)), Planted(31.0, 0.02, (-0.5,)))
+
+
+def _average(record: Recording) -> AveragedResponse:
+    force = record.force
+    assert force is not None
+    signals = np.array([channel.values for channel in record.accelerations])
+    hits = [
+        HitRecord(force.values, signals, pulse)
+        for pulse in find_pulses(force.values, record.sampling_rate_hz)
+    ]
+    return averaged_response(hits, record.sampling_rate_hz, 60.0)
+
+
+def _record(modes: tuple[Planted, ...] = MODES, **changes: float) -> Recording:
+    keywords = {"hits": 4, "seconds": 8.0, "rate_hz": RATE_HZ, **changes}
+    return recording(modes, (Sensor(),), **keywords)  # type: ignore[arg-type]
+
+
+def _accelerance(frequency_hz: np.ndarray) -> np.ndarray:
+    """-w^2 sum phi / (w_r^2 - w^2 + 2 i zeta w_r w) for unit modal mass."""
+    omega = 2 * np.pi * frequency_hz[:, np.newaxis]
+    natural = 2 * np.pi * np.array([mode.frequency_hz for mode in MODES])
+    damping = np.array([mode.damping_ratio for mode in MODES])
+    shape = np.array([mode.shape[0] for mode in MODES])
+    modal = shape / (natural**2 - omega**2 + 2j * damping * natural * omega)
+    return np.asarray(-(omega[:, 0] ** 2) * modal.sum(axis=1))
+
+
+def test_h1_is_the_accelerance_of_the_planted_modes() -> None:
+    average = _average(_record())
+    band = (average.frequency_hz > 5) & (average.frequency_hz < 40)
+    expected = _accelerance(average.frequency_hz[band])
+    error = np.abs(average.accelerance[0, band] - expected)
+    assert np.max(error) < 0.02 * np.max(np.abs(expected))
+
+
+def test_lines_begin_at_zero_are_even_and_pass_the_band_a_little() -> None:
+    frequency = _average(_record()).frequency_hz
+    assert frequency[0] == 0
+    np.testing.assert_allclose(np.diff(frequency), frequency[1])
+    assert 70 < frequency[-1] <= 75
+    assert frequency[1] == pytest.approx(1 / 8, rel=0.05)
+
+
+def test_coherence_is_one_without_noise_and_falls_with_it() -> None:
+    clean, noisy = _average(_record()), _average(_record(noise=150.0))
+    assert clean.coherence is not None
+    assert noisy.coherence is not None
+    assert np.all(clean.coherence[0, 40:300] > 0.999)
+    assert np.median(noisy.coherence[0, 40:300]) < 0.9
+
+
+def test_a_single_hit_has_no_coherence() -> None:
+    assert _average(_record(hits=1)).coherence is None
+
+
+def test_a_ring_down_that_has_died_away_gets_no_exponential_window() -> None:
+    assert _average(_record()).window_time_constant_s == math.inf
+
+
+def test_a_long_ring_down_is_brought_to_a_hundredth_by_its_window() -> None:
+    slow = (Planted(12.0, 0.001, (1.0,)),)
+    average = _average(_record(slow, hits=1))
+    own = math.exp(-0.001 * 2 * math.pi * 12.0 * 7.0)
+    window = math.exp(-7.7 / average.window_time_constant_s)
+    assert own * window == pytest.approx(END_LEVEL, rel=0.15)
+
+
+def test_the_window_adds_just_the_damping_that_its_time_constant_says() -> None:
+    """Identified from its windowed response and told the window, a mode has its own damping."""
+    slow = (Planted(12.0, 0.001, (1.0,)),)
+    average = _average(_record(slow, hits=1, seconds=20.0))
+    tau = average.window_time_constant_s
+    response = FrequencyResponse(
+        "windowed", (ResponsePoint("a"),), average.frequency_hz, average.accelerance
+    )
+    (mode,) = identify([response], IdentifyOptions(2.0, 60.0), test_id="t").test.modes
+    assert mode.damping_ratio == pytest.approx(0.001 + 1 / (2 * np.pi * 12.0 * tau), rel=0.03)
+    told = IdentifyOptions(2.0, 60.0, window_time_constant_s=tau)
+    (mode,) = identify([response], told, test_id="t").test.modes
+    assert mode.damping_ratio == pytest.approx(0.001, rel=0.05)
+
+
+def test_hits_of_different_length_are_cut_to_the_shortest() -> None:
+    record = _record()
+    force = record.force
+    assert force is not None
+    signals = np.array([channel.values for channel in record.accelerations])
+    pulses = find_pulses(force.values, RATE_HZ)
+    spacings = [
+        averaged_response(
+            [HitRecord(force.values, signals, p) for p in some], RATE_HZ, 60.0
+        ).frequency_hz[1]
+        for some in (pulses[:1], pulses[:2], pulses[-1:])
+    ]
+    assert spacings[0] == spacings[1] <= spacings[2]

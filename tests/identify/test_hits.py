@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import firwin, lfilter
+
+from shm.identify.hits import find_pulses
+from shm.values import FloatArray
+from tests.identify.signals import force_signal, half_sine
+
+
+def _force(
+    rate_hz: float = 2048.0, hits: int = 4, noise_n: float = 0.5, seed: int = 0
+) -> tuple[FloatArray, list[int]]:
+    rng = np.random.default_rng(seed)
+    starts = [round((0.5 + 3 * hit) * rate_hz) for hit in range(hits)]
+    samples = round(3 * hits * rate_hz)
+    force = force_signal(starts, samples, rate_hz, rng.uniform(800, 3000, hits))
+    return force + noise_n * rng.standard_normal(samples), starts
+
+
+def _struck_again(force: FloatArray, start: int, share: float, after_s: float) -> FloatArray:
+    again = force.copy()
+    pulse = half_sine(2048.0, share * float(force.max()))
+    begin = start + round(after_s * 2048)
+    again[begin : begin + len(pulse)] += pulse
+    return again
+
+
+def test_every_hit_is_found_where_it_begins() -> None:
+    force, starts = _force(hits=6)
+    found = [pulse.start for pulse in find_pulses(force, 2048.0)]
+    assert np.max(np.abs(np.subtract(found, starts))) <= 1
+
+
+def test_the_peak_force_of_each_hit_is_told() -> None:
+    force, starts = _force(noise_n=0.0)
+    for pulse, start in zip(find_pulses(force, 2048.0), starts, strict=True):
+        assert pulse.peak_force_n == pytest.approx(force[start : start + 20].max(), rel=1e-9)
+
+
+def test_a_hammer_wired_the_wrong_way_round_still_hits() -> None:
+    force, starts = _force()
+    assert [p.start for p in find_pulses(-force, 2048.0)] == [
+        p.start for p in find_pulses(force, 2048.0)
+    ]
+    assert len(starts) == 4
+
+
+def test_a_hit_on_the_first_sample_is_found() -> None:
+    force = np.concatenate((half_sine(25_600, 80.0, 0.0003), np.zeros(20_000)))
+    force += 0.05 * np.random.default_rng(1).standard_normal(len(force))
+    assert [pulse.start for pulse in find_pulses(force, 25_600.0)] == [0]
+
+
+def test_slow_drift_of_the_force_sensor_is_not_a_hit() -> None:
+    time = np.arange(8192) / 1024
+    drift = 40 * np.sin(0.9 * time) + 0.1 * np.random.default_rng(2).standard_normal(8192)
+    assert find_pulses(drift, 1024.0) == []
+
+
+def test_noise_and_machines_are_not_hits() -> None:
+    rng = np.random.default_rng(3)
+    time = np.arange(16_384) / 1024
+    assert find_pulses(rng.standard_normal(16_384), 1024.0) == []
+    assert (
+        find_pulses(5 * np.sin(2 * np.pi * 50 * time) + rng.standard_normal(16_384), 1024.0) == []
+    )
+    assert find_pulses(np.zeros(1000), 1024.0) == []
+    assert find_pulses(np.full(1000, np.nan), 1024.0) == []
+
+
+def test_a_soft_knock_among_hard_hits_is_not_a_hit() -> None:
+    force, starts = _force()
+    force[starts[1] + 3000 : starts[1] + 3010] += 0.05 * force.max()
+    assert len(find_pulses(force, 2048.0)) == len(starts)
+
+
+@pytest.mark.parametrize("share", [0.04, 0.3, 1.5])
+@pytest.mark.parametrize("after_s", [0.015, 0.06, 0.4])
+def test_a_second_strike_of_the_same_swing_is_seen(share: float, after_s: float) -> None:
+    force, starts = _force()
+    struck = [
+        p.second_peak > 0
+        for p in find_pulses(_struck_again(force, starts[2], share, after_s), 2048.0)
+    ]
+    assert struck == [False, False, True, False]
+
+
+def test_a_second_strike_is_told_as_a_share_of_the_first() -> None:
+    force = force_signal([1000], 8000, 2048.0, [1000.0])
+    (pulse,) = find_pulses(_struck_again(force, 1000, 0.3, 0.05), 2048.0)
+    assert pulse.second_peak == pytest.approx(0.3, rel=0.03)
+
+
+@pytest.mark.parametrize("factor", [4, 8, 16, 32])
+def test_the_ringing_of_an_anti_aliasing_filter_is_not_a_second_strike(factor: int) -> None:
+    """Hits sampled at 16384 Hz, filtered sharply and thinned to 4096 ... 512 Hz."""
+    for seed in range(6):
+        fine, _ = _force(16_384.0, hits=3, noise_n=0.0, seed=seed)
+        taps = firwin(40 * factor + 1, 0.9 / factor)
+        thin = lfilter(taps, [1.0], fine)[seed::factor]
+        thin += 0.1 * np.random.default_rng(seed).standard_normal(len(thin))
+        pulses = find_pulses(thin, 16_384.0 / factor)
+        assert [pulse.second_peak for pulse in pulses] == [0.0, 0.0, 0.0]
+
+
+def test_a_ring_down_ends_before_the_next_hit() -> None:
+    force, starts = _force()
+    pulses = find_pulses(force, 2048.0)
+    assert all(p.stop < after for p, after in zip(pulses, starts[1:], strict=False))
+    assert pulses[-1].stop == len(force)
+
+
+def test_the_pulse_ends_where_the_force_is_quiet_again() -> None:
+    force, starts = _force()
+    for pulse, start in zip(find_pulses(force, 2048.0), starts, strict=True):
+        assert 5 <= pulse.end - start <= 9

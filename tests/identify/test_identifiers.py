@@ -1,0 +1,182 @@
+"""The contract: every registered identifier finds what was planted, and refuses noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import UsageError
+from shm.identify import IDENTIFIERS, IdentifyOptions
+from shm.identify.contract import Finding, Identifier, Measurement
+from shm.identify.jackknife import FREQUENCY_FLOOR
+from shm.identify.recordings import measurement_of_recordings
+from shm.identify.registry import identifier
+from tests.identify.signals import Planted, Sensor, hanger_modes, recording
+
+OPTIONS = IdentifyOptions(2.0, 50.0)
+every_identifier = pytest.mark.parametrize("identify", IDENTIFIERS.values(), ids=IDENTIFIERS.keys())
+
+
+def _measured(modes: list[Planted], **keywords: object) -> Measurement:
+    return measurement_of_recordings([recording(modes, **keywords)], OPTIONS)  # type: ignore[arg-type]
+
+
+def _frequencies(finding: Finding) -> list[float]:
+    return [mode.frequency_hz for mode in finding.modes]
+
+
+@every_identifier
+def test_close_modes_of_two_planes_are_found_with_their_damping(identify: Identifier) -> None:
+    planted = sorted(hanger_modes(skew_deg=10.0), key=lambda mode: mode.frequency_hz)
+    finding = identify(_measured(planted, noise=0.02), OPTIONS)
+    for found, truth in zip(finding.modes, planted, strict=True):
+        assert found.frequency_hz == pytest.approx(truth.frequency_hz, rel=5e-4)
+        assert found.damping_ratio == pytest.approx(truth.damping_ratio, rel=0.1)
+        shape = np.array(truth.shape) / max(truth.shape, key=abs)
+        np.testing.assert_allclose(found.shape, shape, atol=0.05)
+
+
+@every_identifier
+def test_without_noise_frequencies_are_exact(identify: Identifier) -> None:
+    """Free decays are sums of exponentials: nothing is approximated but by rounding."""
+    planted = [Planted(7.0, 0.003, (1.0, 0.2)), Planted(19.0, 0.002, (-0.4, 1.0))]
+    finding = identify(_measured(planted), OPTIONS)
+    assert _frequencies(finding) == pytest.approx([7.0, 19.0], rel=1e-7)
+    assert [m.damping_ratio for m in finding.modes] == pytest.approx([0.003, 0.002], rel=1e-4)
+
+
+@every_identifier
+def test_noise_holds_no_mode(identify: Identifier) -> None:
+    for seed in range(3):
+        measurement = _measured(hanger_modes(), seed=seed)
+        rng = np.random.default_rng(seed)
+        noise = tuple(rng.standard_normal(decay.shape) for decay in measurement.decays)
+        assert _frequencies(identify(replace(measurement, decays=noise), OPTIONS)) == []
+        alone = replace(measurement, decays=noise[:1])
+        assert _frequencies(identify(alone, OPTIONS)) == []
+
+
+@every_identifier
+def test_silence_holds_no_mode(identify: Identifier) -> None:
+    measurement = _measured(hanger_modes())
+    silent = tuple(np.zeros_like(decay) for decay in measurement.decays)
+    finding = identify(replace(measurement, decays=silent), OPTIONS)
+    assert finding.modes == ()
+    assert len(finding.poles.order) == 0
+
+
+@every_identifier
+def test_two_channels_that_say_the_same_do_no_harm(identify: Identifier) -> None:
+    planted = [Planted(f, 0.003, (1.0, 1.0)) for f in (6.0, 13.5, 23.0)]
+    for noise in (0.0, 0.02):
+        measurement = _measured(planted, noise=noise, sensors=(Sensor(), Sensor()))
+        same = tuple(np.vstack([decay[0], decay[0]]) for decay in measurement.decays)
+        finding = identify(replace(measurement, decays=same), OPTIONS)
+        assert _frequencies(finding) == pytest.approx([6.0, 13.5, 23.0], rel=5e-4)
+
+
+@every_identifier
+def test_modes_out_of_the_band_are_left_out(identify: Identifier) -> None:
+    narrow = IdentifyOptions(10.0, 30.0)
+    record = recording(hanger_modes(), noise=0.01)
+    found = _frequencies(identify(measurement_of_recordings([record], narrow), narrow))
+    assert len(found) == 4
+    assert all(10 < frequency < 30 for frequency in found)
+
+
+@every_identifier
+def test_standard_deviations_follow_the_noise(identify: Identifier) -> None:
+    quiet, loud = (
+        identify(_measured(hanger_modes(), noise=noise, seed=3), OPTIONS).modes
+        for noise in (0.01, 0.1)
+    )
+    ratio = [b.frequency_sd_hz / a.frequency_sd_hz for a, b in zip(quiet, loud, strict=True)]
+    assert np.median(ratio) == pytest.approx(10.0, rel=0.5)
+    for mode in quiet:
+        assert 0 < mode.damping_sd < 0.2 * mode.damping_ratio
+        assert np.all(mode.shape_sd >= 0)
+
+
+@every_identifier
+@pytest.mark.parametrize("hits", [1, 2])
+def test_below_three_hits_only_the_stated_floor_is_claimed(identify: Identifier, hits: int) -> None:
+    for mode in identify(_measured(hanger_modes(), noise=0.01, hits=hits), OPTIONS).modes:
+        assert mode.frequency_sd_hz == pytest.approx(FREQUENCY_FLOOR * mode.frequency_hz)
+        assert np.isnan(mode.damping_sd)
+        assert np.isnan(mode.shape_sd).all()
+
+
+@every_identifier
+def test_one_disturbed_hit_does_not_make_a_mode(identify: Identifier) -> None:
+    """A ringing at 41 Hz after one hit of five is not the hanger's."""
+    measurement = _measured(hanger_modes(), noise=0.01)
+    time = np.arange(measurement.decays[0].shape[1]) / measurement.sampling_rate_hz
+    ringing = measurement.decays[0] + 5 * np.exp(-0.5 * time) * np.sin(2 * np.pi * 41 * time)
+    finding = identify(replace(measurement, decays=(ringing, *measurement.decays[1:])), OPTIONS)
+    assert len(finding.modes) == 8
+    assert any("41" in entry.what for entry in finding.dropped)
+
+
+@every_identifier
+def test_a_single_sensor_axis_is_enough_for_modes_apart(identify: Identifier) -> None:
+    planted = [Planted(f, 0.003, (1.0,)) for f in (6.0, 13.5, 23.0)]
+    finding = identify(_measured(planted, sensors=(Sensor(),), noise=0.02), OPTIONS)
+    assert _frequencies(finding) == pytest.approx([6.0, 13.5, 23.0], rel=5e-4)
+
+
+@every_identifier
+def test_many_channels_are_no_harder_than_few(identify: Identifier) -> None:
+    places = np.linspace(0.5, 4.0, 12)
+    planted = [
+        Planted(f, 0.003, tuple(np.sin(n * np.pi * places / 9)))
+        for n, f in enumerate((5.0, 10.6, 17.0, 24.5, 33.0), 1)
+    ]
+    sensors = tuple(Sensor("transverse", float(x)) for x in places)
+    finding = identify(_measured(planted, sensors=sensors, noise=0.02), OPTIONS)
+    assert _frequencies(finding) == pytest.approx([5.0, 10.6, 17.0, 24.5, 33.0], rel=5e-4)
+
+
+@every_identifier
+def test_the_diagram_marks_the_poles_of_the_modes_as_stable(identify: Identifier) -> None:
+    finding = identify(_measured(hanger_modes(), noise=0.02), OPTIONS)
+    poles = finding.poles
+    assert len(poles.order) == len(poles.frequency_hz) == len(poles.damping_ratio)
+    for frequency in _frequencies(finding):
+        near = np.abs(poles.frequency_hz / frequency - 1) < 1e-3
+        assert poles.stable[near].sum() > 5
+
+
+@every_identifier
+def test_the_same_measurement_gives_the_same_modes(identify: Identifier) -> None:
+    measurement = _measured(hanger_modes(), noise=0.02)
+    one, other = (identify(measurement, OPTIONS) for _ in range(2))
+    assert _frequencies(one) == _frequencies(other)
+
+
+def test_the_size_of_the_model_may_be_stated() -> None:
+    measurement = _measured(hanger_modes(), noise=0.02)
+    stated = replace(OPTIONS, block_rows=60, max_order=40)
+    finding = IDENTIFIERS["ssi"](measurement, stated)
+    assert len(finding.modes) == 8
+    assert finding.poles.order.max() <= 40
+
+
+def test_an_unknown_identifier_is_a_usage_error_that_names_the_known() -> None:
+    with pytest.raises(UsageError, match="ssi"):
+        identifier("peak picking")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"band_low_hz": 50.0, "band_high_hz": 10.0},
+        {"band_low_hz": -1.0},
+        {"max_order": 0},
+        {"block_rows": 1},
+    ],
+)
+def test_options_that_cannot_be_are_usage_errors(wrong: dict[str, float]) -> None:
+    with pytest.raises(UsageError):
+        IdentifyOptions(**wrong)  # type: ignore[arg-type]

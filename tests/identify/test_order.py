@@ -1,0 +1,85 @@
+"""Orders of modes when some are missing, on hangers by finite elements and on the measured one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shm.identify.order import PlaneModes, assign_orders
+from shm.simulate import HangerState, natural_frequencies
+from shm.values import Hanger
+
+HANGER = Hanger(1, 12.0, 200e9, 0.00283, 6.4e-7, 22.1, 300e3)
+# Table 1.1 of the thesis on hanger 3: end plates rotated by 90 degrees bend it off the pattern.
+MEASURED = (
+    [5.82, 13.85, 26.17, 40.47, 59.3, 81.3],
+    [6.09, 14.8, 27.0, 41.8, 61.5, 83.68],
+)
+
+
+def _plane(frequencies: object) -> PlaneModes:
+    values = np.array(frequencies, dtype=float)
+    return PlaneModes(values, np.empty(0), np.empty((len(values), 0)))
+
+
+def _hanger_frequencies(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    state = HangerState(300e3 * rng.uniform(0.5, 1.5), *(10 ** rng.uniform(3, 8, 4)))
+    return natural_frequencies(HANGER, state, 9)
+
+
+@pytest.mark.parametrize("missing", range(1, 7))
+def test_a_missing_mode_of_the_measured_hanger_does_not_shift_the_others(missing: int) -> None:
+    rest = [order for order in range(1, 7) if order != missing]
+    one, two = MEASURED
+    gappy = [one[order - 1] for order in rest]
+    assert assign_orders([_plane(gappy), _plane(two)]) == [rest, [1, 2, 3, 4, 5, 6]]
+    assert assign_orders([_plane(gappy), _plane([])]) == [rest, []]
+
+
+def test_a_whole_hanger_is_counted() -> None:
+    for seed in range(5):
+        frequencies = _hanger_frequencies(seed)
+        counted = list(range(1, 10))
+        assert assign_orders([_plane(f) for f in frequencies]) == [counted, counted]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_orders_missing_at_random_in_both_planes_are_left_open(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    kept = [np.sort(rng.choice(9, 7, replace=False)) for _ in range(2)]
+    planes = [_plane(f[k]) for f, k in zip(_hanger_frequencies(seed), kept, strict=True)]
+    assert assign_orders(planes) == [(k + 1).tolist() for k in kept]
+
+
+def test_a_lonely_mode_is_numbered_by_the_other_plane() -> None:
+    transverse, longitudinal = _hanger_frequencies(1)
+    assert assign_orders([_plane(transverse), _plane(longitudinal[3:4])])[1] == [4]
+
+
+def test_a_lonely_mode_alone_is_the_first() -> None:
+    assert assign_orders([_plane([14.8]), _plane([])]) == [[1], []]
+
+
+def test_what_is_no_hanger_is_counted() -> None:
+    frequencies = [810.0, 851.0, 900.0, 2640.0, 3008.0, 3669.0]
+    assert assign_orders([_plane(frequencies), _plane([])]) == [[1, 2, 3, 4, 5, 6], []]
+
+
+def test_more_modes_than_the_pattern_holds_are_counted() -> None:
+    many = np.linspace(5, 90, 70)
+    assert assign_orders([_plane(many)]) == [list(range(1, 71))]
+
+
+def test_no_mode_at_all_has_no_order() -> None:
+    assert assign_orders([_plane([]), _plane([])]) == [[], []]
+
+
+def test_shapes_number_two_modes_that_frequencies_cannot() -> None:
+    """A string's modes 2 and 4 look like 1 and 2 by frequency; three sensors tell."""
+    position = np.array([0.1, 0.25, 0.4])
+    orders = np.array([2, 4])
+    shapes = np.sin(np.outer(orders, position) * np.pi)
+    assert assign_orders([PlaneModes(5.0 * orders, position, shapes)]) == [[2, 4]]
+    blind = PlaneModes(5.0 * orders, np.empty(0), np.empty((2, 0)))
+    assert assign_orders([blind]) == [[1, 2]]

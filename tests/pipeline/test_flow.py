@@ -1,0 +1,454 @@
+"""Files go through all stages, in the right order, once, whatever happens on the way."""
+
+from __future__ import annotations
+
+import json
+import logging
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shm.documents import dump, modes_document
+from shm.errors import ShmError, StoreBusy, StoreError, UsageError
+from shm.pipeline import steps
+from shm.store import DeliveryState, Stage, Store, Workspace
+from shm.values import AddedMass, ModalTest, Posterior
+from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
+from tests.helpers.workspaces import START, make_workspace, put, write_test
+
+
+def spool(workspace: Workspace, name: str, **values: float) -> None:
+    write_test(workspace.spool / f"{name}.modes.json", workspace, **values)  # type: ignore[arg-type]
+
+
+def stages(workspace: Workspace) -> dict[str, Stage]:
+    with workspace.store() as store:
+        return {recording.file.file_name: recording.stage for recording in store.recordings()}
+
+
+@pytest.mark.usefixtures("real_sampler")
+def test_files_go_from_the_spool_through_all_stages(workspace: Workspace) -> None:
+    spool(workspace, "t1", day=0)
+    spool(workspace, "t2", day=1, tension=1.01)
+    ingest(workspace)
+    assert list(workspace.spool.iterdir()) == []
+    assert set(stages(workspace).values()) == {Stage.DONE}
+    with workspace.store() as store:
+        tensions = tension_kn(store)
+        assert tensions["t1"] == pytest.approx(711, rel=0.01)
+        assert tensions["t2"] == pytest.approx(711 * 1.01, rel=0.01)
+        assert [drift.test for drift in store.drifts(3)] == ["t2"]
+        assert store.drifts(3)[0].shift_mean == pytest.approx(0.01, abs=0.002)
+        assert store.alerts() == ()
+        assert store.baseline(3) is not None
+
+
+def test_the_earliest_of_the_waiting_tests_makes_the_baseline(workspace: Workspace) -> None:
+    for name, day in (("a", 9), ("b", 1), ("c", 5)):
+        spool(workspace, name, day=day)
+    ingest(workspace)
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert baseline.posterior.tests == ("b",)
+        assert [drift.test for drift in store.drifts(3)] == ["c", "a"]
+
+
+def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load, others = steps.load_modes, threading.Semaphore(0)
+
+    def load_the_earliest_last(path: Path) -> tuple[ModalTest, ...]:
+        if path.name.startswith("earliest"):
+            assert others.acquire(timeout=20)
+            time.sleep(0.1)
+        else:
+            others.release()
+        return load(path)
+
+    monkeypatch.setattr(steps, "load_modes", load_the_earliest_last)
+    spool(workspace, "earliest", day=0)
+    spool(workspace, "later", day=1)
+    ingest(workspace, lanes=3)
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert baseline.posterior.tests == ("earliest",)
+
+
+def test_tests_are_watched_in_the_order_of_their_times(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two tests show a loss; the earlier is slower to update, and still the alert names it."""
+    spool(workspace, "t0", day=0)
+    ingest(workspace)
+    quick, done = steps.update, threading.Event()
+
+    def update(tests: Any, model: Any, options: Any) -> Posterior:
+        if tests[0].id == "t1":
+            assert done.wait(20)
+            time.sleep(0.1)
+        done.set()
+        return quick(tests, model, options)
+
+    monkeypatch.setattr(steps, "update", update)
+    for day in (1, 2):
+        spool(workspace, f"t{day}", day=day, tension=0.8)
+    ingest(workspace, lanes=3)
+    with workspace.store() as store:
+        assert [stored.alert.test for stored in store.alerts()] == ["t1"]
+
+
+def test_several_first_tests_make_the_baseline_together(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 3})
+    for day in (1, 2):
+        spool(workspace, f"t{day}", day=day)
+    ingest(workspace)
+    assert set(stages(workspace).values()) == {Stage.IDENTIFIED}
+    for day in (3, 4):
+        spool(workspace, f"t{day}", day=day)
+    ingest(workspace)
+    assert set(stages(workspace).values()) == {Stage.DONE}
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert baseline.posterior.tests == ("t1", "t2", "t3")
+        assert [drift.test for drift in store.drifts(3)] == ["t4"]
+
+
+def test_each_hanger_has_its_own_baseline_and_selected_class(tmp_path: Path) -> None:
+    workspace = make_workspace(
+        tmp_path / "bridge", hangers=(3, 4), settings={"models": "beam1,beam2"}
+    )
+    spool(workspace, "three", hanger=3)
+    spool(workspace, "four", hanger=4, tension=0.9)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert set(store.selected_models()) == {3, 4}
+        for hanger in (3, 4):
+            selection = store.selection(hanger)
+            assert selection is not None
+            assert {p.model for p in selection.selection.posteriors} == {"beam1", "beam2"}
+            assert sum(selection.selection.probabilities) == pytest.approx(1)
+
+
+def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_first_test(
+    workspace: Workspace,
+) -> None:
+    for day, tension in enumerate((1.0, 0.8, 0.8, 0.8)):
+        spool(workspace, f"t{day}", day=day, tension=tension)
+    postman = Postman()
+    ingest(workspace, notifier=postman, lanes=3)
+    with workspace.store() as store:
+        (stored,) = store.alerts()
+        assert stored.alert.test == "t1"
+        assert stored.alert.key == "hanger-3:tension-down:baseline-1"
+        assert postman.told == [("mail", stored.alert.key)]
+        assert [each.state for each in store.deliveries()] == [DeliveryState.DELIVERED]
+        assert len(store.drifts(3)) == 3
+
+
+def test_without_a_notifier_alerts_wait_in_the_outbox(workspace: Workspace) -> None:
+    spool(workspace, "t1")
+    spool(workspace, "t2", day=1, tension=0.8)
+    ingest(workspace)
+    postman = Postman()
+    ingest(workspace, notifier=postman)
+    assert len(postman.told) == 1
+
+
+def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(tmp_path: Path) -> None:
+    workspace = make_workspace(
+        tmp_path / "bridge",
+        hooks={"mail": ["true"]},
+        settings={"hook_attempts": 3, "hook_backoff_seconds": 10.0},
+    )
+    spool(workspace, "t1")
+    spool(workspace, "t2", day=1, tension=0.8)
+    clock, postman, waits = Clock(), Postman(failures=99), []
+    with a_flow(workspace, clock=clock, notifier=postman) as flow:
+        receive_all(flow)
+        flow.drain()
+        while waiting := flow.store.deliveries(DeliveryState.WAITING):
+            waits.append((waiting[0].next_attempt_at - clock()).total_seconds())
+            clock.pass_by(waits[-1])
+            flow.drain()
+        (delivery,) = flow.store.deliveries()
+    assert waits == [10.0, 20.0]
+    assert (delivery.state, delivery.attempts) == (DeliveryState.GIVEN_UP, 3)
+    assert delivery.last_error == "no answer"
+    assert set(stages(workspace).values()) == {Stage.DONE}
+
+
+def test_a_hook_that_recovers_is_told(workspace: Workspace) -> None:
+    spool(workspace, "t1")
+    spool(workspace, "t2", day=1, tension=0.8)
+    clock, postman = Clock(), Postman(failures=1)
+    with a_flow(workspace, clock=clock, notifier=postman) as flow:
+        receive_all(flow)
+        flow.drain()
+        clock.pass_by(60)
+        flow.drain()
+        (delivery,) = flow.store.deliveries()
+    assert (delivery.state, delivery.attempts) == (DeliveryState.DELIVERED, 2)
+    assert len(postman.told) == 2
+
+
+def test_a_hook_that_is_no_longer_described_fails_and_says_so(workspace: Workspace) -> None:
+    spool(workspace, "t1")
+    spool(workspace, "t2", day=1, tension=0.8)
+    ingest(workspace)
+    bare = replace(workspace, bridge=replace(workspace.bridge, hooks=()))
+    ingest(bare, notifier=Postman())
+    with workspace.store() as store:
+        (delivery,) = store.deliveries()
+    assert delivery.attempts == 1
+    assert "no hook mail" in delivery.last_error
+
+
+def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Workspace) -> None:
+    spool(workspace, "t1")
+    content = (workspace.spool / "t1.modes.json").read_bytes()
+    put(workspace.spool / "copy.modes.json", content)
+    ingest(workspace)
+    put(workspace.spool / "late.modes.json", content)
+    ingest(workspace)
+    assert list(workspace.spool.iterdir()) == []
+    assert len(stages(workspace)) == 1
+    with workspace.store() as store:
+        assert len(store.tests()) == 1
+        assert [event.kind for event in store.events()] == ["duplicate", "duplicate"]
+
+
+def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
+    found = []
+    for label, names, lanes in (("one", "abc", 1), ("many", "cab", 3)):
+        workspace = make_workspace(tmp_path / label)
+        spool(workspace, "0", day=-1)
+        ingest(workspace)
+        with a_flow(workspace, lanes=lanes) as flow:
+            for name in names:
+                spool(workspace, name, day=ord(name), tension=1 + ord(name) / 1e4)
+                flow.receive(workspace.spool / f"{name}.modes.json")
+                if lanes == 1:
+                    flow.drain()
+            flow.drain()
+            history = flow.store.history(3)
+            found.append({test.test.id: posterior.samples for test, posterior in history})
+    assert found[0].keys() == found[1].keys() == {"0", "a", "b", "c"}
+    for name, samples in found[0].items():
+        np.testing.assert_array_equal(samples, found[1][name])
+
+
+def test_a_flow_ended_after_any_turn_goes_on_where_it_stood(workspace: Workspace) -> None:
+    """As by `kill -9`: each flow takes few turns, what it had under way is lost with it."""
+    for day in range(3):
+        spool(workspace, f"t{day}", day=day, tension=0.8 if day else 1.0)
+    reference = make_workspace(workspace.folder.with_name("reference"))
+    for path in workspace.spool.iterdir():
+        put(reference.spool / path.name, path.read_bytes())
+    ingest(reference)
+    for turns in (1, 2, 2, 3, 2, 4, 2, 3, 2, 2, 2, 2):
+        with a_flow(workspace) as flow, ThreadPoolExecutor(1) as threads:
+            flow.executor = threads
+            receive_all(flow)
+            for _ in range(turns):
+                flow.advance()
+    ingest(workspace)
+    assert stages(workspace) == stages(reference)
+    with workspace.store() as store, reference.store() as expected:
+        assert tension_kn(store) == tension_kn(expected)
+        assert store.drifts() == expected.drifts()
+        assert [a.alert for a in store.alerts()] == [a.alert for a in expected.alerts()]
+
+
+def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    update = steps.update
+
+    def fail_on_t2(tests, model, options):  # type: ignore[no-untyped-def]
+        if tests[0].id == "t2":
+            raise ZeroDivisionError("division by zero")
+        return update(tests, model, options)
+
+    monkeypatch.setattr(steps, "update", fail_on_t2)
+    for day in (1, 2, 3):
+        spool(workspace, f"t{day}", day=day)
+    ingest(workspace)
+    assert list(stages(workspace).values()) == [Stage.DONE, Stage.REFUSED, Stage.DONE]
+    reason = json.loads((workspace.folder / "quarantine/t2.modes.json.reason.json").read_text())
+    assert "internal error: ZeroDivisionError" in reason["message"]
+    assert any(record.exc_info for record in caplog.records)
+    with workspace.store() as store:
+        assert list(tension_kn(store)) == ["t1", "t3"]
+        (refused,) = store.recordings(Stage.REFUSED)
+        assert workspace.archive.holds(refused.file)
+
+
+def test_passing_trouble_is_waited_out_and_holds_up_nobody(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read_modes, trouble = steps.load_modes, [True]
+
+    def fail_once(path):  # type: ignore[no-untyped-def]
+        if path.name.startswith("a") and trouble.pop():
+            raise ShmError("not now.", retry_after_s=30.0)
+        return read_modes(path)
+
+    monkeypatch.setattr(steps, "load_modes", fail_once)
+    trouble[:] = [False, True]
+    spool(workspace, "a", day=2)
+    spool(workspace, "b", day=1)
+    clock = Clock()
+    with a_flow(workspace, clock=clock) as flow:
+        receive_all(flow)
+        flow.drain()
+        assert list(stages(workspace).values()) == [Stage.RECEIVED, Stage.DONE]
+        clock.pass_by(31)
+        flow.drain()
+    assert set(stages(workspace).values()) == {Stage.DONE}
+
+
+class DyingPool(ThreadPoolExecutor):
+    """Its workers die, all that are at work, when they meet a file of this name."""
+
+    def __init__(self, name: str):
+        super().__init__(2)
+        self.name = name
+        self.at_work: list[str] = []
+        self.beside: list[int] = []
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        step, subject = fn.args[:2]
+        file_name = subject.file.file_name if step == "identify_file" else ""
+        return super().submit(self._work, fn, file_name)
+
+    def _work(self, fn: Any, file_name: str) -> Any:
+        self.at_work.append(file_name)
+        time.sleep(0.05)  # so that both workers are met at work
+        try:
+            if file_name.startswith(self.name):
+                self.beside.append(len(self.at_work) - 1)
+                raise BrokenProcessPool("a worker died")
+            return fn()
+        finally:
+            self.at_work.remove(file_name)
+
+
+def test_a_file_that_kills_its_worker_is_tried_once_more_alone_and_then_refused(
+    workspace: Workspace, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.WARNING)
+    for number, name in enumerate(("bad", "good", "other")):
+        spool(workspace, name, day=number)
+    with DyingPool("bad") as pool:
+        ingest(workspace, executor=pool, lanes=2)
+    assert pool.beside == [1, 0]
+    assert list(stages(workspace).values()) == [Stage.REFUSED, Stage.DONE, Stage.DONE]
+    died = [r for r in caplog.records if "process that worked on it died" in r.message]
+    assert len(died) == 2
+
+
+def test_a_result_is_not_lost_while_the_store_is_busy(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spool(workspace, "t1")
+    keep, busy = Store.identified, [True]
+
+    def busy_once(self, *args):  # type: ignore[no-untyped-def]
+        if busy and busy.pop():
+            raise StoreBusy("held", retry_after_s=1.0)
+        keep(self, *args)
+
+    monkeypatch.setattr(Store, "identified", busy_once)
+    with a_flow(workspace) as flow:
+        receive_all(flow)
+        with pytest.raises(StoreBusy):
+            flow.drain()
+        flow.drain()
+    assert set(stages(workspace).values()) == {Stage.DONE}
+
+
+def test_a_result_that_the_store_will_not_have_refuses_its_file(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self, *args):  # type: ignore[no-untyped-def]
+        raise StoreError("a value is out of range.")
+
+    monkeypatch.setattr(Store, "identified", refuse)
+    spool(workspace, "t1")
+    ingest(workspace)
+    assert set(stages(workspace).values()) == {Stage.REFUSED}
+
+
+def test_a_test_that_no_class_describes_is_refused_with_its_file(workspace: Workspace) -> None:
+    test = write_test(workspace.spool / "x.modes.json", workspace)
+    heavy = replace(test, id="heavy", added_mass=AddedMass(25.0, 3.6))
+    put(workspace.spool / "x.modes.json", dump(modes_document([test, heavy])))
+    spool(workspace, "good")
+    ingest(workspace)
+    assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
+    with workspace.store() as store:
+        assert [test.test.id for test in store.tests()] == ["good"]
+        (refused,) = store.recordings(Stage.REFUSED)
+        assert refused.reason is not None
+        assert "heavy" in refused.reason["message"]
+
+
+def test_a_refused_test_does_not_stop_the_others_of_its_file(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    update = steps.update
+
+    def fail_on_second(tests, model, options):  # type: ignore[no-untyped-def]
+        if tests[0].id == "second":
+            raise ShmError("will not.", remedy="Leave it out.")
+        return update(tests, model, options)
+
+    monkeypatch.setattr(steps, "update", fail_on_second)
+    test = write_test(workspace.spool / "x.modes.json", workspace)
+    tests = [
+        replace(test, id=name, time=START + timedelta(days=day))
+        for day, name in enumerate(("first", "second", "third"))
+    ]
+    put(workspace.spool / "x.modes.json", dump(modes_document(tests)))
+    ingest(workspace)
+    assert set(stages(workspace).values()) == {Stage.REFUSED}
+    with workspace.store() as store:
+        assert list(tension_kn(store)) == ["first", "third"]
+        assert [drift.test for drift in store.drifts(3)] == ["third"]
+
+
+def test_tests_of_a_hanger_taken_out_of_the_description_wait(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4), settings={"baseline_tests": 2})
+    spool(workspace, "t1", hanger=4)
+    ingest(workspace)
+    without = replace(workspace.bridge, hangers=workspace.bridge.hangers[:1])
+    ingest(replace(workspace, bridge=without))
+    assert set(stages(workspace).values()) == {Stage.IDENTIFIED}
+
+
+def test_a_file_gone_from_the_archive_is_refused_all_the_same(workspace: Workspace) -> None:
+    spool(workspace, "t1")
+    with a_flow(workspace) as flow:
+        receipt = flow.receive(workspace.spool / "t1.modes.json")
+        assert receipt.recording.file.archived_as is not None
+        (workspace.archive.folder / receipt.recording.file.archived_as).unlink()
+        flow.drain()
+    assert set(stages(workspace).values()) == {Stage.REFUSED}
+
+
+def test_an_unknown_model_class_is_told_before_any_file_is_touched(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "bridge", settings={"models": "beam1,beam9"})
+    with pytest.raises(UsageError, match="beam9"), a_flow(workspace):
+        pytest.fail("began")

@@ -1,0 +1,148 @@
+"""Taking a file in loses nothing and doubles nothing, wherever it is cut short."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from shm.errors import ShmError
+from shm.pipeline import intake
+from shm.pipeline.intake import receive
+from shm.store import Outcome, Receipt, Stage, Store, Workspace
+from tests.helpers.workspaces import START, put
+
+
+class CutShort(BaseException):
+    """Stands for the end of the process."""
+
+
+def files_in(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def take(workspace: Workspace, name: str) -> Receipt:
+    with workspace.store() as store:
+        return receive(workspace.spool / name, workspace, store, START)
+
+
+def test_a_file_goes_from_the_spool_into_archive_and_store(workspace: Workspace) -> None:
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    receipt = take(workspace, "h3.csv")
+    assert receipt.outcome is Outcome.NEW
+    assert receipt.recording.stage is Stage.RECEIVED
+    assert receipt.recording.received_at == START
+    assert workspace.archive.holds(receipt.recording.file)
+    assert files_in(workspace.spool) == []
+
+
+def test_a_sidecar_goes_along(workspace: Workspace) -> None:
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    put(workspace.spool / "h3.toml", "hanger = 3\n")
+    file = take(workspace, "h3.csv").recording.file
+    assert files_in(workspace.spool) == []
+    with workspace.archive.opened(file) as path:
+        assert path.with_name("h3.toml").read_text() == "hanger = 3\n"
+
+
+def test_a_sidecar_that_another_file_needs_too_stays(workspace: Workspace) -> None:
+    for name in ("h3.csv", "h3.uff", "h3.toml"):
+        put(workspace.spool / name, name)
+    take(workspace, "h3.csv")
+    assert sorted(path.name for path in files_in(workspace.spool)) == ["h3.toml", "h3.uff"]
+    assert take(workspace, "h3.uff").recording.file.sidecar_as is not None
+    assert files_in(workspace.spool) == []
+
+
+def test_a_file_in_a_subfolder_keeps_it_in_its_name(workspace: Workspace) -> None:
+    (workspace.spool / "logger").mkdir()
+    put(workspace.spool / "logger" / "h3.csv", "force,acc_1\n")
+    assert take(workspace, "logger/h3.csv").recording.file.file_name == "logger/h3.csv"
+
+
+def test_a_file_outside_the_spool_stays_where_it_is(workspace: Workspace, tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text("force,acc_1\n")
+    with workspace.store() as store:
+        first = receive(path, workspace, store, START)
+        again = receive(path, workspace, store, START)
+    assert path.exists()
+    assert first.recording.file.file_name == "mine.csv"
+    assert (first.outcome, again.outcome) == (Outcome.NEW, Outcome.DUPLICATE)
+
+
+def test_a_file_of_the_spool_is_known_however_it_is_named(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    monkeypatch.chdir(workspace.folder)
+    with workspace.store() as store:
+        receive(Path("spool/../spool/h3.csv"), workspace, store, START)
+    assert files_in(workspace.spool) == []
+
+
+def test_a_copy_with_the_same_dates_is_still_noticed(workspace: Workspace, tmp_path: Path) -> None:
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    shutil.copy2(workspace.spool / "h3.csv", tmp_path / "kept.csv")
+    take(workspace, "h3.csv")
+    shutil.copy2(tmp_path / "kept.csv", workspace.spool / "h3.csv")
+    assert take(workspace, "h3.csv").outcome is Outcome.DUPLICATE
+
+
+@pytest.mark.parametrize(
+    ("owner", "verb"),
+    [(Store, "receive"), (intake, "_remove"), (Path, "unlink"), (os, "fsync"), (Path, "rename")],
+)
+def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, owner: object, verb: str
+) -> None:
+    def cut_short(*args: object, **options: object) -> None:
+        raise CutShort
+
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    put(workspace.spool / "h3.toml", "hanger = 3\n")
+    with monkeypatch.context() as patched:
+        patched.setattr(owner, verb, cut_short)
+        with pytest.raises(CutShort):
+            take(workspace, "h3.csv")
+    assert (workspace.spool / "h3.csv").exists()
+    workspace.archive.sweep()
+    receipt = take(workspace, "h3.csv")
+    assert receipt.outcome in (Outcome.NEW, Outcome.RESUMED)
+    assert receipt.recording.file.sidecar_as is not None
+    assert files_in(workspace.spool) == []
+    assert len(files_in(workspace.archive.folder)) == 2
+    with workspace.store() as store:
+        assert len(store.recordings()) == 1
+        assert store.events() == ()
+
+
+def test_a_receipt_cut_short_between_the_two_removals_is_finished(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    put(workspace.spool / "h3.toml", "hanger = 3\n")
+    unlink = Path.unlink
+
+    def only_the_sidecar(self: Path, missing_ok: bool = False) -> None:
+        if self.suffix == ".csv":
+            raise CutShort
+        unlink(self, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", only_the_sidecar)
+        with pytest.raises(CutShort):
+            take(workspace, "h3.csv")
+    receipt = take(workspace, "h3.csv")
+    assert receipt.outcome is Outcome.RESUMED
+    assert receipt.recording.file.sidecar_as is not None
+    assert files_in(workspace.spool) == []
+
+
+def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
+    with pytest.raises((ShmError, FileNotFoundError)):
+        take(workspace, "gone.csv")
+    with workspace.store() as store:
+        assert store.recordings() == ()

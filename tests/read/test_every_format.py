@@ -1,0 +1,360 @@
+"""One contract for every registered format: what is written is read, what is damaged refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shm.errors import BadInput, UsageError
+from shm.read import FORMATS, Format, peek, read, sidecar_path, write
+from shm.values import Channel, FrequencyResponse, Recording
+
+formats = pytest.mark.parametrize("file_format", FORMATS, ids=lambda f: f.name)
+examples = settings(
+    max_examples=150,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+def path_for(file_format: Format, folder: Path) -> Path:
+    return folder / f"test{file_format.suffixes[0]}"
+
+
+def written(file_format: Format, recording: Recording | FrequencyResponse, folder: Path) -> Path:
+    path = path_for(file_format, folder)
+    write(recording, path)
+    return path
+
+
+def assert_same(found: Recording | FrequencyResponse, expected: Recording) -> None:
+    assert isinstance(found, Recording)
+    assert found.hanger == expected.hanger
+    assert found.time == expected.time
+    assert found.temperature_c == pytest.approx(expected.temperature_c, nan_ok=True)
+    assert found.sampling_rate_hz == pytest.approx(expected.sampling_rate_hz, rel=1e-12)
+    for one, other in zip(found.channels, expected.channels, strict=True):
+        assert (one.name, one.quantity, one.plane) == (other.name, other.quantity, other.plane)
+        assert one.x_m == pytest.approx(other.x_m, nan_ok=True)
+        largest = np.nanmax(np.abs(other.values))
+        np.testing.assert_allclose(one.values, other.values, atol=1e-8 * largest)
+
+
+@formats
+def test_a_recording_comes_back_as_it_was_written(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    found = read(path)
+    assert_same(found, recording)
+    assert found.source == str(path)
+
+
+@formats
+def test_what_is_unknown_stays_unknown(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    channels = tuple(replace(c, plane=None, x_m=math.nan) for c in recording.channels)
+    bare = replace(recording, channels=channels, hanger=None, time=None, temperature_c=math.nan)
+    assert_same(read(written(file_format, bare, tmp_path)), bare)
+
+
+@formats
+@pytest.mark.parametrize("rate", [1 / 0.003, 100.0, 51.2, 1651.6129, 65536.0])
+def test_any_sampling_rate_comes_back_exactly(
+    file_format: Format, recording: Recording, tmp_path: Path, rate: float
+) -> None:
+    found = read(written(file_format, replace(recording, sampling_rate_hz=rate), tmp_path))
+    assert isinstance(found, Recording)
+    assert found.sampling_rate_hz == rate
+
+
+@formats
+def test_a_gap_stays_a_gap_or_is_refused_on_writing(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    values = recording.channels[1].values.copy()
+    values[[0, 7, -1]] = np.nan
+    gappy = replace(recording.channels[1], values=values)
+    holed = replace(recording, channels=(recording.channels[0], gappy, recording.channels[2]))
+    if file_format.holds_gaps:
+        assert_same(read(written(file_format, holed, tmp_path)), holed)
+    else:
+        with pytest.raises(UsageError, match=r"gaps \(NaN\) of acc_1.*\.csv"):
+            written(file_format, holed, tmp_path)
+        assert list(tmp_path.iterdir()) == []
+
+
+@formats
+def test_a_frequency_response_comes_back_or_is_refused_on_writing(
+    file_format: Format, response: FrequencyResponse, tmp_path: Path
+) -> None:
+    if not file_format.holds_frequency_responses:
+        with pytest.raises(UsageError, match="frequency responses"):
+            written(file_format, response, tmp_path)
+        return
+    found = read(written(file_format, response, tmp_path))
+    assert isinstance(found, FrequencyResponse)
+    assert (found.hanger, found.time, found.temperature_c) == (7, response.time, 8.0)
+    assert found.points == response.points
+    np.testing.assert_allclose(found.frequency_hz, response.frequency_hz, rtol=1e-14)
+    np.testing.assert_allclose(found.accelerance, response.accelerance, rtol=1e-9)
+    assert found.coherence is not None
+    assert response.coherence is not None
+    np.testing.assert_allclose(found.coherence, response.coherence, rtol=1e-9)
+
+
+@formats
+def test_a_peek_tells_the_headers_of_a_good_file(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    found = peek(written(file_format, recording, tmp_path))
+    assert found.format == file_format.name
+    assert found.problems == ()
+    assert (found.hanger, found.time, found.temperature_c) == (3, recording.time, -2.5)
+    assert (found.samples, found.sampling_rate_hz) == (200, 512.0)
+    told = [(c.name, c.quantity, c.unit, c.plane, c.x_m) for c in found.channels]
+    assert told[0] == ("force", "force", "N", None, 1.92)
+    assert told[1:] == [
+        ("acc_1", "acceleration", "m/s2", "transverse", 2.52),
+        ("acc_2", "acceleration", "m/s2", "longitudinal", 2.52),
+    ]
+
+
+@formats
+def test_a_sidecar_is_written_only_where_the_format_needs_one(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    expected = {path, sidecar_path(path)} if file_format.needs_sidecar else {path}
+    assert set(tmp_path.iterdir()) == expected
+
+
+@formats
+def test_a_sidecar_goes_before_the_file(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    sidecar_path(path).write_text(
+        "hanger = 11\ntime = 2026-06-01T12:00:00+02:00\ntemperature_c = 21\n"
+        '[channel.acc_1]\nplane = "longitudinal"\nx_m = 9.5\n[channel.force]\nunit = "kN"\n'
+    )
+    for found in (read(path), peek(path)):
+        assert not isinstance(found, FrequencyResponse)
+        assert (found.hanger, found.temperature_c) == (11, 21.0)
+        assert found.time == datetime(2026, 6, 1, 10, tzinfo=UTC)
+        assert (found.channels[1].plane, found.channels[1].x_m) == ("longitudinal", 9.5)
+        assert found.channels[2].plane == "longitudinal"
+    whole = read(path)
+    assert isinstance(whole, Recording)
+    np.testing.assert_allclose(whole.channels[0].values, 1000 * recording.channels[0].values)
+
+
+@formats
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("hanger = \n", "not a readable TOML"),
+        ('hanger = "three"\n', "hanger = 'three' is not a number"),
+        ("hanger = 2.5\n", "whole number"),
+        ("hanger = true\n", "not a number"),
+        ('time = "tomorrow"\n', "not an ISO 8601"),
+        ("temperature_c = inf\n", "not a number"),
+        ("sampling_rate_hz = 0\n", "not positive"),
+        ("channel = 3\n", "must hold tables"),
+        ('[channel.acc_9]\nunit = "g"\n', "does not have"),
+        ('[channel.acc_1]\nunit = "furlong"\n', "furlong"),
+        ('[channel.acc_1]\nunit = "N"\n', "not one of acceleration"),
+        ('[channel.acc_1]\nplane = "upwards"\n', "upwards"),
+        ('[channel.acc_1]\nx_m = "far"\n', "far"),
+        ('unit = ["N", "g"]\n', "2 values for 3 channels"),
+    ],
+)
+def test_a_faulty_sidecar_is_refused_by_name(
+    file_format: Format, recording: Recording, tmp_path: Path, text: str, words: str
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    sidecar_path(path).write_text(text)
+    with pytest.raises(BadInput, match=words) as refusal:
+        read(path)
+    assert refusal.value.where.startswith("test.toml")
+    assert refusal.value.remedy
+
+
+@formats
+def test_two_samples_are_not_a_record(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    short = tuple(replace(c, values=c.values[:2]) for c in recording.channels)
+    path = written(file_format, replace(recording, channels=short), tmp_path)
+    with pytest.raises(BadInput, match="2 samples; at least 16"):
+        read(path)
+    assert any("2 samples" in problem for problem in peek(path).problems)
+
+
+@formats
+@pytest.mark.parametrize(("kept", "missing"), [((1, 2), "force"), ((0,), "acceleration")])
+def test_force_and_acceleration_are_both_needed(
+    file_format: Format, recording: Recording, tmp_path: Path, kept: tuple[int, ...], missing: str
+) -> None:
+    channels = tuple(recording.channels[i] for i in kept)
+    path = written(file_format, replace(recording, channels=channels), tmp_path)
+    with pytest.raises(BadInput, match=f"no channel holds .*{missing}"):
+        read(path)
+    assert any(missing in problem for problem in peek(path).problems)
+
+
+@formats
+def test_impossible_values_are_refused_with_their_channel(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    values = recording.channels[1].values.copy()
+    values[4] = 3e12
+    wild = (*recording.channels[:1], replace(recording.channels[1], values=values))
+    path = written(file_format, replace(recording, channels=wild), tmp_path)
+    with pytest.raises(BadInput, match=r"sample 5 is 3e\+12") as refusal:
+        read(path)
+    assert refusal.value.channel == "acc_1"
+
+
+@formats
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "empty"),
+        (b" \r\n\n", "empty"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + bytes(range(256)), "PNG picture"),
+        (b"\xff\xd8\xff\xe0\x00\x10JFIF" + bytes(range(256)), "JPEG picture"),
+        (b"PK\x03\x04" + bytes(50), "ZIP archive"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(50), "HDF5"),
+        (bytes(range(256)) * 4, "does not hold what its name says"),
+    ],
+)
+def test_a_file_of_another_kind_is_refused(
+    file_format: Format, tmp_path: Path, content: bytes, words: str
+) -> None:
+    path = path_for(file_format, tmp_path)
+    path.write_bytes(content)
+    for verb in (read, peek):
+        with pytest.raises(BadInput, match=words) as refusal:
+            verb(path)
+        assert refusal.value.remedy
+
+
+@formats
+def test_a_file_named_as_another_format_is_told_apart(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    for other in FORMATS:
+        if other is not file_format:
+            misnamed = path.rename(tmp_path / f"misnamed{other.suffixes[0]}")
+            with pytest.raises(BadInput, match=f"Rename it to {file_format.suffixes[0]}"):
+                read(misnamed)
+
+
+@formats
+def test_an_unknown_suffix_is_refused_with_the_right_one(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path).rename(tmp_path / "test.xyz")
+    with pytest.raises(BadInput, match=f"suffix .xyz.*rename it to {file_format.suffixes[0]}"):
+        read(path)
+    with pytest.raises(UsageError, match=r"no format is written as \.xyz"):
+        write(recording, path)
+
+
+@formats
+def test_a_missing_file_and_a_folder_are_refused(file_format: Format, tmp_path: Path) -> None:
+    path = path_for(file_format, tmp_path)
+    with pytest.raises(BadInput, match="No such file"):
+        read(path)
+    path.mkdir()
+    with pytest.raises(BadInput, match="cannot be read"):
+        peek(path)
+
+
+@formats
+def test_a_write_that_fails_leaves_the_old_file(
+    file_format: Format, recording: Recording, tmp_path: Path
+) -> None:
+    path = written(file_format, recording, tmp_path)
+    before = {entry.name: entry.read_bytes() for entry in tmp_path.iterdir()}
+    odd = replace(recording, channels=(Channel("force", "force", np.array([1.0, np.nan])),))
+    broken = odd if not file_format.holds_gaps else replace(odd, channels=(
+        replace(odd.channels[0], name="for,ce"),
+    ))  # fmt: skip
+    with pytest.raises(UsageError):
+        write(broken, path)
+    assert {entry.name: entry.read_bytes() for entry in tmp_path.iterdir()} == before
+
+
+@formats
+@examples
+@given(data=st.data())
+def test_damaged_files_raise_nothing_but_bad_input(
+    file_format: Format,
+    recording: Recording,
+    response: FrequencyResponse,
+    tmp_path: Path,
+    data: st.DataObject,
+) -> None:
+    """Cut off, overwritten, inserted, repeated: read well or refused, never a crash."""
+    path = path_for(file_format, tmp_path)
+    both = file_format.holds_frequency_responses and data.draw(st.booleans(), label="response")
+    write(response if both else recording, path)
+    path.write_bytes(damaged(path.read_bytes(), data))
+    read_or_refuse(path)
+
+
+def damaged(whole: bytes, data: st.DataObject) -> bytes:
+    content = bytearray(whole)
+    head = data.draw(st.booleans(), label="in the head")
+    place = data.draw(st.integers(0, min(len(content), 1200) if head else len(content) - 1))
+    telling = [b"\n", b",", b"NaN", b"-1", b"    -1\n", b"\x00", b"9" * 30, b"#", b"1e999", b"\xff"]
+    chunk = data.draw(st.binary(max_size=8) | st.sampled_from(telling))
+    damage = data.draw(st.sampled_from(["cut", "overwrite", "insert", "repeat", "drop"]))
+    if damage == "cut":
+        del content[place:]
+    elif damage == "overwrite":
+        content[place : place + len(chunk)] = chunk
+    elif damage == "insert":
+        content[place:place] = chunk
+    elif damage == "repeat":
+        content[place:place] = content[place : place + 500]
+    else:
+        del content[place : place + 1 + len(chunk)]
+    return bytes(content)
+
+
+@formats
+@examples
+@given(content=st.binary(max_size=400))
+def test_random_bytes_raise_nothing_but_bad_input(
+    file_format: Format, tmp_path: Path, content: bytes
+) -> None:
+    path = path_for(file_format, tmp_path)
+    path.write_bytes(content)
+    read_or_refuse(path)
+
+
+def read_or_refuse(path: Path) -> None:
+    refusals = []
+    for verb in (peek, read):
+        try:
+            found = verb(path)
+        except BadInput as refusal:
+            refusals.append(refusal)
+    assert all(refusal.remedy and refusal.message for refusal in refusals)
+    if not refusals and isinstance(found, Recording):
+        assert 0 < found.sampling_rate_hz < math.inf
+        assert len({len(channel.values) for channel in found.channels}) == 1
+        assert all(not np.isinf(channel.values).any() for channel in found.channels)

@@ -1,0 +1,172 @@
+"""Figures: drawn where their data exist, labelled with units, without global state."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from datetime import timedelta
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from shm.report import HangerReport, Illustration, illustrations
+from shm.report.figures.style import PALETTE
+from shm.values import FrequencyResponse
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def drawn(season: HangerReport) -> dict[str, Illustration]:
+    return {item.name: item for item in illustrations(season)}
+
+
+@pytest.fixture(scope="module")
+def elements(drawn: dict[str, Illustration]) -> dict[str, str]:
+    return {name: item.svg() for name, item in drawn.items()}
+
+
+def test_a_whole_report_has_all_figures(drawn: dict[str, Illustration]) -> None:
+    assert list(drawn) == ["trend", "tension", "frequencies", "response", "stiffness"]
+
+
+def test_a_bare_report_has_only_the_figures_it_has_data_for(bare: HangerReport) -> None:
+    assert [item.name for item in illustrations(bare)] == ["tension", "frequencies"]
+
+
+def test_every_axis_has_a_label_and_quantities_a_unit(drawn: dict[str, Illustration]) -> None:
+    labels = {
+        name: {axes.get_xlabel() for axes in item.figure.axes}
+        | {axes.get_ylabel() for axes in item.figure.axes}
+        for name, item in drawn.items()
+    }
+    assert {"time of the test (UTC)", "tension (kN)"} <= labels["trend"]
+    assert {"tension (kN)", "probability density (1/kN)"} <= labels["tension"]
+    assert "predicted / measured frequency" in labels["frequencies"]
+    assert {"frequency (Hz)", "accelerance (m/s²/N)", "coherence"} <= labels["response"]
+    assert "log10 of stiffness in N m/rad" in labels["stiffness"]
+
+
+def test_captions_and_alternative_texts_are_whole_sentences_without_nan(
+    drawn: dict[str, Illustration],
+) -> None:
+    for item in drawn.values():
+        assert item.caption.endswith(".")
+        assert len(item.alt) > 40
+        assert not re.search(r"\bnan\b", item.caption + item.alt)
+
+
+def test_the_trend_marks_the_alerted_test_at_its_tension(
+    drawn: dict[str, Illustration], season: HangerReport
+) -> None:
+    (axes,) = drawn["trend"].figure.axes
+    marks = next(line for line in axes.lines if line.get_label() == "alert")
+    assert marks.get_ydata() == pytest.approx([season.tension_n.mean / 1e3])
+
+
+def test_the_thresholds_stand_either_side_of_the_baseline(
+    drawn: dict[str, Illustration], season: HangerReport
+) -> None:
+    assert season.baseline is not None
+    (axes,) = drawn["trend"].figure.axes
+    levels = [float(np.asarray(line.get_ydata())[0]) for line in axes.lines[2:5]]
+    baseline = season.baseline.tension_n.mean() / 1e3
+    assert levels == pytest.approx([baseline, baseline * 1.05, baseline * 0.95])
+
+
+def test_the_ratio_figure_shows_prediction_over_measurement(
+    drawn: dict[str, Illustration], season: HangerReport
+) -> None:
+    (axes,) = drawn["frequencies"].figure.axes
+    bars = [container for container in axes.containers if container.get_label() == "transverse"]
+    ratios = np.asarray(bars[0][0].get_ydata())
+    assert ratios == pytest.approx([1 + 0.004 * (-1) ** order for order in range(1, 7)])
+
+
+def test_the_response_ends_a_little_past_the_highest_mode(drawn: dict[str, Illustration]) -> None:
+    upper, _ = drawn["response"].figure.axes
+    assert 83.68 < upper.get_xlim()[1] < 1.15 * 83.68
+
+
+def test_without_coherence_only_the_magnitude_is_drawn(season: HangerReport) -> None:
+    response = season.frequency_response
+    assert response is not None
+    without = replace(season, frequency_response=replace(response, coherence=None))
+    item = next(item for item in illustrations(without) if item.name == "response")
+    assert len(item.figure.axes) == 1
+    assert "coherence is not known" in item.caption
+
+
+def test_of_many_responses_the_first_four_are_drawn_and_that_is_said(
+    season: HangerReport,
+) -> None:
+    response = season.frequency_response
+    assert response is not None
+    many = FrequencyResponse(
+        "x", response.points * 3, response.frequency_hz, np.tile(response.accelerance, (3, 1))
+    )
+    item = next(
+        i for i in illustrations(replace(season, frequency_response=many)) if i.name == "response"
+    )
+    assert "first 4 of 6" in item.caption
+
+
+def test_tests_without_a_time_are_left_out_of_the_trend_and_counted(season: HangerReport) -> None:
+    undated = replace(season.trend[0], time=None)
+    item = illustrations(replace(season, trend=(undated, *season.trend[1:])))[0]
+    assert "1 tests without a time are left out" in item.caption
+
+
+def test_a_lone_test_stands_in_the_middle_of_a_narrow_trend(season: HangerReport) -> None:
+    (axes,) = illustrations(replace(season, trend=season.trend[:1]))[0].figure.axes
+    low, high = axes.get_xlim()
+    assert high - low == pytest.approx(timedelta(days=2) / timedelta(days=1))
+
+
+def test_the_svg_is_well_formed_and_named_for_screen_readers(elements: dict[str, str]) -> None:
+    for name, element in elements.items():
+        root = ElementTree.fromstring(element)
+        assert root.get("role") == "img"
+        assert root.get("aria-labelledby") == f"{name}-title {name}-alt"
+        assert root.find(f"{SVG}title") is not None
+        assert root.find(f"{SVG}desc") is not None
+
+
+def test_ids_are_unique_across_figures_and_references_resolve(elements: dict[str, str]) -> None:
+    together = "".join(elements.values())
+    ids = re.findall(r'\bid="([^"]+)"', together)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', together)) <= set(ids)
+
+
+def test_colours_follow_the_page_so_that_dark_pages_stay_readable(
+    elements: dict[str, str],
+) -> None:
+    for element in elements.values():
+        plain = re.sub(r"var\(--\w+, #[0-9a-f]{6}\)", "", element)
+        assert not re.search(r"(fill|stroke): #[0-9a-f]{6}", plain)
+        assert set(re.findall(r"var\(--(\w+),", element)) <= set(PALETTE)
+
+
+def test_the_same_report_gives_the_same_svg(season: HangerReport) -> None:
+    first, second = (illustrations(season)[1].svg() for _ in range(2))
+    assert first == second
+
+
+def test_a_png_is_a_png(drawn: dict[str, Illustration]) -> None:
+    assert drawn["tension"].png(50).startswith(b"\x89PNG")
+
+
+def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -> None:
+    before = dict(mpl.rcParams)
+    illustrations(season)[0].svg()
+    assert dict(mpl.rcParams) == before
+
+
+def test_reports_do_without_pyplot_and_its_global_figures() -> None:
+    asked = "import sys, shm.report; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

@@ -1,0 +1,135 @@
+"""The HTML file and the JSON document."""
+
+from __future__ import annotations
+
+import json as standard_json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+
+import pytest
+
+from shm import documents
+from shm.report import HangerReport, html, json
+
+VOID = {"meta", "br", "hr", "img", "link", "input"}
+
+
+class Outline(HTMLParser):
+    """Checks that tags nest and keeps their attributes and the visible words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not {"style", "script"} & set(self.open):
+            self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def page(season: HangerReport) -> str:
+    return html(season)
+
+
+@pytest.fixture(scope="module")
+def outline(page: str) -> Outline:
+    parsed = Outline()
+    parsed.feed(page)
+    return parsed
+
+
+def test_the_page_nests_and_names_its_language(outline: Outline) -> None:
+    assert outline.open == []
+    assert dict(outline.tags)["html"] == {"lang": "en"}
+
+
+def test_the_page_fetches_nothing(page: str, outline: Outline) -> None:
+    for tag, attributes in outline.tags:
+        assert tag not in {"script", "link", "iframe"}
+        assert not {"src", "srcset", "data", "action"} & attributes.keys()
+    assert not re.search(r"url\((?!#)|@import", page)
+
+
+def test_every_figure_has_a_heading_a_drawing_and_a_caption(outline: Outline) -> None:
+    names = [tag for tag, _ in outline.tags]
+    assert names.count("figure") == names.count("figcaption") == names.count("svg") == 5
+
+
+def test_ids_are_unique_on_the_page(outline: Outline) -> None:
+    ids = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+
+
+def test_every_table_has_a_caption_and_scoped_headings(outline: Outline) -> None:
+    names = [tag for tag, _ in outline.tags]
+    assert names.count("table") == names.count("caption") == 8
+    scopes = {attributes.get("scope") for tag, attributes in outline.tags if tag == "th"}
+    assert scopes == {"col", "row"}
+
+
+def test_headings_do_not_skip_a_level(outline: Outline) -> None:
+    levels = [int(tag[1]) for tag, _ in outline.tags if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_dark_light_and_print_styles_are_there(page: str) -> None:
+    assert "prefers-color-scheme: dark" in page
+    assert "@media print" in page
+
+
+def test_the_page_leads_with_the_summary_and_the_state(outline: Outline) -> None:
+    told = " ".join(" ".join(outline.words).split())
+    assert told.index("carries 650 kN") < told.index("Numbers")
+    assert "Alert" in told
+
+
+@pytest.mark.parametrize("name", ["season", "bare"])
+def test_the_page_says_nan_nowhere(name: str, request: pytest.FixtureRequest) -> None:
+    parsed = Outline()
+    parsed.feed(html(request.getfixturevalue(name)))
+    assert not re.search(r"\b(nan|inf|None)\b", " ".join(parsed.words))
+
+
+def test_names_from_outside_cannot_inject_markup(bare: HangerReport) -> None:
+    sly = "<script>alert(1)</script>"
+    page = html(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly)))
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_the_document_survives_json_and_holds_the_contract(season: HangerReport) -> None:
+    document = standard_json.loads(documents.dump(json(season)))
+    assert document["schema"] == "shm.report/1"
+    assert document["posterior"] == standard_json.loads(
+        documents.dump(documents.posterior_document(season.posterior))
+    )
+    assert document["status"] == "alert"
+    assert len(document["trend"]) == 10
+    assert set(document["trend"][0]["tension_n"]) == {"mean", "low", "high"}
+    assert document["selection"]["selected"] == "beam2"
+    assert document["drifts"][0]["quantity"] == "tension"
+    assert document["generated_at"] == "2026-09-08T10:00:00Z"
+
+
+def test_unknown_numbers_become_null_in_the_document(bare: HangerReport) -> None:
+    document = standard_json.loads(documents.dump(json(bare)))
+    assert document["baseline"] is None
+    assert document["selection"] is None
+    assert document["posterior"]["r_hat"] is None
+    assert document["test"]["temperature_c"] is None

@@ -1,0 +1,112 @@
+"""The first paragraph: what it says of tension, change, model, and what to do next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.report import HangerReport, Status, advice, status, summary
+from shm.report.summary import tension_change
+from shm.values import Drift, Hanger, Thresholds
+
+
+def with_probability(data: HangerReport, probability: float) -> HangerReport:
+    return replace(data, drifts=(replace(data.drifts[0], probability=probability),))
+
+
+def test_the_summary_gives_tension_with_interval_against_nominal_and_baseline(
+    season: HangerReport,
+) -> None:
+    told = summary(season)
+    assert "Hanger 3 of Arch bridge carries 650 kN (90 % interval 6" in told
+    assert "Against the nominal 711 kN that is -8.5 % (90 % interval" in told
+    assert "Against the baseline of 700 kN (test t000) it is -7.2 % (90 % interval" in told
+    assert "The tension has fallen; the probability of a shift beyond its threshold of 5 %" in told
+
+
+def test_the_summary_says_which_model_was_chosen_and_how_well_it_fits(
+    season: HangerReport,
+) -> None:
+    told = summary(season)
+    assert "beam2, the most probable of beam2, beam1 (probability 0.982)" in told
+    assert "over 12 measured modes it misses the frequencies by 0.40 % (rms)" in told
+
+
+def test_a_model_that_lost_the_selection_is_said_to_have_lost(season: HangerReport) -> None:
+    assert season.selection is not None
+    loser = replace(season, posterior=season.selection.posteriors[1])
+    assert "beam1, not the most probable (beam2 is)" in summary(loser)
+
+
+@pytest.mark.parametrize(
+    ("probability", "expected"),
+    [(0.97, Status.ALERT), (0.95, Status.ALERT), (0.94, Status.WATCH), (0.2, Status.STEADY)],
+)
+def test_the_status_follows_the_probability_of_a_shift(
+    season: HangerReport, probability: float, expected: Status
+) -> None:
+    assert status(with_probability(season, probability)) is expected
+
+
+def test_a_hanger_without_earlier_tests_is_at_its_first(bare: HangerReport) -> None:
+    assert status(bare) is Status.FIRST
+    assert "There is no earlier test to compare with" in summary(bare)
+
+
+def test_the_baseline_test_is_not_compared_with_itself(season: HangerReport) -> None:
+    itself = replace(season, posterior=season.baseline, tests=season.tests[:1], drifts=())
+    assert tension_change(itself) is None
+    assert status(itself) is Status.FIRST
+
+
+def test_a_rise_of_stiffness_is_told_in_decades(season: HangerReport) -> None:
+    rise = Drift(
+        3, "t009", season.drifts[0].time, "longitudinal_end_stiffness", 7, 8, 1.0, 0.2, 0.5, 0.99
+    )
+    told = summary(replace(season, drifts=(rise,)))
+    assert "The longitudinal end stiffness has risen by 1.00 decades (90 % interval" in told
+    assert "its threshold of 0.5 decades is 0.990" in told
+
+
+def test_without_a_sure_shift_the_likeliest_is_named(season: HangerReport) -> None:
+    told = summary(replace(season, drifts=season.drifts[1:]))
+    assert "the likeliest is transverse end stiffness, with probability 0.220" in told
+
+
+def test_the_change_without_a_drift_comes_from_both_posteriors(season: HangerReport) -> None:
+    """Two independent normal tensions, ratio 650/700, sd of each 0.012 * 711 kN: the interval of
+    the relative change has half width 1.645 * sqrt(1 + r^2) * 8.53/700."""
+    change = tension_change(replace(season, drifts=()))
+    assert change is not None
+    ratio = 650 / 700
+    assert change.mean == pytest.approx(ratio - 1, abs=0.002)
+    half = 1.645 * np.sqrt(1 + ratio**2) * 0.012 * 711 / 700
+    assert change.width / 2 == pytest.approx(half, rel=0.1)
+
+
+def test_an_alert_asks_for_a_repeat_and_an_inspection(season: HangerReport) -> None:
+    assert any("Repeat the hammer test within days" in text for text in advice(season))
+
+
+def test_a_steady_hanger_needs_nothing(season: HangerReport) -> None:
+    assert advice(with_probability(season, 0.1)) == (
+        "Nothing needs doing before the next planned test.",
+    )
+
+
+def test_a_missing_temperature_is_asked_for(bare: HangerReport) -> None:
+    assert any("Record the temperature" in text for text in advice(bare))
+
+
+def test_sampling_that_has_not_settled_is_said(season: HangerReport) -> None:
+    unsettled = replace(season, posterior=replace(season.posterior, r_hat=1.4))
+    assert any("R-hat 1.40" in text for text in advice(unsettled))
+
+
+def test_an_interval_wider_than_the_threshold_is_said(season: HangerReport, hanger: Hanger) -> None:
+    sharp = replace(hanger, thresholds=Thresholds(tension_shift_fraction=0.01))
+    assert any(
+        "wider than the threshold of 1 %" in t for t in advice(replace(season, hanger=sharp))
+    )

@@ -1,0 +1,75 @@
+"""Tables and the terminal text: every number with its unit and interval, nothing says nan."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from shm.report import HangerReport, text
+from shm.report.tables import tables
+from shm.values import PredictedFrequency
+
+WHOLE = [
+    "Tension",
+    "Shift since the baseline",
+    "Alerts, latest first",
+    "Frequencies",
+    "Model classes",
+    "Parameters of the model class beam2",
+    "Tests, latest first",
+    "Where these numbers come from",
+]
+
+
+def test_a_whole_report_has_every_table(season: HangerReport) -> None:
+    assert [table.title for table in tables(season)] == WHOLE
+
+
+def test_tables_without_data_are_left_out(bare: HangerReport) -> None:
+    titles = [table.title for table in tables(bare)]
+    assert "Model classes" not in titles
+    assert "Alerts, latest first" not in titles
+
+
+@pytest.mark.parametrize("name", ["season", "bare"])
+def test_every_row_is_as_long_as_its_headings(name: str, request: pytest.FixtureRequest) -> None:
+    for table in tables(request.getfixturevalue(name)):
+        assert {len(row) for row in table.rows} == {len(table.headings)}
+
+
+def test_a_frequency_that_was_not_measured_is_said(bare: HangerReport) -> None:
+    table = next(table for table in tables(bare) if table.title == "Frequencies")
+    assert table.rows[1][2] == "not measured"
+    assert table.rows[1][-1] == "not measured"
+
+
+def test_of_a_pooled_posterior_the_latest_test_is_compared(season: HangerReport) -> None:
+    earlier = PredictedFrequency("transverse", 1, 5.8, 0.05, 5.99)
+    pooled = replace(season.posterior, predicted=(earlier, *season.posterior.predicted))
+    assert replace(season, posterior=pooled).predicted == season.posterior.predicted
+
+
+@pytest.mark.parametrize("name", ["season", "bare"])
+def test_the_text_says_nan_or_none_nowhere(name: str, request: pytest.FixtureRequest) -> None:
+    told = text(request.getfixturevalue(name))
+    assert not re.search(r"\b(nan|inf|None)\b", told)
+
+
+def test_the_text_begins_with_hanger_and_status(season: HangerReport) -> None:
+    first, rule, paragraph = text(season).splitlines()[:3]
+    assert first == "Hanger 3, Arch bridge: Alert"
+    assert set(rule) == {"="}
+    assert paragraph.startswith("Hanger 3 of Arch bridge carries")
+
+
+def test_a_long_history_is_cut_in_the_text_and_says_so(season: HangerReport) -> None:
+    long = replace(season, trend=season.trend * 3)
+    assert "... and 18 earlier ones" in text(long)
+
+
+def test_lineage_and_version_are_named(season: HangerReport) -> None:
+    told = text(season)
+    assert "SHA-256 ab12cd34" in told
+    assert re.search(r"shm version +0\.1\.0", told)

@@ -1,0 +1,66 @@
+"""Numbers in words: decimals follow the interval, the unknown is said."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta, timezone
+
+import pytest
+
+from shm.report import Interval, words
+
+
+@pytest.mark.parametrize(
+    ("interval", "expected"),
+    [
+        (Interval(655.4, 640.2, 671.3), "655 kN (90 % interval 640 to 671 kN)"),
+        (Interval(655.44, 654.62, 656.31), "655.44 kN (90 % interval 654.62 to 656.31 kN)"),
+        (Interval(3200.0, 1000.0, 9000.0), "3200 kN (90 % interval 1000 to 9000 kN)"),
+    ],
+)
+def test_an_interval_shows_as_many_decimals_as_its_width_deserves(
+    interval: Interval, expected: str
+) -> None:
+    assert words.with_interval(interval, "kN") == expected
+
+
+def test_a_width_that_is_not_known_gets_one_decimal() -> None:
+    assert words.decimals(float("nan")) == 1
+    assert words.decimals(0.0) == 1
+
+
+def test_a_relative_change_carries_its_sign_and_its_interval() -> None:
+    change = Interval(-0.0804, -0.0991, -0.0612)
+    assert words.signed_percent(change) == "-8.0 % (90 % interval -9.9 to -6.1 %)"
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(0.5, "0.500"), (0.99999, "> 0.999"), (1e-9, "< 0.001"), (float("nan"), "not known")],
+)
+def test_a_probability_pretends_no_certainty(value: float, expected: str) -> None:
+    assert words.probability(value) == expected
+
+
+def test_what_is_unknown_is_said_in_words() -> None:
+    assert words.number(float("nan"), ".3f") == "not known"
+    assert words.temperature(float("nan")) == "temperature not recorded"
+    assert words.moment(None) == "time not recorded"
+
+
+def test_times_are_given_in_utc() -> None:
+    time = datetime(2026, 5, 1, 12, 30, tzinfo=timezone(timedelta(hours=2)))
+    assert words.moment(time) == "2026-05-01 10:30 UTC"
+
+
+def test_parameters_and_springs_have_plain_names_and_units() -> None:
+    assert words.quantity("log10_k3") == "end stiffness k3 (transverse, arch end)"
+    assert words.quantity("transverse_end_stiffness") == "transverse end stiffness"
+    assert words.meaning("log10_k1", "beam2").endswith("in N m/rad")
+    assert words.meaning("log10_k1", "solid2").endswith("in N/m per node")
+    assert words.meaning("theta_F", "beam2") == "tension over nominal tension"
+
+
+def test_a_normal_interval_holds_ninety_percent() -> None:
+    interval = Interval.normal(10.0, 2.0)
+    assert interval.high - 10.0 == pytest.approx(1.645 * 2.0, rel=1e-3)
+    assert interval.scaled(0.5).width == pytest.approx(interval.width / 2)

@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+import math
+import time as clock
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from scipy.signal import find_peaks, hilbert
+
+from shm.errors import UsageError
+from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
+from shm.simulate.elements import plane_modes
+from shm.values import ComplexArray, FloatArray, Hanger, Recording
+
+STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
+QUIET = HammerPlan(
+    hits=1, acceleration_noise_m_s2=0, force_noise_n=0, adc_bits=32, acceleration_range_m_s2=50,
+    peak_force_scatter=0, hit_time_scatter_s=0,
+)  # fmt: skip
+
+
+def simulate(hanger: Hanger, state: HangerState, plan: HammerPlan, seed: int = 1) -> Recording:
+    return hammer_test(hanger, state, plan, np.random.default_rng(seed))
+
+
+def accelerance(recording: Recording, channel: int) -> tuple[FloatArray, ComplexArray]:
+    assert recording.force is not None
+    force = np.fft.rfft(recording.force.values)
+    response = np.fft.rfft(recording.accelerations[channel].values)
+    return np.fft.rfftfreq(recording.samples, 1 / recording.sampling_rate_hz), response / force
+
+
+def test_a_test_has_force_and_two_channels_a_sensor_over_all_hits(hanger: Hanger) -> None:
+    when = datetime(2026, 5, 1, 10, tzinfo=UTC)
+    recording = hammer_test(
+        hanger, STATE, HammerPlan(), np.random.default_rng(1),
+        time=when, temperature_c=12.0, source="s",
+    )  # fmt: skip
+    assert (recording.hanger, recording.time, recording.temperature_c) == (3, when, 12.0)
+    assert recording.source == "s"
+    assert recording.duration_s == 100.0
+    names = [(c.name, c.quantity, c.plane, round(c.x_m, 9)) for c in recording.channels]
+    assert names == [
+        ("force", "force", None, 1.92),
+        ("acc_1", "acceleration", "transverse", 2.52),
+        ("acc_2", "acceleration", "longitudinal", 2.52),
+        ("acc_3", "acceleration", "transverse", 4.44),
+        ("acc_4", "acceleration", "longitudinal", 4.44),
+    ]
+
+
+@pytest.mark.parametrize("rate", [512.0, 2048.0])
+def test_response_over_force_is_the_accelerance_of_the_modes(hanger: Hanger, rate: float) -> None:
+    """H = -w^2 sum of phi_s phi_h / (w_n^2 - w^2 + 2 i zeta w_n w), times the plane's share."""
+    state = replace(STATE, damping_ratio=0.02)
+    recording = simulate(hanger, state, replace(QUIET, sampling_rate_hz=rate))
+    modes = plane_modes(hanger, state, "transverse", 60)
+    hammer, sensor = modes.at(np.array([1.92, 2.52]))
+    frequency, found = accelerance(recording, 0)
+    band = (frequency > 3) & (frequency < 200)
+    w, wn = 2 * np.pi * frequency[band, None], modes.angular_frequency_rad_s
+    terms = -(w**2) * hammer * sensor / (wn**2 - w**2 + 2j * 0.02 * wn * w)
+    exact = terms.sum(axis=1) * math.cos(math.pi / 4)
+    assert np.abs(found[band] - exact).max() < 1e-3 * np.abs(exact).max()
+
+
+def test_the_response_peaks_at_the_natural_frequencies_of_its_plane(hanger: Hanger) -> None:
+    """A half-power width of 2 zeta f spans several lines here, so a peak is right to a line."""
+    state, plan = replace(STATE, damping_ratio=0.002), replace(QUIET, seconds_per_hit=60.0)
+    planted = natural_frequencies(hanger, state, 6)
+    recording = simulate(hanger, state, plan)
+    for plane in (0, 1):
+        frequency, response = accelerance(recording, plane)
+        band = frequency < planted[plane, -1] + 5
+        peaks, _ = find_peaks(np.abs(response[band]), prominence=np.abs(response[band]).max() / 30)
+        np.testing.assert_allclose(frequency[peaks], planted[plane], atol=2 / 60)
+
+
+def test_free_vibration_decays_at_the_given_damping_ratio(hanger: Hanger) -> None:
+    """One mode alone (a sensor record band-passed around it) falls as exp(-zeta w t)."""
+    state, plan = replace(STATE, damping_ratio=0.003), replace(QUIET, seconds_per_hit=30.0)
+    recording = simulate(hanger, state, plan)
+    for order, planted in enumerate(natural_frequencies(hanger, state, 3)[0]):
+        values = recording.accelerations[0].values
+        lines = np.fft.rfftfreq(len(values), 1 / 512)
+        spectrum = np.fft.rfft(values) * np.exp(-0.5 * ((lines - planted) / 0.6) ** 2)
+        envelope = np.log(np.abs(hilbert(np.fft.irfft(spectrum))))
+        seconds = np.arange(len(values)) / 512
+        window = (seconds > 2) & (seconds < 12)
+        rate = -np.polyfit(seconds[window], envelope[window], 1)[0]
+        assert rate / (2 * np.pi * planted) == pytest.approx(0.003, rel=0.01), order
+
+
+def test_the_angle_of_the_hammer_shares_the_force_between_the_planes(hanger: Hanger) -> None:
+    across = simulate(hanger, STATE, replace(QUIET, hammer_angle_deg=0.0)).accelerations
+    along = simulate(hanger, STATE, replace(QUIET, hammer_angle_deg=90.0)).accelerations
+    assert np.abs(across[0].values).max() > 1
+    assert np.abs(along[1].values).max() > 1
+    assert np.abs(across[1].values).max() < 1e-6
+    assert np.abs(along[0].values).max() < 1e-6
+
+
+def test_each_hit_falls_in_its_own_slot_with_its_own_level(hanger: Hanger) -> None:
+    plan = replace(HammerPlan(), peak_force_n=1500.0, peak_force_scatter=0.2)
+    force = simulate(hanger, STATE, plan).force
+    assert force is not None
+    slots = force.values.reshape(5, -1)
+    peaks, times = slots.max(axis=1), slots.argmax(axis=1) / 512
+    assert np.all((times > 0.5) & (times < 0.71))
+    assert np.ptp(times) > 0.02
+    assert 0.05 < np.std(np.log(peaks)) < 0.5
+    assert np.median(peaks) == pytest.approx(1500, rel=0.3)
+
+
+def test_the_impulse_of_a_hit_is_that_of_its_half_sine(hanger: Hanger) -> None:
+    """A half sine of peak F over t has the impulse 2 F t / pi; the logger's filter keeps it."""
+    force = simulate(hanger, STATE, QUIET).force
+    assert force is not None
+    assert force.values.sum() / 512 == pytest.approx(2 * 2000 * 0.004 / math.pi, rel=1e-4)
+
+
+def test_a_faster_logger_sees_the_same_hit_below_the_band_edge(hanger: Hanger) -> None:
+    """Nothing is aliased: the spectra of 512 and 2048 Hz agree up to 0.4 of the lower rate."""
+    slow = simulate(hanger, STATE, QUIET)
+    fast = simulate(hanger, STATE, replace(QUIET, sampling_rate_hz=2048.0))
+    for one, other in zip(slow.channels, fast.channels, strict=True):
+        below = slice(0, 200 * 20)
+        a, b = np.fft.rfft(one.values)[below] / 512, np.fft.rfft(other.values)[below] / 2048
+        assert np.abs(a - b).max() < 0.02 * np.abs(b).max(), one.name
+
+
+def test_a_hit_at_the_very_start_of_the_record_is_kept(hanger: Hanger) -> None:
+    plan = replace(QUIET, pre_trigger_s=0.002)
+    late, early = simulate(hanger, STATE, QUIET), simulate(hanger, STATE, plan)
+    shift = 255  # 0.498 s, a whole number of samples at 512 Hz but for 0.02 of one
+    a, b = late.accelerations[0].values[shift + 50 :], early.accelerations[0].values[50:-shift]
+    assert np.abs(a - b).max() < 0.1 * np.abs(a).max()
+
+
+def test_the_same_seed_gives_the_same_data_and_another_seed_another(hanger: Hanger) -> None:
+    first, again, other = (simulate(hanger, STATE, HammerPlan(), seed) for seed in (7, 7, 8))
+    for one, two, three in zip(first.channels, again.channels, other.channels, strict=True):
+        assert np.array_equal(one.values, two.values)
+        assert not np.array_equal(one.values, three.values)
+
+
+def test_the_noise_has_the_level_that_was_asked_for(hanger: Hanger) -> None:
+    plan = replace(QUIET, pre_trigger_s=15.0, acceleration_noise_m_s2=0.01, force_noise_n=3.0)
+    recording = simulate(hanger, STATE, plan)
+    before = slice(0, 14 * 512)  # at rest, but for noise
+    assert recording.force is not None
+    assert recording.force.values[before].std() == pytest.approx(3.0, rel=0.05)
+    for channel in recording.accelerations:
+        assert channel.values[before].std() == pytest.approx(0.01, rel=0.05)
+
+
+def test_values_stand_on_the_steps_of_the_converter(hanger: Hanger) -> None:
+    plan = replace(HammerPlan(), adc_bits=12, acceleration_range_m_s2=20.0, force_range_n=5000.0)
+    recording = simulate(hanger, STATE, plan)
+    for channel in recording.channels:
+        step = (5000.0 if channel.quantity == "force" else 20.0) / 2**11
+        codes = channel.values / step
+        np.testing.assert_allclose(codes, np.round(codes), atol=1e-9)
+        assert len(np.unique(codes)) > 20
+
+
+def test_a_hit_beyond_the_range_is_clipped(hanger: Hanger) -> None:
+    plan = replace(HammerPlan(), force_range_n=800.0, acceleration_range_m_s2=2.0)
+    recording = simulate(hanger, STATE, plan)
+    for channel in recording.channels:
+        limit = 800.0 if channel.quantity == "force" else 2.0
+        assert np.abs(channel.values).max() == pytest.approx(limit, rel=1e-5)
+        assert np.sum(np.abs(channel.values) > 0.999 * limit) >= 5
+
+
+def test_a_whole_test_takes_less_than_a_third_of_a_second(hanger: Hanger) -> None:
+    simulate(hanger, STATE, HammerPlan())
+    seconds = []
+    for _ in range(3):
+        start = clock.perf_counter()
+        simulate(hanger, STATE, HammerPlan())
+        seconds.append(clock.perf_counter() - start)
+    assert min(seconds) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("state", "plan", "words"),
+    [
+        (STATE, HammerPlan(hits=0), "at least one hit"),
+        (STATE, HammerPlan(sensors_x_m=(2.0, 12.5)), "between 0 and 12 m"),
+        (STATE, HammerPlan(hammer_x_m=-1.0), "between 0 and 12 m"),
+        (replace(STATE, length_m=3.0), HammerPlan(), "between 0 and 3 m"),
+        (STATE, HammerPlan(sampling_rate_hz=0.0), "positive"),
+        (STATE, HammerPlan(seconds_per_hit=0.3), "within its own seconds"),
+        (STATE, HammerPlan(acceleration_noise_m_s2=-1.0), "noise"),
+        (STATE, HammerPlan(adc_bits=1), "bits"),
+        (replace(STATE, tension_n=math.nan), HammerPlan(), "tension"),
+        (replace(STATE, damping_ratio=1.0), HammerPlan(), "damping"),
+        (replace(STATE, k2_n_m_rad=-1.0), HammerPlan(), "springs"),
+        (replace(STATE, length_m=-3.0), HammerPlan(), "length"),
+    ],
+)
+def test_a_state_or_plan_that_cannot_be_is_refused(
+    hanger: Hanger, state: HangerState, plan: HammerPlan, words: str
+) -> None:
+    with pytest.raises(UsageError, match=words):
+        simulate(hanger, state, plan)

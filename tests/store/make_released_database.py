@@ -1,0 +1,60 @@
+"""Writes `data/schema_NNNN.db`, the database that a later schema must be able to upgrade.
+
+Run it once when a schema is released: `python tests/store/make_released_database.py`.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from shm.store import IdentifiedTest, Lineage, Store
+from shm.store.tables import SCHEMA
+from shm.values import Selection
+from tests.helpers.nouns import (
+    NOW,
+    a_drift,
+    a_file,
+    a_posterior,
+    a_response,
+    a_test,
+    an_alert,
+)
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+
+
+def fill(store: Store) -> None:
+    """Two tests with results, one refused file, one dropped twice, one alert."""
+    for number in (1, 2, 3):
+        store.receive(a_file(number), NOW)
+    store.receive(a_file(1, arrival="again"), NOW)
+    for number in (1, 2):
+        found = IdentifiedTest(a_test(f"t{number}", number), 0, a_response(), ("2 poles: damped",))
+        store.identified(number, [found], LINEAGE, NOW)
+    store.refuse(3, {"message": "no sampling rate.", "sha256": "3"}, NOW)
+    first, second = store.tests(3)
+    posteriors = (a_posterior("beam1"), a_posterior("beam2"))
+    store.selected(3, [first], Selection(posteriors, (0.9, 0.1)), LINEAGE, NOW)
+    store.updated(second, a_posterior("beam1", ("t2",), seed=8), LINEAGE, NOW)
+    baseline = store.baseline(3)
+    assert baseline is not None
+    store.watched(second, baseline, [a_drift()], an_alert(), ["mail"], NOW)
+
+
+def main() -> None:
+    path = Path(__file__).parent / "data" / f"schema_{SCHEMA}.db"
+    path.unlink(missing_ok=True)
+    with Store.create(path) as store:
+        fill(store)
+    connection = sqlite3.connect(path)
+    connection.execute("PRAGMA journal_mode = DELETE")
+    connection.execute("VACUUM")
+    connection.close()
+
+
+if __name__ == "__main__":
+    main()

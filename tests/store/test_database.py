@@ -1,0 +1,97 @@
+"""Transactions of several processes, and what the database's errors turn into."""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+
+from shm.errors import StoreBusy, StoreError
+from shm.store import Stage, Store, database
+from tests.helpers.nouns import NOW, a_file
+
+
+def test_many_writers_never_find_the_store_locked(store: Store) -> None:
+    """Read, then write, from four connections at once: a deferred BEGIN fails most of these."""
+    failures: list[str] = []
+
+    def write(first: int) -> None:
+        try:
+            for number in range(first, first + 25):
+                store.receive(a_file(number), NOW)
+        except StoreError as error:
+            failures.append(str(error))
+
+    threads = [threading.Thread(target=write, args=(100 * i,)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
+    assert store.stage_counts()[Stage.RECEIVED] == 100
+
+
+def test_a_store_held_by_another_process_is_busy_and_says_when_to_return(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(database, "BUSY_SECONDS", 0.05)
+    with Store.create(tmp_path / "shm.db") as store:
+        holder = sqlite3.connect(tmp_path / "shm.db", isolation_level=None)
+        holder.execute("BEGIN IMMEDIATE")
+        with pytest.raises(StoreBusy) as caught:
+            store.receive(a_file(1), NOW)
+        assert caught.value.retry_after_s == 1.0
+        assert store.recordings() == ()  # reading goes on meanwhile
+        holder.execute("ROLLBACK")
+        holder.close()
+        store.receive(a_file(1), NOW)
+
+
+def test_a_full_disk_is_told_and_waited_for(store: Store) -> None:
+    with store.engine.connect() as connection:
+        connection.exec_driver_sql("PRAGMA max_page_count = 1")
+    with pytest.raises(StoreError, match="disk is full") as caught:
+        store.receive(a_file(1, file_name="x" * 100_000), NOW)
+    assert caught.value.retry_after_s == 60.0
+    assert "Free some space" in str(caught.value)
+
+
+def test_a_store_that_cannot_be_written_says_what_to_do(store: Store) -> None:
+    with store.engine.connect() as connection:
+        connection.exec_driver_sql("PRAGMA query_only = 1")
+    with pytest.raises(StoreError, match="cannot be written"):
+        store.receive(a_file(1), NOW)
+
+
+def test_a_transaction_is_all_or_nothing(store: Store) -> None:
+    values = "(1, 'beam1', '2026-05-01')"
+    insert = sa.text(f"INSERT INTO selections (hanger, model, selected_at) VALUES {values}")
+
+    def insert_and_fail() -> None:
+        with store.writing() as connection:
+            connection.execute(insert)
+            assert connection.scalar(sa.text("SELECT count(*) FROM selections")) == 1
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        insert_and_fail()
+    assert store.selected_models() == {}
+
+
+def test_a_reference_to_nothing_is_refused(store: Store) -> None:
+    orphan = sa.text(
+        "INSERT INTO baselines (hanger, posterior_id, set_at, who, why)"
+        " VALUES (3, 99, '2026-05-01', '', '')"
+    )
+    with pytest.raises(StoreError, match="FOREIGN KEY") as caught, store.writing() as connection:
+        connection.execute(orphan)
+    assert caught.value.retry_after_s is None
+
+
+def test_commits_outlast_a_power_cut(store: Store) -> None:
+    with store.engine.connect() as connection:
+        assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
+        assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2

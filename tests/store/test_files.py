@@ -1,0 +1,112 @@
+"""Received files: each once, whatever is dropped again."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from shm.errors import NothingThere
+from shm.store import IdentifiedTest, Lineage, Outcome, Stage, Store
+from tests.helpers.nouns import NOW, a_file, a_test
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
+
+
+def test_a_received_file_is_entered_as_it_came(store: Store) -> None:
+    receipt = store.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
+    assert receipt.outcome is Outcome.NEW
+    stored = store.recording(receipt.recording.id)
+    assert stored == receipt.recording
+    assert stored.file == a_file(1, sidecar_as="11/1.toml")
+    assert (stored.received_at, stored.stage, stored.hanger) == (NOW, Stage.RECEIVED, None)
+    assert store.recording_of(a_file(1).sha256) == stored
+    assert store.recording_of("f" * 64) is None
+
+
+def test_the_same_bytes_dropped_again_are_noticed_and_not_entered(store: Store) -> None:
+    first = store.receive(a_file(1), NOW).recording
+    again = store.receive(a_file(1, file_name="copy.csv", arrival="other"), NOW)
+    assert again.outcome is Outcome.DUPLICATE
+    assert store.recordings() == (first,)
+    (event,) = store.events("duplicate")
+    assert (event.file_name, event.recording_id) == ("copy.csv", first.id)
+    assert "h3-1.csv" in event.message
+    assert "sidecar" not in event.message
+
+
+def test_a_duplicate_with_another_sidecar_is_told(store: Store) -> None:
+    store.receive(a_file(1), NOW)
+    store.receive(a_file(1, arrival="other", sidecar_as="22/2.toml"), NOW)
+    assert "sidecar differs" in store.events("duplicate")[0].message
+
+
+def test_a_receipt_cut_short_by_a_crash_is_no_duplicate(store: Store) -> None:
+    store.receive(a_file(1), NOW)
+    assert store.receive(a_file(1), NOW).outcome is Outcome.RESUMED
+    assert store.events() == ()
+    assert len(store.recordings()) == 1
+
+
+def test_a_refused_file_keeps_its_reason(store: Store) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    store.refuse(recording.id, REASON, NOW)
+    stored = store.recording(recording.id)
+    assert stored.stage is Stage.REFUSED
+    assert stored.reason == REASON
+    assert store.events("refused")[0].message == "no sampling rate."
+
+
+def test_a_refused_file_dropped_again_is_tried_again(store: Store) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    store.refuse(recording.id, REASON, NOW)
+    mended = a_file(1, arrival="later", sidecar_as="22/2.toml")
+    receipt = store.receive(mended, NOW + timedelta(days=1))
+    assert receipt.outcome is Outcome.REOPENED
+    assert receipt.recording.file == mended
+    assert receipt.recording.stage is Stage.RECEIVED
+    assert receipt.recording.reason is None
+    assert [event.kind for event in store.events()] == ["refused", "reopened"]
+
+
+def test_the_spool_entry_of_a_refused_file_left_by_a_crash_is_not_tried_again(
+    store: Store,
+) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    store.refuse(recording.id, REASON, NOW)
+    assert store.receive(a_file(1), NOW).outcome is Outcome.RESUMED
+    assert store.recording(recording.id).stage is Stage.REFUSED
+
+
+def test_trying_again_drops_refused_tests_and_keeps_those_that_have_results(store: Store) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    found = [IdentifiedTest(a_test("good"), 0), IdentifiedTest(a_test("bad"), 1)]
+    store.identified(recording.id, found, LINEAGE, NOW)
+    good, bad = store.tests()
+    store.refuse(recording.id, REASON, NOW, [bad.id])
+    assert [test.test.id for test in store.tests()] == ["good"]
+    store.receive(a_file(1, arrival="later"), NOW)
+    store.identified(recording.id, found, LINEAGE, NOW)
+    assert [test.test.id for test in store.tests()] == ["good", "bad"]
+    assert store.tests()[0].id == good.id
+
+
+def test_waiting_files_come_in_order_and_without_those_held_back(store: Store) -> None:
+    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2, 3, 4)]
+    store.refuse(ids[0], REASON, NOW)
+    waiting = store.waiting_recordings(2, excluding=[ids[1]])
+    assert [recording.id for recording in waiting] == ids[2:]
+
+
+def test_every_stage_is_counted(store: Store) -> None:
+    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2)]
+    store.refuse(ids[0], REASON, NOW)
+    counts = store.stage_counts()
+    assert counts == {**dict.fromkeys(Stage, 0), Stage.RECEIVED: 1, Stage.REFUSED: 1}
+    assert [recording.id for recording in store.recordings(Stage.REFUSED)] == ids[:1]
+
+
+def test_an_unknown_recording_is_nothing_there(store: Store) -> None:
+    with pytest.raises(NothingThere, match="no recording 9"):
+        store.recording(9)

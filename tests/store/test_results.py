@@ -1,0 +1,210 @@
+"""Tests, posteriors, selections: complete when read back, and kept once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import timedelta
+
+import numpy as np
+import pytest
+
+from shm.errors import NothingThere
+from shm.store import (
+    IdentifiedTest,
+    Lineage,
+    Stage,
+    Store,
+    StoredTest,
+    samples_npz,
+    samples_table,
+)
+from shm.store.blobs import unpack
+from shm.values import AddedMass, Posterior, Selection
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_response, a_test
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+
+
+def identified(store: Store, number: int, *found: IdentifiedTest) -> tuple[StoredTest, ...]:
+    recording = store.receive(a_file(number), NOW).recording
+    items = found or (IdentifiedTest(a_test(f"t{number}", days=number)),)
+    store.identified(recording.id, items, LINEAGE, NOW)
+    return tuple(test for test in store.tests() if test.recording_id == recording.id)
+
+
+def baseline_of_two_models(store: Store, *tests: StoredTest) -> None:
+    names = tuple(test.test.id for test in tests)
+    posteriors = (a_posterior("beam2", names), a_posterior("beam1", names))
+    store.selected(3, tests, Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
+
+
+def assert_same(found: Posterior, expected: Posterior) -> None:
+    for name in ("samples", "log_likelihood", "most_probable"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    plain = [n for n in vars(expected) if n not in ("samples", "log_likelihood", "most_probable")]
+    assert repr([getattr(found, n) for n in plain]) == repr([getattr(expected, n) for n in plain])
+
+
+def test_a_test_comes_back_as_it_was(store: Store) -> None:
+    test = a_test(added_mass=AddedMass(25.0, 3.6))
+    (stored,) = identified(store, 1, IdentifiedTest(test, 0, None, ("3 poles: too damped",)))
+    assert repr(stored.test) == repr(test)  # NaN differs from itself, its text does not
+    assert math.isnan(stored.test.amplitude)
+    assert (stored.time, stored.stage, stored.notes) == (
+        test.time,
+        Stage.IDENTIFIED,
+        ("3 poles: too damped",),
+    )
+    assert stored.lineage == LINEAGE
+    assert stored.key == f"{a_file(1).sha256}/0"
+    assert store.recording(stored.recording_id).hanger == 3
+
+
+def test_a_test_without_time_stands_at_its_receipt_and_stays_without(store: Store) -> None:
+    (stored,) = identified(store, 1, IdentifiedTest(a_test(time=None)))
+    assert stored.time == NOW
+    assert stored.test.time is None
+
+
+def test_a_frequency_response_comes_back_in_single_precision(store: Store) -> None:
+    response = a_response()
+    (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
+    found = store.frequency_response(stored)
+    assert found is not None
+    assert repr(found.points) == repr(response.points)
+    np.testing.assert_array_equal(found.frequency_hz, response.frequency_hz)
+    np.testing.assert_allclose(found.accelerance, response.accelerance, rtol=1e-6)
+    assert response.coherence is not None
+    assert found.coherence is not None
+    np.testing.assert_allclose(found.coherence, response.coherence, rtol=1e-6)
+    assert (found.source, found.hanger) == ("h3-1.csv", 3)
+
+
+def test_a_response_of_unknown_coherence_stays_so(store: Store) -> None:
+    response = replace(a_response(), coherence=None)
+    (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
+    found = store.frequency_response(stored)
+    assert found is not None
+    assert found.coherence is None
+
+
+def test_modes_given_by_a_file_have_no_frequency_response(store: Store) -> None:
+    (stored,) = identified(store, 1)
+    assert store.frequency_response(stored) is None
+
+
+def test_two_files_may_call_their_tests_the_same(store: Store) -> None:
+    identified(store, 1, IdentifiedTest(a_test("t1")))
+    identified(store, 2, IdentifiedTest(a_test("t1")), IdentifiedTest(a_test("t2"), 1))
+    suffix = a_file(2).sha256[:8]
+    assert [test.test.id for test in store.tests(3)] == ["t1", f"t1-{suffix}-0", "t2"]
+
+
+def test_identifying_a_file_again_changes_nothing(store: Store) -> None:
+    (stored,) = identified(store, 1)
+    for position in (0, 1):
+        again = [IdentifiedTest(a_test("other"), position)]
+        store.identified(stored.recording_id, again, LINEAGE, NOW)
+    assert [test.test.id for test in store.tests()] == ["t1"]
+
+
+def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(store: Store) -> None:
+    (first,) = identified(store, 1)
+    baseline_of_two_models(store, first)
+    selection = store.selection(3)
+    assert selection is not None
+    assert selection.selection.selected.model == "beam2"
+    assert selection.selection.probabilities == (0.8, 0.2)
+    assert store.selected_models() == {3: "beam2"}
+    baseline = store.baseline(3)
+    assert baseline is not None
+    assert_same(baseline.posterior, a_posterior("beam2"))
+    assert store.test(first.id).stage is Stage.WATCHED
+    assert store.recording(first.recording_id).stage is Stage.DONE
+
+
+def test_a_second_first_selection_is_not_kept(store: Store) -> None:
+    (first,) = identified(store, 1)
+    (second,) = identified(store, 2)
+    baseline_of_two_models(store, first)
+    baseline_of_two_models(store, second)
+    assert len(store.posteriors(3)) == 1
+    assert store.test(second.id).stage is Stage.IDENTIFIED
+
+
+def test_several_tests_may_make_one_baseline(store: Store) -> None:
+    tests = (*identified(store, 1), *identified(store, 2))
+    baseline_of_two_models(store, *tests)
+    history = store.history(3)
+    assert [test.test.id for test, _ in history] == ["t1", "t2"]
+    assert {posterior.tests for _, posterior in history} == {("t1", "t2")}
+    assert store.posteriors(3)[0].time == NOW + timedelta(days=2)
+
+
+def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
+    (first,) = identified(store, 1)
+    (second,) = identified(store, 2)
+    baseline_of_two_models(store, first)
+    posterior = a_posterior("beam2", ("t2",), seed=2**32 - 1)
+    store.updated(second, posterior, LINEAGE, NOW)
+    assert_same(store.posterior(3), posterior)
+    assert_same(store.posterior(3, "t2"), posterior)
+    assert_same(store.posterior_of(second), posterior)
+    assert store.posterior(3, "t1").model == "beam2"
+    assert store.posteriors(3)[-1].lineage == LINEAGE
+    assert store.test(second.id).stage is Stage.UPDATED
+    assert store.recording(second.recording_id).stage is Stage.UPDATED
+
+
+def test_updating_a_test_again_changes_nothing(store: Store) -> None:
+    (first,) = identified(store, 1)
+    (second,) = identified(store, 2)
+    baseline_of_two_models(store, first)
+    for seed in (1, 2):
+        store.updated(second, a_posterior("beam2", ("t2",), seed=seed), LINEAGE, NOW)
+    assert store.posterior(3, "t2").seed == 1
+
+
+def test_a_recording_stands_where_its_last_test_stands(store: Store) -> None:
+    first, second = identified(store, 1, IdentifiedTest(a_test()), IdentifiedTest(a_test("t2"), 1))
+    baseline_of_two_models(store, first)
+    assert store.recording(first.recording_id).stage is Stage.IDENTIFIED
+    store.updated(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
+    assert store.recording(first.recording_id).stage is Stage.UPDATED
+
+
+def test_waiting_tests_come_by_hanger_and_time_whatever_their_arrival(store: Store) -> None:
+    for number, (hanger, days) in enumerate([(4, 1), (3, 5), (3, 2)], start=1):
+        identified(store, number, IdentifiedTest(a_test(f"t{number}", days, hanger=hanger)))
+    waiting = store.waiting_tests()
+    assert [(test.hanger, test.id) for test in waiting] == [(3, 3), (3, 2), (4, 1)]
+
+
+@pytest.mark.parametrize("test", [None, "t1"])
+def test_what_was_never_updated_is_nothing_there(store: Store, test: str | None) -> None:
+    with pytest.raises(NothingThere, match="no posterior of hanger 3"):
+        store.posterior(3, test)
+    assert store.selection(3) is None
+    assert store.baseline(3) is None
+    with pytest.raises(NothingThere):
+        store.test(1)
+
+
+def test_samples_are_exported_as_a_plain_table() -> None:
+    posterior = a_posterior()
+    names, table = samples_table(posterior)
+    assert names == ("theta_F", "sigma", "tension_n", "log_likelihood")
+    assert table.shape == (50, 4)
+    np.testing.assert_array_equal(table[:, 2], posterior.samples[:, 0] * 711e3)
+    arrays = unpack(samples_npz(posterior))
+    np.testing.assert_array_equal(arrays["tension_n"], posterior.tension_n)
+
+
+def test_a_pickled_blob_is_not_read() -> None:
+    import io
+
+    buffer = io.BytesIO()
+    np.savez(buffer, samples=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(ValueError, match="allow_pickle"):
+        unpack(buffer.getvalue())

@@ -1,0 +1,147 @@
+"""The schema, proven twice: tables equal migrations, and every released schema upgrades."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+
+from shm.errors import NothingThere, SchemaOutdated, StoreError
+from shm.resources import migrations_folder
+from shm.store import Stage, Store
+from shm.store.database import make_engine
+from shm.store.tables import SCHEMA, metadata
+
+RELEASED = sorted(Path(__file__).parent.glob("data/schema_*.db"))
+
+
+def test_the_migrations_make_exactly_the_tables(store: Store) -> None:
+    with store.engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, metadata) == []
+
+
+def test_the_schema_named_in_the_code_is_the_newest_migration() -> None:
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()))
+    assert ScriptDirectory.from_config(config).get_heads() == [SCHEMA]
+
+
+def test_a_database_of_every_schema_is_kept() -> None:
+    migrations = sorted((migrations_folder() / "versions").glob("*.py"))
+    numbers = [path.name.split("_")[0] for path in migrations]
+    assert [path.stem.removeprefix("schema_") for path in RELEASED] == numbers
+
+
+@pytest.mark.parametrize("released", RELEASED, ids=lambda path: path.stem)
+def test_a_released_database_upgrades_and_keeps_its_contents(
+    released: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(released, path)
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        context = MigrationContext.configure(store.engine.connect())
+        assert compare_metadata(context, metadata) == []
+        context.connection.close()
+        assert store.stage_counts()[Stage.DONE] == 2
+        assert store.stage_counts()[Stage.REFUSED] == 1
+        assert [test.test.id for test in store.tests(3)] == ["t1", "t2"]
+        (_, first), (_, second) = store.history(3)
+        assert first.tension_n.mean() == pytest.approx(711e3, rel=0.02)
+        assert second.model == store.selected_models()[3] == "beam1"
+        assert store.baseline(3) is not None
+        assert [drift.quantity for drift in store.drifts(3)] == ["tension"]
+        assert [stored.alert.key for stored in store.alerts()] == ["hanger-3:tension-down"]
+        assert [delivery.hook for delivery in store.deliveries()] == ["mail"]
+        assert [event.kind for event in store.events()] == ["duplicate", "refused"]
+
+
+@pytest.mark.parametrize("version", ["0000", None])
+def test_an_older_schema_is_refused_with_the_command_that_mends_it(
+    tmp_path: Path, version: str | None
+) -> None:
+    path = tmp_path / "shm.db"
+    Store.create(path).close()
+    _set_version(path, version)
+    with pytest.raises(SchemaOutdated, match="shm db upgrade") as caught:
+        Store.open(path)
+    assert caught.value.exit_code == 5
+
+
+def test_a_schema_of_the_future_is_refused_and_not_touched(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    Store.create(path).close()
+    _set_version(path, "9999")
+    for attempt in (Store.open, Store.upgrade):
+        with pytest.raises(SchemaOutdated, match="newer"):
+            attempt(path)
+    assert _tables(path) >= {"recordings", "tests"}
+
+
+def test_an_upgrade_that_fails_leaves_nothing_half_done(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    with sqlite3.connect(path) as connection:
+        connection.execute("CREATE TABLE tests (id INTEGER)")
+    connection.close()
+    with pytest.raises(StoreError):
+        Store.upgrade(path)
+    assert _tables(path) == {"tests"}
+
+
+def test_an_upgrade_from_an_unknown_schema_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    Store.create(path).close()
+    _set_version(path, "0000")
+    with pytest.raises(StoreError, match="cannot be upgraded"):
+        Store.upgrade(path)
+
+
+def test_upgrading_twice_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    Store.create(path).close()
+    Store.upgrade(path)
+    Store.open(path).close()
+
+
+def test_what_is_not_a_database_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    path.write_text("not a database, but long enough to be taken for one" * 100)
+    with pytest.raises(StoreError, match="is not a database"):
+        Store.open(path)
+
+
+def test_a_missing_store_is_not_made_by_looking(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    for attempt in (Store.open, Store.upgrade):
+        with pytest.raises(NothingThere, match="shm init"):
+            attempt(path)
+    assert not path.exists()
+
+
+def test_a_url_without_driver_is_refused_without_its_password() -> None:
+    with pytest.raises(StoreError, match="no driver") as caught:
+        make_engine("elsewhere://user:secret@host/shm")
+    assert "secret" not in str(caught.value)
+
+
+def _set_version(path: Path, version: str | None) -> None:
+    connection = sqlite3.connect(path)
+    with connection:
+        connection.execute("DELETE FROM alembic_version")
+        if version is not None:
+            connection.execute("INSERT INTO alembic_version VALUES (?)", (version,))
+    connection.close()
+
+
+def _tables(path: Path) -> set[str]:
+    connection = sqlite3.connect(path)
+    rows = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+    connection.close()
+    return {name for (name,) in rows}

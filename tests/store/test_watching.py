@@ -1,0 +1,134 @@
+"""Drifts, alerts and the outbox: an alert and what is owed for it are one."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from shm.errors import StoreError
+from shm.store import (
+    Baseline,
+    DeliveryState,
+    IdentifiedTest,
+    Lineage,
+    Stage,
+    Store,
+    StoredAlert,
+    StoredTest,
+)
+from shm.values import Alert, Drift, Selection
+from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, an_alert
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+
+
+@pytest.fixture
+def updated(store: Store) -> list[StoredTest]:
+    """Three tests with posteriors after the one that makes the baseline."""
+    for number in range(4):
+        recording = store.receive(a_file(number), NOW).recording
+        test = IdentifiedTest(a_test(f"t{number}", days=number))
+        store.identified(recording.id, [test], LINEAGE, NOW)
+    first, *later = store.tests()
+    store.selected(3, [first], Selection((a_posterior(),), (1.0,)), LINEAGE, NOW)
+    for test in later:
+        store.updated(test, a_posterior(tests=(test.test.id,)), LINEAGE, NOW)
+    return later
+
+
+def watch(
+    store: Store, test: StoredTest, alert: Alert | None = None, *hooks: str
+) -> StoredAlert | None:
+    return store.watched(test, baseline(store), [a_drift(test.test.id)], alert, hooks, NOW)
+
+
+def baseline(store: Store) -> Baseline:
+    found = store.baseline(3)
+    assert found is not None
+    return found
+
+
+def test_a_watched_test_is_done_and_its_drift_is_kept(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    assert watch(store, updated[0]) is None
+    assert store.test(updated[0].id).stage is Stage.WATCHED
+    assert store.recording(updated[0].recording_id).stage is Stage.DONE
+    assert store.drifts(3) == (a_drift("t1"),)
+    assert store.drifts(3, "t2") == store.drifts(4) == ()
+
+
+def test_a_new_alert_owes_each_hook_a_delivery(store: Store, updated: list[StoredTest]) -> None:
+    raised = watch(store, updated[0], an_alert(test="t1"), "mail", "siren")
+    assert raised is not None
+    assert store.alerts(3) == (raised,)
+    assert raised.alert == an_alert(test="t1")
+    due = store.due_deliveries(NOW, 10)
+    assert [(each.hook, each.attempts, each.alert) for each in due] == [
+        ("mail", 0, raised.alert),
+        ("siren", 0, raised.alert),
+    ]
+
+
+def test_a_standing_condition_is_told_once_and_its_drifts_are_all_kept(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    raised = [watch(store, test, an_alert(test=test.test.id), "mail") for test in updated]
+    assert [each is not None for each in raised] == [True, False, False]
+    assert len(store.alerts()) == len(store.deliveries()) == 1
+    assert [drift.test for drift in store.drifts(3)] == ["t1", "t2", "t3"]
+
+
+def test_another_condition_is_told_too(store: Store, updated: list[StoredTest]) -> None:
+    for test, key in zip(updated, ("down", "up"), strict=False):
+        assert watch(store, test, an_alert(key)) is not None
+    assert [stored.alert.key for stored in store.alerts(3)] == ["down", "up"]
+
+
+def test_watching_a_test_again_changes_nothing(store: Store, updated: list[StoredTest]) -> None:
+    watch(store, updated[0])
+    assert watch(store, updated[0], an_alert(), "mail") is None
+    assert len(store.drifts()) == 1
+    assert store.alerts() == ()
+
+
+def test_an_alert_whose_delivery_cannot_be_entered_is_not_raised(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    with pytest.raises(StoreError):
+        watch(store, updated[0], an_alert(), "mail", "mail")
+    assert store.alerts() == store.deliveries() == store.drifts() == ()
+    assert store.test(updated[0].id).stage is Stage.UPDATED
+
+
+def test_a_delivery_that_failed_is_due_later(store: Store, updated: list[StoredTest]) -> None:
+    watch(store, updated[0], an_alert(), "mail")
+    (delivery,) = store.due_deliveries(NOW, 10)
+    later = NOW + timedelta(seconds=5)
+    store.delivery_failed(delivery, "exit code 1", NOW, later)
+    assert store.due_deliveries(NOW, 10) == ()
+    (again,) = store.due_deliveries(later, 10)
+    assert (again.attempts, again.last_error) == (1, "exit code 1")
+    assert store.due_deliveries(later, 10, excluding=[again.id]) == ()
+
+
+def test_an_ended_delivery_is_not_due_again(store: Store, updated: list[StoredTest]) -> None:
+    watch(store, updated[0], an_alert(), "mail", "siren")
+    mail, siren = store.due_deliveries(NOW, 10)
+    store.delivered(mail, NOW)
+    store.delivery_failed(siren, "no such program", NOW, None)
+    assert store.due_deliveries(NOW + timedelta(days=9), 10) == ()
+    (done,) = store.deliveries(DeliveryState.DELIVERED)
+    (given_up,) = store.deliveries(DeliveryState.GIVEN_UP)
+    assert (done.hook, done.attempts, done.ended_at) == ("mail", 1, NOW)
+    assert (given_up.hook, given_up.last_error) == ("siren", "no such program")
+
+
+def test_unknown_numbers_of_a_drift_come_back_unknown(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    nan = float("nan")
+    drift = Drift(3, "t1", NOW, "tension", nan, 1.0, nan, 0.0, 0.05, nan)
+    store.watched(updated[0], baseline(store), [drift], None, [], NOW)
+    assert repr(store.drifts(3)) == repr((drift,))
