@@ -172,11 +172,16 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
         frequency_sd_hz=frequency_sd,
         damping_ratio=_number(mode, "damping_ratio", label, file),
         damping_sd=_number(mode, "damping_sd", label, file),
-        shape=tuple(
-            _shape_point(p, f"{label}.shape[{i}]", file)
-            for i, p in enumerate(mode.get("shape") or ())
-        ),
+        shape=_shape(mode.get("shape"), label, file),
     )
+
+
+def _shape(points: Any, label: str, file: str | Path) -> tuple[ShapePoint, ...]:
+    if points is None:
+        return ()
+    if not isinstance(points, list):
+        raise BadInput(f"{label}: shape is not a list.", file=file, remedy="Give a list of points.")
+    return tuple(_shape_point(p, f"{label}.shape[{i}]", file) for i, p in enumerate(points))
 
 
 def _shape_point(point: Any, label: str, file: str | Path) -> ShapePoint:

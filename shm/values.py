@@ -190,7 +190,7 @@ class Posterior:
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
-    runs of the sampler, the worst parameter (1 is converged).
+    batches of draws, the worst parameter (1 is converged).
     """
 
     model: str

@@ -94,9 +94,8 @@ def _identify(
     group: Sequence[Path], hanger: Hanger | None, options: IdentifyOptions
 ) -> Identification:
     """One test; it is of the described hanger where its records do not say."""
-    length_m = hanger.length_m if hanger else math.nan
     records = [read(path) for path in group]
-    found = identify(records, options, test_id=group[0].stem, length_m=length_m)
+    found = identify(records, options, test_id=group[0].stem, hanger=hanger)
     named = found.test.hanger
     if hanger is None or named == hanger.id:
         return found

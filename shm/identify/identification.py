@@ -17,7 +17,7 @@ from shm.identify.quality import coherent_only, without_window
 from shm.identify.recordings import measurement_of_recordings
 from shm.identify.registry import identifier
 from shm.identify.responses import measurement_of_responses
-from shm.values import NAN, FrequencyResponse, ModalTest, Recording
+from shm.values import NAN, FrequencyResponse, Hanger, ModalTest, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,11 @@ def identify(
     options: IdentifyOptions = _DEFAULTS,
     *,
     test_id: str,
-    length_m: float = NAN,
+    hanger: Hanger | None = None,
 ) -> Identification:
     """The modes of one test from its records: time records with hits, or frequency responses.
 
-    `length_m` of the hanger, where known, lets the shapes help to number the modes. Raises BadInput
+    The description of the `hanger`, where known, helps to number the modes. Raises BadInput
     where the records cannot be used together, NotIdentifiable where no mode can be trusted.
     """
     measurement = _measurement(records, options)
@@ -58,7 +58,7 @@ def identify(
     found = coherent_only(without_window(found, measurement), measurement, options)
     if not found.modes:
         raise _nothing_found(measurement, found)
-    modes, notes = placed(found.modes, measurement.points, length_m)
+    modes, notes = placed(found.modes, measurement.points, hanger)
     first = records[0]
     return Identification(
         test=ModalTest(

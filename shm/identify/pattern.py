@@ -19,6 +19,7 @@ from shm.values import FloatArray
 
 HIGHEST_ORDER = 60
 _TENSION = np.concatenate(([0.0], np.geomspace(1.0, 1000.0, 40)))
+_NO_TENSION = 0.5
 _SPRING = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e9])
 
 
@@ -26,10 +27,11 @@ _SPRING = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e9])
 class Pattern:
     """Modes of tensioned beams over a grid of xi and kappa.
 
-    Each array has shape (tensions, springs, orders): `log_frequency` up to a constant, `beta`,
-    `alpha` and `theta` of the shape.
+    `log_xi` has shape (tensions,), the others (tensions, springs, orders): `log_frequency` up to a
+    constant, `beta`, `alpha` and `theta` of the shape.
     """
 
+    log_xi: FloatArray
     log_frequency: FloatArray
     beta: FloatArray
     alpha: FloatArray
@@ -53,7 +55,8 @@ def tensioned_beam_pattern() -> Pattern:
     tension, spring, order_pi = np.meshgrid(_TENSION, _SPRING, order * np.pi, indexing="ij")
     beta = _solve_beta(tension, spring, order_pi)
     alpha = np.hypot(tension, beta)
-    return Pattern(np.log(alpha * beta), beta, alpha, _theta(beta, tension, spring))
+    log_xi = np.log(np.maximum(_TENSION, _NO_TENSION))
+    return Pattern(log_xi, np.log(alpha * beta), beta, alpha, _theta(beta, tension, spring))
 
 
 def _theta(beta: FloatArray, tension: FloatArray, spring: FloatArray) -> FloatArray:

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.identify.contract import FoundMode
-from shm.identify.order import PlaneModes, assign_orders
+from shm.identify.order import Expected, PlaneModes, assign_orders
 from shm.identify.planes import planes_of, shape_points
-from shm.values import PLANES, Mode, Plane, ResponsePoint, ShapePoint
+from shm.values import NAN, PLANES, Hanger, Mode, Plane, ResponsePoint, ShapePoint
 
 
 def placed(
-    found: Sequence[FoundMode], points: Sequence[ResponsePoint], length_m: float
+    found: Sequence[FoundMode], points: Sequence[ResponsePoint], hanger: Hanger | None
 ) -> tuple[tuple[Mode, ...], tuple[str, ...]]:
     """The modes with plane, order and shape by position, plane by plane, and what was decided."""
     planes = planes_of(found, points)
@@ -24,8 +24,10 @@ def placed(
         [shape_points(mode, plane, points) for mode in group]
         for plane, group in zip(PLANES, groups, strict=True)
     ]
+    length_m = hanger.length_m if hanger else NAN
     orders = assign_orders(
-        [_plane_modes(*pair, length_m) for pair in zip(groups, shapes, strict=True)]
+        [_plane_modes(*pair, length_m) for pair in zip(groups, shapes, strict=True)],
+        Expected.of(hanger) if hanger else None,
     )
     modes = tuple(
         _mode(plane, order, mode, shape)

@@ -73,7 +73,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -
     hanger = _hanger(record.hanger, bridge)
     _refuse_future(record.time, latest, "the recording")
     options = IdentifyOptions(band_low_hz=settings.band_low_hz, band_high_hz=settings.band_high_hz)
-    result = identify([record], options, test_id=path.stem, length_m=hanger.length_m)
+    result = identify([record], options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
     return IdentifiedTest(result.test, 0, result.frequency_response, (*result.notes, *dropped))
 

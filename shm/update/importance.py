@@ -26,6 +26,7 @@ _BATCH = 4000
 _ADAPTATIONS = 4
 _MOST_BATCHES = 6
 _REFIT = 2000
+_BATCHES = 4
 _REFIT_STEPS = 6
 
 
@@ -52,6 +53,22 @@ class Weighted:
     def effective_sample_size(self) -> float:
         """Kish's effective number of draws."""
         return float(1 / np.sum(normalised(self.log_weights) ** 2))
+
+    @property
+    def r_hat(self) -> float:
+        """Potential scale reduction (Gelman and Rubin 1992) of independent batches, the worst.
+
+        Each batch estimates mean and variance of every parameter by its own weights.
+        """
+        moments = [self._moments(slice(batch, None, _BATCHES)) for batch in range(_BATCHES)]
+        means, variances = np.swapaxes(moments, 0, 1)
+        return float(np.sqrt(1 + means.var(axis=0, ddof=1) / variances.mean(axis=0)).max())
+
+    def _moments(self, part: slice) -> tuple[FloatArray, FloatArray]:
+        weights = normalised(self.log_weights[part])[:, None]
+        z = self.points.z[part]
+        mean = (weights * z).sum(axis=0)
+        return mean, (weights * (z - mean) ** 2).sum(axis=0) + np.finfo(float).tiny
 
     def resampled(self, n: int, rng: np.random.Generator) -> Points:
         """`n` equally weighted points."""

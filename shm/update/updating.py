@@ -49,10 +49,10 @@ def update(
 ) -> Posterior:
     """The posterior of `model` given all modes of `tests`.
 
-    Independent runs of the sampler find the posterior (their agreement is `r_hat`), importance
-    sampling gives the evidence and the draws, and a few steps spread equal draws. `progress`
-    hears the model's name and the fraction done. Raises BadInput where a test has no modes or
-    conditions that the model class cannot describe.
+    Independent runs of the sampler find the posterior, importance sampling gives the evidence and
+    the draws (`r_hat` is the agreement of its batches), and a few steps spread equal draws.
+    `progress` hears the model's name and the fraction done. Raises BadInput where a test has no
+    modes or conditions that the model class cannot describe.
     """
     options = options or UpdateOptions()
     started = time.perf_counter()
@@ -77,7 +77,7 @@ def update(
         log_evidence=weighted.log_evidence,
         log_evidence_sd=weighted.log_evidence_sd,
         effective_sample_size=min(weighted.effective_sample_size, options.samples),
-        r_hat=r_hat([run.points.z for run in runs]),
+        r_hat=weighted.r_hat,
         evaluations=problem.evaluations,
         predicted=_predicted(problem.likelihood, predicted),
         tests=tuple(test.id for test in tests),
@@ -119,13 +119,6 @@ def _draws(
     sigma = problem.likelihood.draw_sigma(points.predicted, rng)
     theta = problem.theta(problem.unfold(points.z, rng))
     return np.column_stack([theta, sigma]), points.predicted
-
-
-def r_hat(runs: Sequence[FloatArray]) -> float:
-    """Gelman and Rubin's (1992) potential scale reduction over runs of shape (n, d), the worst."""
-    within = np.mean([run.var(axis=0, ddof=1) for run in runs], axis=0)
-    between = np.var([run.mean(axis=0) for run in runs], axis=0, ddof=1)
-    return float(np.sqrt(1 + between / within).max())
 
 
 def _most_probable(problem: Problem, best: FloatArray) -> FloatArray:

@@ -25,28 +25,26 @@ from tests.helpers.workspaces import make_workspace
 
 
 def live_and_be_killed(workspace: Workspace, seconds: float) -> dict[Stage, int]:
-    """One life of the daemon; how many files stand where after it."""
-    daemon = real_daemon(workspace.folder)
-    until_serving(daemon.pid, workspace.folder)
-    time.sleep(seconds)
-    daemon.kill()
-    daemon.wait()
+    """One life of the daemon, ended by SIGKILL; how many files stand where after it."""
+    with real_daemon(workspace.folder) as daemon:
+        until_serving(daemon.pid, workspace.folder)
+        time.sleep(seconds)
     with workspace.store() as store:
         return store.stage_counts()
 
 
 def live_in_peace(workspace: Workspace, files: int) -> None:
     """A last life that ends when all files have come to their end."""
-    daemon = real_daemon(workspace.folder)
     ended = 0
-    while ended < files:
-        time.sleep(0.2)
-        with workspace.store() as store:
-            counts = store.stage_counts()
-        ended = counts[Stage.DONE] + counts[Stage.REFUSED]
-    daemon.terminate()
-    if daemon.wait(30) != 0:
-        raise SystemExit(f"SIGTERM gave exit code {daemon.returncode}")
+    with real_daemon(workspace.folder) as daemon:
+        while ended < files:
+            time.sleep(0.2)
+            with workspace.store() as store:
+                counts = store.stage_counts()
+            ended = counts[Stage.DONE] + counts[Stage.REFUSED]
+        daemon.terminate()
+        if daemon.wait(30) != 0:
+            raise SystemExit(f"SIGTERM gave exit code {daemon.returncode}")
 
 
 def main() -> None:

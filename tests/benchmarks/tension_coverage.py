@@ -46,7 +46,7 @@ def posterior_of(case: int, samples: int) -> tuple[HangerState, Posterior]:
     state = planted(rng)
     plan = HammerPlan(hits=5, seconds_per_hit=10.0, acceleration_noise_m_s2=0.1)
     recording = hammer_test(HANGER, state, plan, rng)
-    found = identify([recording], IdentifyOptions(), test_id=str(case), length_m=HANGER.length_m)
+    found = identify([recording], IdentifyOptions(), test_id=str(case), hanger=HANGER)
     options = UpdateOptions(samples=samples, seed=case)
     return state, update([found.test], build("beam2", HANGER), options)
 

@@ -21,9 +21,8 @@ def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
         time.sleep(0.01)
 
 
-def at_work(workspace: Workspace) -> bool:
-    """Whether a step has reached a worker, which has its file open."""
-    return any((workspace.folder / "archive" / ".open").glob("*"))
+def log_of(workspace: Workspace) -> str:
+    return (workspace.folder / "daemon.log").read_text()
 
 
 def done(workspace: Workspace) -> int:
@@ -51,19 +50,18 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
     monkeypatch.setenv("SHM_TEST", str(workspace.folder))
     for day in range(6):
         write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
-    daemon = real_daemon(workspace.folder)
-    until(lambda: at_work(workspace))
-    daemon.terminate()
-    assert daemon.wait(10) == 0
+    with real_daemon(workspace.folder) as daemon:
+        until(lambda: "identify 1: done" in log_of(workspace))  # and the next one is under way
+        daemon.terminate()
+        assert daemon.wait(10) == 0
     until(lambda: not processes_of(workspace), 10)
-    log = (workspace.folder / "daemon.log").read_text()
-    assert "ended" in log
-    assert "Traceback" not in log
+    assert log_of(workspace).splitlines()[-1].endswith("ended")
+    assert "Traceback" not in log_of(workspace)
 
-    daemon = real_daemon(workspace.folder)
-    until(lambda: len(processes_of(workspace)) > 2)  # itself, a helper, a worker
-    daemon.kill()
-    assert daemon.wait(10) == -9
+    with real_daemon(workspace.folder) as daemon:
+        until(lambda: len(processes_of(workspace)) > 2)  # itself, a helper, a worker
+        daemon.kill()
+        assert daemon.wait(10) == -9
     until(lambda: not processes_of(workspace), 20)
 
     quick_daemon(workspace.folder, once=True).join(60)

@@ -7,7 +7,9 @@ import multiprocessing
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 
@@ -34,10 +36,15 @@ def quick_daemon(folder: Path, once: bool = False) -> ForkServerProcess:
     return process
 
 
-def real_daemon(folder: Path) -> subprocess.Popen[bytes]:
-    """`python -m shm_daemon`, as an owner begins it, logging to `daemon.log`."""
-    with (folder / "daemon.log").open("ab") as log:
-        return subprocess.Popen([sys.executable, "-m", "shm_daemon", str(folder)], stderr=log)
+@contextmanager
+def real_daemon(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """`python -m shm_daemon`, as an owner begins it, logging to `daemon.log`; ended at the end."""
+    command = [sys.executable, "-m", "shm_daemon", str(folder)]
+    with (folder / "daemon.log").open("ab") as log, subprocess.Popen(command, stderr=log) as daemon:
+        try:
+            yield daemon
+        finally:
+            daemon.kill()
 
 
 def until_serving(pid: int | None, folder: Path, seconds: float = 30.0) -> None:

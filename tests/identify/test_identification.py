@@ -39,7 +39,7 @@ def _test_recording(
 
 @pytest.fixture(scope="module")
 def identified() -> Identification:
-    return identify([_test_recording()], OPTIONS, test_id="t1", length_m=HANGER.length_m)
+    return identify([_test_recording()], OPTIONS, test_id="t1", hanger=HANGER)
 
 
 def test_all_modes_of_both_planes_are_found_with_plane_and_order(
@@ -129,7 +129,7 @@ def test_a_mode_at_whose_node_the_sensor_sits_does_not_shift_the_rest() -> None:
     """At a third of a pinned hanger, orders 3, 6, 9 do not show."""
     state = HangerState(450e3, 0.0, 0.0, 0.0, 0.0, damping_ratio=0.002)
     plan = replace(PLAN, sensors_x_m=(4.0,), hammer_angle_deg=0.0)
-    result = identify([_test_recording(1, plan, state)], OPTIONS, test_id="t", length_m=12.0)
+    result = identify([_test_recording(1, plan, state)], OPTIONS, test_id="t", hanger=HANGER)
     truth = natural_frequencies(HANGER, state, 20)[0]
     orders = [mode.order for mode in result.test.modes]
     assert 3 not in orders

@@ -70,10 +70,12 @@ def make_response() -> FrequencyResponse:
     noise = np.random.default_rng(5).normal(0, 2e-3, (2, *lines.shape))
     lines += noise[0] + 1j * noise[1]
     coherence = np.clip(1 - 4e-5 / np.abs(lines) ** 2, 0.02, 1)
-    points = (
-        ResponsePoint("acc_1", "transverse", 3.6),
-        ResponsePoint("acc_2", "longitudinal", 3.6),
+    points = tuple(
+        ResponsePoint(f"acc_{2 * number + row + 1}", plane, x_m)
+        for number, x_m in enumerate((2.52, 4.44))
+        for row, plane in enumerate(MEASURED)
     )
+    lines, coherence = np.tile(lines, (2, 1)), np.tile(coherence, (2, 1))
     return FrequencyResponse("t009.csv", points, frequency_hz, lines, coherence, 3)
 
 

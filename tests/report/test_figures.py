@@ -60,6 +60,37 @@ def test_captions_and_alternative_texts_are_whole_sentences_without_nan(
         assert not re.search(r"\bnan\b", item.caption + item.alt)
 
 
+def test_legends_leave_the_axes_their_room(drawn: dict[str, Illustration]) -> None:
+    """A legend wider than the figure would squeeze the axes to a strip."""
+    for name, item in drawn.items():
+        item.figure.draw_without_rendering()
+        widths = [axes.get_position().width for axes in item.figure.axes]
+        assert sum(widths) / len({axes.get_position().y0 for axes in item.figure.axes}) > 0.8, name
+
+
+def test_long_names_of_channels_leave_the_axes_their_room(season: HangerReport) -> None:
+    response = season.frequency_response
+    assert response is not None
+    points = tuple(replace(p, name=f"{p.name} accelerometer, WWWWWWW") for p in response.points)
+    named = replace(season, frequency_response=replace(response, points=points))
+    item = next(item for item in illustrations(named) if item.name == "response")
+    item.figure.draw_without_rendering()
+    assert item.figure.axes[0].get_position().width > 0.8
+
+
+def test_lines_near_the_posterior_of_tension_are_drawn_and_far_ones_named(
+    season: HangerReport,
+) -> None:
+    near = next(item for item in illustrations(season) if item.name == "tension").figure.axes[0]
+    assert {line.get_label() for line in near.lines} == {"nominal", "baseline"}
+    assert not near.texts
+    sharp = replace(season.posterior, samples=season.posterior.samples.copy())
+    sharp.samples[:, 0] = 650 / 711 + 1e-2 * (sharp.samples[:, 0] - 650 / 711)
+    far = next(i for i in illustrations(replace(season, posterior=sharp)) if i.name == "tension")
+    told = [text.get_text() for text in far.figure.axes[0].texts]
+    assert told == ["nominal 711.0 kN →", "baseline 699.8 kN →"]
+
+
 def test_the_trend_marks_the_alerted_test_at_its_tension(
     drawn: dict[str, Illustration], season: HangerReport
 ) -> None:
@@ -107,12 +138,12 @@ def test_of_many_responses_the_first_four_are_drawn_and_that_is_said(
     response = season.frequency_response
     assert response is not None
     many = FrequencyResponse(
-        "x", response.points * 3, response.frequency_hz, np.tile(response.accelerance, (3, 1))
+        "x", response.points * 2, response.frequency_hz, np.tile(response.accelerance, (2, 1))
     )
     item = next(
         i for i in illustrations(replace(season, frequency_response=many)) if i.name == "response"
     )
-    assert "first 4 of 6" in item.caption
+    assert "first 4 of 8" in item.caption
 
 
 def test_tests_without_a_time_are_left_out_of_the_trend_and_counted(season: HangerReport) -> None:

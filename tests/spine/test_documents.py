@@ -92,6 +92,7 @@ MODE = ["tests", 0, "modes", 0]
         (changed([*MODE, "frequency_hz"], "5.8"), "frequency_hz = '5.8' is not a number"),
         (changed([*MODE, "frequency_sd_hz"], -0.1), "frequency_sd_hz is negative"),
         (changed([*MODE, "shape"], [3]), r"shape\[0\] is not an object"),
+        (changed([*MODE, "shape"], True), "shape is not a list"),
         (changed(["tests", 0, "time"], "yesterday"), "not an ISO 8601 time"),
         (changed(["tests", 0, "added_mass"], {"mass_kg": -1, "x_m": 2}), "positive mass_kg"),
         (changed(["tests", 0, "added_mass"], 25), "added_mass is not an object"),

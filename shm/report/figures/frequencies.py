@@ -25,6 +25,8 @@ def _draw(data: HangerReport) -> Figure | None:
     figure = style.new_figure()
     axes = figure.subplots()
     style.dress(axes, "mode number in its plane", "predicted / measured frequency")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.use_sticky_edges = False
     axes.axhline(1.0, color=style.INK, linewidth=1)
     half = NORMAL_90 * _sigma(data).mean
     axes.axhspan(1 - half, 1 + half, color=style.INK, alpha=0.07, linewidth=0, label="model error")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,6 +15,7 @@ from shm.values import PLANES, FloatArray, FrequencyResponse, Mode, ResponsePoin
 
 _POINTS_SHOWN = 4
 _HEADROOM = 1.12
+_LONGEST_NAME = 14
 
 
 def _draw(data: HangerReport) -> Figure | None:
@@ -54,7 +57,7 @@ def _magnitude(
     axes.set_yscale("log")
     _marks(axes, modes)
     axes.set_xlim(response.frequency_hz[shown][0], response.frequency_hz[shown][-1])
-    style.legend_above(axes, columns=6)
+    style.legend_above(axes, columns=3)
 
 
 def _curves(axes: Axes, response: FrequencyResponse, shown: slice, values: FloatArray) -> None:
@@ -70,7 +73,8 @@ def _curves(axes: Axes, response: FrequencyResponse, shown: slice, values: Float
 
 
 def _label(point: ResponsePoint) -> str:
-    return point.name if np.isnan(point.x_m) else f"{point.name} at {point.x_m:.2f} m"
+    name = textwrap.shorten(point.name, _LONGEST_NAME, placeholder="…")
+    return name if np.isnan(point.x_m) else f"{name} at {point.x_m:.2f} m"
 
 
 def _marks(axes: Axes, modes: tuple[Mode, ...]) -> None:

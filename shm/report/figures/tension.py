@@ -7,9 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report import words
-from shm.report.content import HangerReport, Interval
+from shm.report.content import HangerReport
 from shm.report.figures import style
 from shm.report.figures.member import Member
+
+_NEAR = 1.5
+"""How far from the samples a line may lie to be in view, in widths of the samples' range."""
 
 
 def _draw(data: HangerReport) -> Figure:
@@ -17,13 +20,47 @@ def _draw(data: HangerReport) -> Figure:
     axes = figure.subplots()
     style.dress(axes, "tension (kN)", "probability density (1/kN)")
     _histogram(axes, data)
-    axes.axvline(
-        data.hanger.nominal_tension_n / 1e3, color=style.INK, linestyle=":", label="nominal"
-    )
+    _see(axes, data)
+    _line(axes, data.hanger.nominal_tension_n / 1e3, "nominal", style.INK, ":", 0.9)
     if data.baseline_tension_n is not None:
-        _baseline(axes, words.kilonewtons(data.baseline_tension_n))
+        baseline = words.kilonewtons(data.baseline_tension_n)
+        axes.axvspan(baseline.low, baseline.high, color=style.GREEN, alpha=0.15, linewidth=0)
+        _line(axes, baseline.mean, "baseline", style.GREEN, "--", 0.8)
     style.legend_above(axes)
     return figure
+
+
+def _see(axes: Axes, data: HangerReport) -> None:
+    """Shows the samples and the lines near them: a sharp posterior must stay readable."""
+    low, high = data.posterior.tension_n.min(), data.posterior.tension_n.max()
+    lines = [data.hanger.nominal_tension_n]
+    if (baseline := data.baseline_tension_n) is not None:
+        lines += [baseline.low, baseline.high]
+    reach = _NEAR * (high - low)
+    seen = [low, high, *(line for line in lines if low - reach <= line <= high + reach)]
+    margin = 0.05 * (max(seen) - min(seen))
+    axes.set_xlim((min(seen) - margin) / 1e3, (max(seen) + margin) / 1e3)
+
+
+def _line(
+    axes: Axes, tension_kn: float, label: str, colour: str, dashes: str, height: float
+) -> None:
+    """A tension as a line or, where it lies out of view, in words at the edge it lies beyond."""
+    low, high = axes.get_xlim()
+    if low <= tension_kn <= high:
+        axes.axvline(tension_kn, color=colour, linestyle=dashes, label=label)
+        return
+    right = tension_kn > high
+    named = f"{label} {tension_kn:.1f} kN"
+    axes.text(
+        0.99 if right else 0.01,
+        height,
+        f"{named} →" if right else f"← {named}",
+        transform=axes.transAxes,
+        color=colour,
+        fontsize=9,
+        ha="right" if right else "left",
+    )
 
 
 def _histogram(axes: Axes, data: HangerReport) -> None:
@@ -44,11 +81,6 @@ def _histogram(axes: Axes, data: HangerReport) -> None:
         )
 
 
-def _baseline(axes: Axes, baseline: Interval) -> None:
-    axes.axvspan(baseline.low, baseline.high, color=style.GREEN, alpha=0.15, linewidth=0)
-    axes.axvline(baseline.mean, color=style.GREEN, linestyle="--", label="baseline")
-
-
 def _caption(data: HangerReport) -> str:
     tension = words.with_interval(words.kilonewtons(data.tension_n), "kN")
     baseline = (
@@ -58,7 +90,7 @@ def _caption(data: HangerReport) -> str:
     )
     return (
         f"Tension by the latest test: {tension}. Dark bars lie in the 90 % interval. "
-        f"Dotted: nominal tension. {baseline}"
+        f"Dotted: nominal tension. {baseline} What lies out of view is named at the edge."
     )
 
 
