@@ -3,7 +3,8 @@
     python tests/benchmarks/kill_daemon.py --kills 30 --files 40
 
 The daemon is `python -m shm_daemon` with a pool of two processes and the real sampler. Files come
-in from time to time; each life lasts a random time from the moment the daemon comes to work.
+in from time to time; each life lasts a random time from the moment the daemon, or in most lives
+its first worker, comes to work.
 `tests/faults` holds the short form.
 """
 
@@ -24,10 +25,22 @@ from tests.helpers.feeds import Feed, assert_all_done_once
 from tests.helpers.workspaces import make_workspace
 
 
-def live_and_be_killed(workspace: Workspace, seconds: float) -> dict[Stage, int]:
-    """One life of the daemon, ended by SIGKILL; how many files stand where after it."""
+def until_a_step_is_done(workspace: Workspace) -> None:
+    """Waits until the workers of the present life have come to work."""
+    log, end = workspace.folder / "daemon.log", time.monotonic() + 60
+    while ": done" not in log.read_text().rpartition("watching")[2] and time.monotonic() < end:
+        time.sleep(0.02)
+
+
+def live_and_be_killed(workspace: Workspace, seconds: float, warm: bool) -> dict[Stage, int]:
+    """One life of the daemon, ended by SIGKILL; how many files stand where after it.
+
+    `warm` lets the time begin only when the workers, which import much, are at work.
+    """
     with real_daemon(workspace.folder) as daemon:
         until_serving(daemon.pid, workspace.folder)
+        if warm:
+            until_a_step_is_done(workspace)
         time.sleep(seconds)
     with workspace.store() as store:
         return store.stage_counts()
@@ -51,7 +64,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=30)
     parser.add_argument("--files", type=int, default=40)
-    parser.add_argument("--longest", type=float, default=4.0, help="longest life, in s")
+    parser.add_argument("--longest", type=float, default=2.0, help="longest life, in s")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     rng, began = random.Random(options.seed), time.monotonic()
@@ -61,7 +74,9 @@ def main() -> None:
         for life in range(options.kills):
             while len(feed.files) < options.files * (life + 1) / options.kills:
                 feed.drop()
-            counts = live_and_be_killed(workspace, rng.uniform(0.0, options.longest))
+            counts = live_and_be_killed(
+                workspace, rng.uniform(0.0, options.longest), warm=rng.random() < 0.7
+            )
             print(f"kill {life + 1}: " + ", ".join(f"{n} {s}" for s, n in counts.items() if n))
         live_in_peace(workspace, options.files)
         assert_all_done_once(feed)

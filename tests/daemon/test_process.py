@@ -10,7 +10,7 @@ import pytest
 
 from shm.store import Stage, Workspace
 from shm_daemon.__main__ import main
-from tests.helpers.daemons import quick_daemon, real_daemon
+from tests.helpers.daemons import quick_daemons, real_daemon
 from tests.helpers.workspaces import write_test
 
 
@@ -64,7 +64,9 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
         assert daemon.wait(10) == -9
     until(lambda: not processes_of(workspace), 20)
 
-    quick_daemon(workspace.folder, once=True).join(60)
+    with quick_daemons(workspace.folder) as daemons:
+        daemons.begin(once=True)
+        assert daemons.ended() == 0
     assert done(workspace) == 6
 
 

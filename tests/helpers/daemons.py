@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
+import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 
-import shm_daemon
-from shm.pipeline import steps
-from shm.store import Workspace
-from tests.helpers import quick_update
-
-
-def serve_quickly(folder: Path, once: bool) -> None:
-    """The daemon with the stand-in for the sampler and its steps in a thread."""
-    logging.basicConfig(filename=folder / "daemon.log", level=logging.INFO)
-    steps.update, steps.select = quick_update.update, quick_update.select  # type: ignore[assignment]
-    shm_daemon.run(Workspace.open(folder), once=once, make_executor=ThreadPoolExecutor)
-
-
-def quick_daemon(folder: Path, once: bool = False) -> ForkServerProcess:
-    """Begins one within milliseconds: it is forked off a process that has everything imported."""
-    context = multiprocessing.get_context("forkserver")
-    assert isinstance(context, ForkServerContext)
-    context.set_forkserver_preload(["__main__", __name__])
-    process = context.Process(target=serve_quickly, args=(folder, once))
-    process.start()
-    return process
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @contextmanager
@@ -47,10 +27,82 @@ def real_daemon(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
             daemon.kill()
 
 
-def until_serving(pid: int | None, folder: Path, seconds: float = 30.0) -> None:
+class QuickDaemons:
+    """Begins daemons within milliseconds, forked off a process that has everything imported.
+
+    They have the stand-in for the sampler and run their steps in a thread. One at a time.
+    """
+
+    def __init__(self, folder: Path):
+        self._nursery = subprocess.Popen(
+            [sys.executable, "-m", "tests.helpers.daemons", str(folder)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=ROOT,
+            text=True,
+        )
+
+    def begin(self, *, once: bool = False) -> int:
+        """Begins one; its process id."""
+        assert self._nursery.stdin is not None
+        self._nursery.stdin.write("once\n" if once else "serve\n")
+        self._nursery.stdin.flush()
+        return self._told()
+
+    def kill(self, pid: int) -> int:
+        """Kills one without warning; its exit code."""
+        os.kill(pid, signal.SIGKILL)
+        return self.ended()
+
+    def ended(self) -> int:
+        """Waits until the one at work has ended; its exit code."""
+        return self._told()
+
+    def close(self) -> None:
+        self._nursery.kill()
+        self._nursery.communicate()
+
+    def _told(self) -> int:
+        assert self._nursery.stdout is not None
+        return int(self._nursery.stdout.readline())
+
+
+@contextmanager
+def quick_daemons(folder: Path) -> Iterator[QuickDaemons]:
+    daemons = QuickDaemons(folder)
+    try:
+        yield daemons
+    finally:
+        daemons.close()
+
+
+def until_serving(pid: int, folder: Path, seconds: float = 30.0) -> None:
     """Waits until a daemon begun a moment ago holds the workspace."""
     lock, end = folder / "shm.lock", time.monotonic() + seconds
     while not lock.exists() or lock.read_text() != str(pid):
         if time.monotonic() > end:
             raise TimeoutError(f"process {pid} does not serve {folder}")
         time.sleep(0.005)
+
+
+def _nurse(folder: Path) -> None:
+    """Forks off a daemon for each line that comes in; tells its process id, then its exit code."""
+    import shm_daemon
+    from shm.pipeline import steps
+    from shm.store import Workspace
+    from tests.helpers import quick_update
+
+    logging.basicConfig(filename=folder / "daemon.log", level=logging.INFO)
+    steps.update, steps.select = quick_update.update, quick_update.select  # type: ignore[assignment]
+    for line in sys.stdin:
+        pid = os.fork()
+        if pid == 0:
+            once = line == "once\n"
+            shm_daemon.run(Workspace.open(folder), once=once, make_executor=ThreadPoolExecutor)
+            return
+        print(pid, flush=True)
+        print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), flush=True)
+
+
+if __name__ == "__main__":
+    _nurse(Path(sys.argv[1]))

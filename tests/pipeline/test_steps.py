@@ -17,7 +17,7 @@ from shm.pipeline import steps
 from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
-from shm.values import ModalTest, Recording
+from shm.values import Hanger, ModalTest, Recording
 from tests.helpers.nouns import NOW, a_posterior, a_response, a_test
 from tests.helpers.workspaces import put
 
@@ -50,8 +50,8 @@ class Logger:
     def read(self, path: Path) -> Recording:
         return Recording(path.name, (), 512.0, self.hanger, self.time)
 
-    def identify(self, records: Any, options: Any, *, test_id: str, length_m: float) -> Any:
-        self.asked = {"options": options, "length_m": length_m, "source": records[0].source}
+    def identify(self, records: Any, options: Any, *, test_id: str, hanger: Hanger) -> Any:
+        self.asked = {"options": options, "hanger": hanger.id, "source": records[0].source}
         test: ModalTest = a_test(test_id, hanger=records[0].hanger, time=records[0].time)
         dropped = (SimpleNamespace(count=2, what="poles", reason="too damped"),)
         return SimpleNamespace(
@@ -73,7 +73,7 @@ def test_a_recording_is_identified_in_its_band_and_with_its_hanger(
     (found,) = identify("h3.csv", band_low_hz=3.0, band_high_hz=50.0)
     options = logger.asked["options"]
     assert (options.band_low_hz, options.band_high_hz) == (3.0, 50.0)
-    assert (logger.asked["length_m"], logger.asked["source"]) == (12.0, "h3.csv")
+    assert (logger.asked["hanger"], logger.asked["source"]) == (3, "h3.csv")
     assert found.test.id == "h3"
     assert found.frequency_response is not None
     assert found.notes == ("renumbered", "2 poles: too damped")
