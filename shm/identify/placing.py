@@ -8,7 +8,8 @@ import numpy as np
 
 from shm.identify.contract import FoundMode
 from shm.identify.order import Expected, PlaneModes, assign_orders
-from shm.identify.planes import planes_of, shape_points
+from shm.identify.pairs import with_both_planes
+from shm.identify.planes import CLOSE, planes_of, shape_points
 from shm.values import NAN, PLANES, Hanger, Mode, Plane, ResponsePoint, ShapePoint
 
 
@@ -16,7 +17,7 @@ def placed(
     found: Sequence[FoundMode], points: Sequence[ResponsePoint], hanger: Hanger | None
 ) -> tuple[tuple[Mode, ...], tuple[str, ...]]:
     """The modes with plane, order and shape by position, plane by plane, and what was decided."""
-    planes = planes_of(found, points)
+    found, planes, pair_notes = with_both_planes(found, planes_of(found, points), points)
     groups = [
         [mode for mode, own in zip(found, planes, strict=True) if own == plane] for plane in PLANES
     ]
@@ -34,7 +35,7 @@ def placed(
         for plane, *columns in zip(PLANES, orders, groups, shapes, strict=True)
         for order, mode, shape in zip(*columns, strict=True)
     )
-    return modes, (*_plane_notes(points), *_order_notes(orders))
+    return modes, (*_plane_notes(points), *pair_notes, *_pair_notes(groups), *_order_notes(orders))
 
 
 def _plane_modes(
@@ -64,6 +65,19 @@ def _plane_notes(points: Sequence[ResponsePoint]) -> list[str]:
     if not any(point.plane for point in points):
         return ["no channel states its plane: all modes are taken as transverse"]
     return []
+
+
+def _pair_notes(groups: Sequence[Sequence[FoundMode]]) -> list[str]:
+    notes = []
+    for plane, group in zip(PLANES, groups, strict=True):
+        frequencies = np.array([mode.frequency_hz for mode in group])
+        pairs = int(np.sum(frequencies[1:] / frequencies[:-1] - 1 < CLOSE))
+        if pairs:
+            notes.append(
+                f"{pairs} pairs of {plane} modes are too near for one plane, so orders may be off: "
+                "measure with a biaxial accelerometer"
+            )
+    return notes
 
 
 def _order_notes(orders: Sequence[Sequence[int]]) -> list[str]:

@@ -25,7 +25,7 @@ def planes_of(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> li
     known = [plane for plane in PLANES if any(point.plane == plane for point in points)]
     if len(known) < 2:
         return [known[0] if known else "transverse"] * len(modes)
-    shares = np.array([_transverse_share(mode.shape, points) for mode in modes])
+    shares = np.array([transverse_share(mode.shape, points) for mode in modes])
     planes: list[Plane] = ["transverse" if share >= 0.5 else "longitudinal" for share in shares]
     frequencies = np.array([mode.frequency_hz for mode in modes])
     for first in range(len(modes) - 1):
@@ -33,7 +33,7 @@ def planes_of(modes: Sequence[FoundMode], points: Sequence[ResponsePoint]) -> li
     return planes
 
 
-def _transverse_share(shape: FloatArray, points: Sequence[ResponsePoint]) -> float:
+def transverse_share(shape: FloatArray, points: Sequence[ResponsePoint]) -> float:
     """Share of the energy a channel that is transverse."""
     transverse, longitudinal = (
         np.mean(shape[[point.plane == plane for point in points]] ** 2) for plane in PLANES
@@ -44,20 +44,23 @@ def _transverse_share(shape: FloatArray, points: Sequence[ResponsePoint]) -> flo
 def _separate(first: int, planes: list[Plane], shares: FloatArray, frequencies: FloatArray) -> None:
     """Moves one of the modes `first` and `first + 1` to the other plane where they must differ."""
     pair = [first, first + 1]
-    if planes[first] != planes[first + 1] or not _close(frequencies[pair[0]], frequencies[pair[1]]):
+    if planes[first] != planes[first + 1] or not is_close(
+        frequencies[pair[0]], frequencies[pair[1]]
+    ):
         return
     other: Plane = PLANES[1 - PLANES.index(planes[first])]
     share = shares if other == "transverse" else 1 - shares
     moved = pair[int(np.argmax(share[pair]))]
     crowded = any(
-        planes[index] == other and _close(frequencies[index], frequencies[moved])
+        planes[index] == other and is_close(frequencies[index], frequencies[moved])
         for index in range(len(planes))
     )
     if share[moved] >= LEAST_SHARE and not crowded:
         planes[moved] = other
 
 
-def _close(one: float, other: float) -> bool:
+def is_close(one: float, other: float) -> bool:
+    """Whether two frequencies are too near to be neighbours in one plane."""
     return bool(abs(one / other - 1) < CLOSE)
 
 

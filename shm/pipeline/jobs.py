@@ -14,6 +14,7 @@ from shm.errors import NothingThere, ShmError
 from shm.pipeline.terms import run_step, seed_of
 from shm.store import (
     Delivery,
+    IdentifiedTest,
     Lineage,
     Stage,
     Store,
@@ -116,11 +117,15 @@ class Jobs:
             settings,
             selected,
         )
+        return Step(run, partial(self._keep_tests, recording))
+
+    def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> None:
+        settings, hanger_id = self.workspace.settings, found[0].test.hanger
+        hangers = [asdict(h) for h in self.workspace.bridge.hangers if h.id == hanger_id]
         band = {name: getattr(settings, name) for name in ("band_low_hz", "band_high_hz")}
-        lineage = Lineage.of([recording.file.sha256, recording.file.sidecar_as], band)
-        return Step(
-            run, lambda found: self.store.identified(recording.id, found, lineage, self.clock())
-        )
+        inputs = [recording.file.sha256, recording.file.sidecar_as]
+        lineage = Lineage.of(inputs, {**band, "hanger": hangers})
+        self.store.identified(recording.id, found, lineage, self.clock())
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.test(test.id) for test in first]

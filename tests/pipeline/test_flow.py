@@ -452,3 +452,24 @@ def test_an_unknown_model_class_is_told_before_any_file_is_touched(tmp_path: Pat
     workspace = make_workspace(tmp_path / "bridge", settings={"models": "beam1,beam9"})
     with pytest.raises(UsageError, match="beam9"), a_flow(workspace):
         pytest.fail("began")
+
+
+@pytest.mark.parametrize(
+    ("changed", "same_input", "same_settings"),
+    [({}, True, True), ({"band_high_hz": 90.0}, True, False), ({"samples": 200}, True, True)],
+)
+def test_a_result_says_from_what_and_how_it_was_made(
+    tmp_path: Path, changed: dict[str, object], same_input: bool, same_settings: bool
+) -> None:
+    """Only what went into the identification changes its lineage; the posterior's has all."""
+    found = []
+    for label, settings in (("one", {}), ("two", changed)):
+        workspace = make_workspace(tmp_path / label, settings=settings)
+        spool(workspace, "t1")
+        ingest(workspace)
+        with workspace.store() as store:
+            found.append((store.tests(3)[0].lineage, store.posteriors(3)[0].lineage))
+    (test, posterior), (other_test, other_posterior) = found
+    assert (test.input_sha256 == other_test.input_sha256) is same_input
+    assert (test.settings_sha256 == other_test.settings_sha256) is same_settings
+    assert (posterior == other_posterior) is (not changed)
