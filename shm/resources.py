@@ -1,7 +1,8 @@
-"""Finds packaged files: inside the wheel beside this module, in a checkout beside the package."""
+"""Packaged files, found inside the wheel or beside the package; threads of numerical libraries."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -20,3 +21,13 @@ def migrations_folder() -> Path:
 def default_config() -> Path:
     """The commented `bridge.toml` that `shm init` writes."""
     return _locate("config/default.toml")
+
+
+def one_thread_a_process() -> None:
+    """Keeps the linear algebra of this process and its children to one thread, unless told else.
+
+    Many threads slow problems of our size down ten times and change the last digits. To be called
+    before numpy is imported.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")

@@ -13,6 +13,7 @@ from rich.markup import escape
 
 from shm import __version__
 from shm.errors import ShmError
+from shm.resources import one_thread_a_process
 
 UNEXPECTED = 1
 _LISTING = "shm_cli.listing"
@@ -111,6 +112,7 @@ def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | No
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with the code of the contract."""
+    one_thread_a_process()
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     sys.exit(run(arguments))
 

@@ -74,17 +74,22 @@ def drop_measured_baseline(workspace: Workspace) -> None:
 
 
 def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
-    """The season: hangers 3 and 7 every fortnight, the others at its start and end.
+    """The season: hangers 3 and 7 every three weeks, the others at its start, every third again.
 
     Hanger 3 is simulated at the most probable parameters of its measured baseline.
     """
     tests = []
     for hanger in workspace.bridge.hangers:
-        often = hanger.id in (MEASURED, LOSING)
         measured = store.posterior(hanger.id) if hanger.id == MEASURED else None
-        for week in range(0, 12, 2) if often else (0, 10):
+        for week in _weeks(hanger.id):
             tests.append(_planned(hanger, week, measured))
     return sorted(tests, key=lambda test: test.time)
+
+
+def _weeks(hanger_id: int) -> Sequence[int]:
+    if hanger_id in (MEASURED, LOSING):
+        return range(0, 13, 3)
+    return (0, 10) if hanger_id % 3 == 2 else (0,)
 
 
 def _planned(hanger: Hanger, week: int, measured: Posterior | None) -> PlannedTest:

@@ -12,13 +12,12 @@ from contextlib import contextmanager
 from importlib import import_module
 from multiprocessing.connection import wait
 
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from shm.resources import one_thread_a_process
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:
     """Processes that start clean, hold none of our files and locks, and die with us."""
-    for name in _ONE_THREAD:  # many threads slow small problems down and change the last digits
-        os.environ.setdefault(name, "1")
+    one_thread_a_process()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([])  # imports there would hold us up until they are done
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)

@@ -16,11 +16,13 @@ from scipy.special import logsumexp
 
 from shm.update.mixture import Normal, TMixture
 from shm.update.problem import Points, Problem
+from shm.update.search import Anchors
 from shm.update.tmcmc import Mover, normalised, systematic
 from shm.values import FloatArray
 
 _CLUSTERS = 16
 _FROM_PRIOR = 0.1
+_FROM_ANCHORS = 0.2
 _ENOUGH_ERROR = 0.05
 _BATCH = 4000
 _ADAPTATIONS = 4
@@ -84,10 +86,17 @@ class Weighted:
 
 
 def weigh(
-    problem: Problem, population: FloatArray, enough: float, rng: np.random.Generator
+    problem: Problem,
+    population: FloatArray,
+    anchors: Anchors,
+    enough: float,
+    rng: np.random.Generator,
 ) -> Weighted:
-    """Draws from the best mixture until `enough` effective ones and a standard error of 0.05."""
-    mixture, weighted = _adapted(problem, population, enough, rng)
+    """Draws from the best mixture until `enough` effective ones and a standard error of 0.05.
+
+    The first mixtures hold the anchors too, lest the population have missed one that matters.
+    """
+    mixture, weighted = _adapted(problem, population, anchors, enough, rng)
     for _ in range(_MOST_BATCHES):
         if _suffices(weighted, enough):
             break
@@ -100,12 +109,17 @@ def _suffices(weighted: Weighted, enough: float) -> bool:
 
 
 def _adapted(
-    problem: Problem, population: FloatArray, enough: float, rng: np.random.Generator
+    problem: Problem,
+    population: FloatArray,
+    anchors: Anchors,
+    enough: float,
+    rng: np.random.Generator,
 ) -> tuple[TMixture, Weighted]:
     """The mixture with the most effective draws among a few refits, and a first batch of it."""
     tried: list[tuple[TMixture, Weighted]] = []
     for _ in range(1 + _ADAPTATIONS):
-        mixture = TMixture.of(population, _CLUSTERS, rng)
+        clusters = TMixture.of(population, _CLUSTERS, rng)
+        mixture = clusters.joined(anchors.normals(0.0), _FROM_ANCHORS)
         weighted = _batch(problem, mixture, rng)
         tried.append((mixture, weighted))
         if _suffices(weighted, enough):

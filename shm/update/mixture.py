@@ -66,6 +66,11 @@ class TMixture:
         shares = np.array([len(cluster) for cluster in members], dtype=float)
         return cls([_shrunk(cluster, whole) for cluster in members], shares)
 
+    def joined(self, parts: Sequence[Normal], share: float) -> TMixture:
+        """This mixture with `parts` added, which get `share` of it in equal measure."""
+        added = np.full(len(parts), share / len(parts))
+        return TMixture([*self.parts, *parts], np.append((1 - share) * self.shares, added))
+
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draws (n, d) in random order."""
         counts = rng.multinomial(n, self.shares)

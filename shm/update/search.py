@@ -2,8 +2,9 @@
 
 Frequencies good to 1e-4 confine the parameters to a needle whose share of the prior is so small
 that no population meets it before the likelihood is already as narrow. Damped least squares
-(Levenberg 1944, Marquardt 1963) does: most starts end in it. The optima found become anchors, from
-which the sampler proposes at every stage with the covariance of that stage.
+(Levenberg 1944, Marquardt 1963) does: starts soon lie in the valley that leads there, and the best
+are followed to its end. The points found become anchors, from which the sampler proposes at every
+stage with the covariance of that stage.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ _STARTS = 40
 _KEPT = 12
 _PHASES = 3
 _STEPS = 8
+_LAST_STEPS = 80
 _FIRST_SIGMA = 0.02
 _APART = 0.1
 _DIFFERENCE = 1e-4
@@ -51,11 +53,16 @@ def search(problem: Problem, rng: np.random.Generator) -> Anchors:
     z = problem.draw_prior(_STARTS, rng)
     sigma = np.full(_STARTS, _FIRST_SIGMA)
     for _ in range(_PHASES):
-        z = _descend(problem, z, sigma)
-        sigma = problem.likelihood.model_error(problem.predict(z))
-    z = problem.fold(z)
-    best = _distinct(problem, z)
-    return Anchors(z[best], sigma[best], _slopes(problem, z[best]), problem)
+        z, sigma = _descend(problem, z, sigma, _STEPS)
+    promising = _distinct(problem, problem.fold(z))
+    ends, _ = _descend(problem, z[promising], sigma[promising], _LAST_STEPS)
+    z = problem.fold(np.vstack([z, ends]))
+    z = z[_distinct(problem, z)]
+    return Anchors(z, _model_error(problem, z), _slopes(problem, z), problem)
+
+
+def _model_error(problem: Problem, z: FloatArray) -> FloatArray:
+    return problem.likelihood.model_error(problem.predict(z))
 
 
 def _distinct(problem: Problem, z: FloatArray) -> IntArray:
@@ -67,12 +74,14 @@ def _distinct(problem: Problem, z: FloatArray) -> IntArray:
     return np.array(kept[:_KEPT])
 
 
-def _descend(problem: Problem, z: FloatArray, sigma: FloatArray) -> FloatArray:
-    """All points `z` (m, d) moved downhill together, each with its own model error (m,)."""
+def _descend(
+    problem: Problem, z: FloatArray, sigma: FloatArray, steps: int
+) -> tuple[FloatArray, FloatArray]:
+    """All points `z` (m, d) moved downhill together, and their model errors `sigma` (m,) after."""
     noise = _noise(problem, sigma)
     damping = np.full(len(z), 1e-2)
     residual, cost = _residual(problem, z, noise)
-    for _ in range(_STEPS):
+    for _ in range(steps):
         step = _step(_slopes(problem, z) / noise[..., None], residual, z, damping)
         trial_residual, trial_cost = _residual(problem, z + step, noise)
         better = trial_cost < cost
@@ -80,7 +89,7 @@ def _descend(problem: Problem, z: FloatArray, sigma: FloatArray) -> FloatArray:
         residual = np.where(better[:, None], trial_residual, residual)
         cost = np.where(better, trial_cost, cost)
         damping = np.where(better, damping * 0.3, damping * 4).clip(1e-9, 1e8)
-    return z
+    return z, _model_error(problem, z)
 
 
 def _noise(problem: Problem, sigma: FloatArray) -> FloatArray:

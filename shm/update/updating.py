@@ -15,7 +15,7 @@ from shm.update.importance import Weighted, weigh
 from shm.update.likelihood import Likelihood
 from shm.update.mixture import Normal
 from shm.update.problem import Problem
-from shm.update.search import search
+from shm.update.search import Anchors, search
 from shm.update.tmcmc import Mover, Population, normalised, sample, systematic
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency, Selection
 
@@ -60,9 +60,11 @@ def update(
         model.refuse(test)
     problem = Problem(model, Likelihood(tests, options.repeat))
     rng = np.random.default_rng(options.seed)
-    runs = _independent_runs(problem, options.samples, rng, progress)
+    progress(model.name, 0.0)
+    anchors = search(problem, rng)
+    runs = _independent_runs(problem, anchors, options.samples, rng, progress)
     pooled = _pooled(runs, rng)
-    weighted = weigh(problem, pooled, _ENOUGH * options.samples, rng)
+    weighted = weigh(problem, pooled, anchors, _ENOUGH * options.samples, rng)
     samples, predicted = _draws(problem, weighted, options.samples, rng)
     log_likelihood = problem.likelihood.joint(predicted, samples[:, -1])
     progress(model.name, 1.0)
@@ -87,10 +89,8 @@ def update(
 
 
 def _independent_runs(
-    problem: Problem, samples: int, rng: np.random.Generator, progress: Progress
+    problem: Problem, anchors: Anchors, samples: int, rng: np.random.Generator, progress: Progress
 ) -> list[Population]:
-    progress(problem.model.name, 0.0)
-    anchors = search(problem, rng)
     runs = []
     for done in range(1, _RUNS + 1):
         runs.append(sample(problem, anchors, max(samples // _RUNS, _FEWEST_PARTICLES), rng))
