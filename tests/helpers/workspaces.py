@@ -41,7 +41,7 @@ def make_workspace(
     return Workspace.initialise(folder, config)
 
 
-def modes_of(hanger: Hanger, tension: float, modes: int = 2) -> tuple[Mode, ...]:
+def modes_of(hanger: Hanger, tension: float, modes: int = 6) -> tuple[Mode, ...]:
     """The first modes of a clamped beam, in both planes, at a fraction of the nominal tension."""
     model = build("beam1", hanger)
     theta = np.array([[tension if name == "theta_F" else 1.0 for name in model.parameter_names]])
