@@ -7,11 +7,12 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
-from shm.pipeline.terms import run_step, seed_of
+from shm.pipeline.terms import seed_of
 from shm.store import (
     Delivery,
     IdentifiedTest,
@@ -27,6 +28,11 @@ from shm.values import Alert, Hanger
 
 Clock = Callable[[], datetime]
 Notifier = Callable[[Hook, Alert], None]
+
+
+def run_step(name: str, *arguments: Any) -> Any:
+    """Runs a step of `shm.pipeline.steps`, which is imported in the process that computes."""
+    return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What the steps agree on: which classes compete, which seed, how a refusal reads, how to run one.
+"""What the steps agree on: which classes compete, which seed, how a refusal reads.
 
 Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +18,8 @@ from shm.store import StoredRecording
 from shm.values import Hanger
 
 
-def run_step(name: str, *arguments: Any) -> Any:
-    """Runs a step of `shm.pipeline.steps`, which is imported in the process that computes."""
-    return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
-
-
 def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
+    """The selected class of a hanger, or all that the settings name where none is selected yet."""
     names = (selected[hanger.id],) if hanger.id in selected else settings.model_names
     return tuple(build(name, hanger) for name in names)
 
