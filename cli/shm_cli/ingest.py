@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import rich_click as click
 
@@ -108,7 +109,6 @@ def _finish(flow: Flow, store: Store, ids: Sequence[int]) -> None:
 
 
 def _row(path: Path, outcome: Outcome, recording: StoredRecording) -> dict[str, object]:
-    reason = recording.reason or {}
     refused = recording.stage is Stage.REFUSED
     return {
         "file": path.name,
@@ -117,11 +117,20 @@ def _row(path: Path, outcome: Outcome, recording: StoredRecording) -> dict[str, 
         "stage": recording.stage.value,
         "hanger": recording.hanger,
         "sha256": recording.file.sha256,
-        "reason": f"{reason['message']} {reason['remedy']}" if reason else None,
+        "reason": _sentence(recording.reason) if recording.reason else None,
     }
 
 
 _REFUSED = "refused"
+
+
+def _sentence(reason: Mapping[str, Any]) -> str:
+    """Line and channel where they are known, what is wrong, what to do."""
+    line = f"line {reason['line']}: " if reason["line"] is not None else ""
+    channel = f"channel {reason['channel']}: " if reason["channel"] else ""
+    return f"{line}{channel}{reason['message']} {reason['remedy']}"
+
+
 _OUTCOMES = {
     Outcome.NEW: "taken in",
     Outcome.RESUMED: "taken in",
