@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from shm.identify.order import PlaneModes, assign_orders
+from shm.identify.order import Expected, PlaneModes, assign_orders
 from shm.simulate import HangerState, natural_frequencies
 from shm.values import Hanger
 
@@ -83,3 +85,16 @@ def test_shapes_number_two_modes_that_frequencies_cannot() -> None:
     assert assign_orders([PlaneModes(5.0 * orders, position, shapes)]) == [[2, 4]]
     blind = PlaneModes(5.0 * orders, np.empty(0), np.empty((2, 0)))
     assert assign_orders([blind]) == [[1, 2]]
+
+
+def test_a_described_hanger_keeps_its_numbers_when_its_first_modes_are_lost() -> None:
+    """Modes 1 to 3 and 7 lie in the noise: by their pattern alone the rest could be 1, 2, 3, ..."""
+    area, second_moment = np.pi * 0.13**2 / 4, np.pi * 0.13**4 / 64
+    hanger = Hanger(14, 21.8, 200e9, area, second_moment, 7800 * area, nominal_tension_n=711e3)
+    state = HangerState(661e3, 9.3e7, 6.6e7, 1.4e7, 1.4e7)
+    found = [3, 4, 5, 7, 8, 9, 10, 11]
+    planes = [_plane(each[found]) for each in natural_frequencies(hanger, state, 12)]
+    orders = [index + 1 for index in found]
+    assert assign_orders(planes, Expected.of(hanger)) == [orders, orders]
+    ill_known = replace(hanger, nominal_tension_n=950e3)
+    assert assign_orders(planes, Expected.of(ill_known)) == [orders, orders]
