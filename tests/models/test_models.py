@@ -7,23 +7,13 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.models import MODELS, Model, build
-from shm.values import AddedMass, Hanger, ModalTest
-
-DIAMETER = 0.130
-HANGER = Hanger(
-    id=3,
-    length_m=12.0,
-    elastic_modulus_pa=200e9,
-    area_m2=np.pi * DIAMETER**2 / 4,
-    second_moment_m4=np.pi * DIAMETER**4 / 64,
-    mass_per_length_kg_m=7800 * np.pi * DIAMETER**2 / 4,
-    nominal_tension_n=711e3,
-)
+from shm.values import AddedMass, ModalTest
+from tests.helpers.hangers import HANGER_3
 
 
 @pytest.fixture(params=MODELS)
 def model(request: pytest.FixtureRequest) -> Model:
-    return build(request.param, HANGER)
+    return build(request.param, HANGER_3)
 
 
 @pytest.fixture
@@ -56,7 +46,7 @@ def test_a_swap_changes_no_frequency(model, theta) -> None:
 
 
 def test_shapes_reach_one_and_vanish_at_the_ends(model, theta) -> None:
-    length = theta[0, model.parameter_names.index("theta_L")] * HANGER.length_m
+    length = theta[0, model.parameter_names.index("theta_L")] * HANGER_3.length_m
     x = np.linspace(0, length, 501)
     for plane in ("transverse", "longitudinal"):
         shape = model.shape(theta[0], plane, 2, x)
@@ -80,25 +70,25 @@ def test_a_beam_refuses_a_test_with_a_known_mass(model) -> None:
 
 def test_an_unknown_class_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UsageError, match="beam1, beam2"):
-        build("beam7", HANGER)
+        build("beam7", HANGER_3)
 
 
 def test_beam_1_of_hanger_3_gives_the_exact_first_frequency() -> None:
     """5.58 Hz at 12 m, 7.67 Hz at 9.817 m; the thesis prints 5.64 and 7.70 (ERRATA)."""
-    model = build("beam1", HANGER)
+    model = build("beam1", HANGER_3)
     long, short = model.frequencies_hz(np.array([[1.0, 1.0], [1.0, 9.817 / 12]]), 1)[:, 0, 0]
     assert long == pytest.approx(5.58, abs=0.005)
     assert short == pytest.approx(7.67, abs=0.005)
 
 
 def test_beam_2_with_stiff_springs_is_beam_1() -> None:
-    stiff = build("beam2", HANGER).frequencies_hz(np.array([[1.1, 0.97, 15, 15, 15, 15]]), 6)
-    clamped = build("beam1", HANGER).frequencies_hz(np.array([[1.1, 0.97]]), 6)
+    stiff = build("beam2", HANGER_3).frequencies_hz(np.array([[1.1, 0.97, 15, 15, 15, 15]]), 6)
+    clamped = build("beam1", HANGER_3).frequencies_hz(np.array([[1.1, 0.97]]), 6)
     np.testing.assert_allclose(stiff, clamped, rtol=1e-7)
 
 
 def test_the_springs_of_beam_2_act_in_their_own_plane() -> None:
-    model = build("beam2", HANGER)
+    model = build("beam2", HANGER_3)
     base = model.pack(dict.fromkeys(model.parameter_names, 8.0) | {"theta_F": 1, "theta_L": 1})
     reference = model.frequencies_hz(base[None], 4)[0]
     for name, plane in {"log10_k1": 0, "log10_k3": 0, "log10_k2": 1, "log10_k4": 1}.items():
