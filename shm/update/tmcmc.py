@@ -100,27 +100,41 @@ class Mover:
         normals = anchors.normals(self._floor)
         shares = np.append(np.full(len(normals), 1 / len(normals)), 1.0)
         jumps = TMixture([*normals, self._centre], shares)
+        density = self._problem.log_posterior(points, self._floor)
         for _ in range(_ROUNDS):
-            points = self.walk(points, 2, rng)
-            points, _ = self._accept(points, *self._jump(points, jumps, rng), rng)
+            points, density = self._walk(points, density, 2, rng)
+            proposal = self._jump(points, jumps, rng)
+            points, density, _ = self._accept(points, density, *proposal, rng)
         return points
 
     def walk(self, points: Points, steps: int, rng: np.random.Generator) -> Points:
         """Local steps alone."""
+        density = self._problem.log_posterior(points, self._floor)
+        return self._walk(points, density, steps, rng)[0]
+
+    def _walk(
+        self, points: Points, density: FloatArray, steps: int, rng: np.random.Generator
+    ) -> tuple[Points, FloatArray]:
         for _ in range(steps):
-            points, rate = self._accept(points, *self._crank_nicolson(points, rng), rng)
+            proposal = self._crank_nicolson(points, rng)
+            points, density, rate = self._accept(points, density, *proposal, rng)
             factor = np.exp(0.5 * (rate - _TARGET_ACCEPTANCE))
             self.step = float(np.clip(self.step * factor, 0.02, 1))
-        return points
+        return points, density
 
     def _accept(
-        self, points: Points, proposal: Points, log_ratio: FloatArray, rng: np.random.Generator
-    ) -> tuple[Points, float]:
-        """Metropolis and Hastings; gives the rate of acceptance too."""
-        before = self._problem.log_posterior(points, self._floor)
-        after = self._problem.log_posterior(proposal, self._floor)
-        accepted = np.log(rng.random(len(before))) < after - before + log_ratio
-        return points.replaced(accepted, proposal), float(accepted.mean())
+        self,
+        points: Points,
+        density: FloatArray,
+        proposal: Points,
+        log_ratio: FloatArray,
+        rng: np.random.Generator,
+    ) -> tuple[Points, FloatArray, float]:
+        """Metropolis and Hastings: points, their log posterior `density`, rate of acceptance."""
+        proposed = self._problem.log_posterior(proposal, self._floor)
+        accepted = np.log(rng.random(len(density))) < proposed - density + log_ratio
+        density = np.where(accepted, proposed, density)
+        return points.replaced(accepted, proposal), density, float(accepted.mean())
 
     def _crank_nicolson(
         self, points: Points, rng: np.random.Generator
