@@ -40,5 +40,5 @@ def check(ctx: click.Context) -> None:
     Example: shm db check
     """
     with open_workspace(ctx).store() as store:
-        held = len(store.recordings())
+        held = sum(store.stage_counts().values())
     click.echo(f"The store has the present schema and holds {held} recordings.")

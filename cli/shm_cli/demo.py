@@ -109,7 +109,7 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes]) -> Iterator[int]:
         refused = store.recordings(Stage.REFUSED)
         if refused:
             raise ShmError(f"a file of the demo was refused: {refused[0].reason}.")
-        yield len(store.recordings(Stage.DONE))
+        yield store.stage_counts()[Stage.DONE]
         time.sleep(_POLL_S)
     raise ShmError("the demo's daemon did not finish.", remedy="Read daemon.log in its folder.")
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 
 from shm.documents import dump, load_modes, modes_document
-from shm.read import sidecar_path, write
+from shm.read import write
+from shm.read.atomic import replace_text
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Store, Workspace
 from shm.values import Hanger, Posterior
@@ -70,7 +70,7 @@ def drop_measured_baseline(workspace: Workspace) -> None:
     """The thesis's measured frequencies of hanger 3, as a test before the season."""
     (test,) = load_modes(thesis.PRINTINGS["table 1.1"])
     test = replace(test, id="thesis_table_1_1", time=_START - timedelta(weeks=1))
-    _put(workspace.spool / "hanger03_measured.modes.json", dump(modes_document([test])))
+    replace_text(workspace.spool / "hanger03_measured.modes.json", dump(modes_document([test])))
 
 
 def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
@@ -129,8 +129,6 @@ def _state_of(posterior: Posterior, hanger: Hanger) -> HangerState:
 
 def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[PlannedTest]:
     """Simulates each test and drops its file into the spool."""
-    kept = workspace.folder / "simulated"
-    kept.mkdir()
     for test in tests:
         recording = hammer_test(
             test.hanger,
@@ -141,15 +139,5 @@ def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[Plan
             temperature_c=test.temperature_c,
             source=test.file_name,
         )
-        path = kept / test.file_name
-        write(recording, path)
-        for part in (sidecar_path(path), path):
-            if part.exists():
-                part.rename(workspace.spool / part.name)
+        write(recording, workspace.spool / test.file_name)
         yield test
-
-
-def _put(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.rename(path)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 import rich_click as click
 
-from shm.store import DeliveryState, Stage, Store, Workspace
+from shm.store import DeliveryState, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
 
 
@@ -45,7 +44,6 @@ def command(ctx: click.Context, as_json: bool) -> None:
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
-    stages = Counter(recording.stage for recording in store.recordings())
     models = store.selected_models()
     hangers = []
     for hanger in workspace.bridge.hangers:
@@ -62,7 +60,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     quarantined = workspace.quarantine.folder.glob("*.reason.json")
     return {
         "bridge": workspace.bridge.name,
-        "recordings": {stage.value: stages[stage] for stage in Stage},
+        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
         "spool": sum(path.is_file() for path in workspace.spool.rglob("*")),
         "quarantine": sum(1 for _ in quarantined),
         "alerts": len(store.alerts()),

@@ -19,8 +19,5 @@ EVIDENCE = {"beam1": 434.49, "beam2": 497.11}
 DEVIATION_FROM_NOMINAL = {"beam1": 0.05, "beam2": -0.04}
 """Table 6.1: most probable tension over nominal tension, less 1."""
 
-MOST_PROBABLE = {"beam1": {"theta_L": 0.97, "theta_F": 1.1}}
-"""Section 5.1."""
-
 EXACT_FIRST_FREQUENCY_HZ = {12.0: 5.58, 9.817: 7.67}
 """First clamped-beam frequency at 711 kN by length, right where tables A.6 and A.7 are not."""

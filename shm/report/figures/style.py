@@ -25,7 +25,6 @@ PALETTE = {
     "purple": PURPLE,
     "red": RED,
 }
-SERIES = (BLUE, ORANGE, GREEN, PURPLE)
 PLANE_COLOURS: dict[Plane, str] = {"transverse": BLUE, "longitudinal": ORANGE}
 PLANE_MARKERS: dict[Plane, str] = {"transverse": "o", "longitudinal": "s"}
 
