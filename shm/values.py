@@ -36,8 +36,40 @@ class Thresholds:
 
 
 @dataclass(frozen=True)
+class EndPlate:
+    """The plate welded to each end of a round rod, which is slotted into it over `slot_m`.
+
+    Its width goes linearly from `end_width_m` at the end face to `neck_width_m`. The deck-end
+    plate lies along the bridge, the arch-end plate across it. Springs on the end faces' edges are
+    given per node; the nodes are `edge_node_spacing_m` apart.
+    """
+
+    length_m: float
+    thickness_m: float
+    end_width_m: float
+    neck_width_m: float
+    slot_m: float
+    edge_node_spacing_m: float
+
+
+@dataclass(frozen=True)
+class Turnbuckle:
+    """A coupler in the bar, centred at `x_m`; its mass and stiffness replace the bar's there."""
+
+    x_m: float
+    length_m: float
+    mass_kg: float
+    bending_stiffness_n_m2: float
+
+
+@dataclass(frozen=True)
 class Hanger:
-    """One hanger as its owner describes it: geometry, material, nominal tension."""
+    """One hanger as its owner describes it: geometry, material, nominal tension.
+
+    `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of
+    the solid section's bending stiffness that a strand has. `models` names the model classes that
+    the owner admits; empty: all that the settings name.
+    """
 
     id: int
     length_m: float
@@ -48,10 +80,16 @@ class Hanger:
     nominal_tension_n: float
     name: str = ""
     thresholds: Thresholds = field(default_factory=Thresholds)
+    diameter_m: float = NAN
+    poissons_ratio: float = 0.3
+    bending_stiffness_factor: float = 1.0
+    plate: EndPlate | None = None
+    turnbuckles: tuple[Turnbuckle, ...] = ()
+    models: tuple[str, ...] = ()
 
     @property
     def bending_stiffness_n_m2(self) -> float:
-        return self.elastic_modulus_pa * self.second_moment_m4
+        return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +228,8 @@ class Posterior:
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
-    batches of draws, the worst parameter (1 is converged).
+    batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
+    `tmcmc` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
     """
 
     model: str
@@ -209,6 +248,7 @@ class Posterior:
     tests: tuple[str, ...]
     seed: int
     seconds: float
+    method: str = "tmcmc"
 
     def parameter(self, name: str) -> FloatArray:
         """Samples of one parameter, shape (samples,)."""

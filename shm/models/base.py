@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -13,20 +13,31 @@ from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
 Swap = tuple[tuple[str, ...], tuple[str, ...]]
 
 
+def silent(fraction: float) -> None:
+    """No progress is shown."""
+
+
 class Model:
     """A model class of one hanger. A member declares its parameters and overrides two verbs.
 
     `bounds` are the uniform priors of the parameters; `swaps` lists groups of parameters that can
     be exchanged without changing any frequency, so that sampling may keep to one of the copies.
+    `expensive` says that an evaluation costs much more than a beam's.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     bounds: ClassVar[Mapping[str, tuple[float, float]]]
-    swaps: ClassVar[Sequence[Swap]] = ()
+    swaps: Sequence[Swap] = ()
+    expensive: ClassVar[bool] = False
 
     def __init__(self, hanger: Hanger):
         self.hanger = hanger
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        """Why this class cannot describe `hanger`; empty where it can."""
+        return ""
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -43,6 +54,13 @@ class Model:
         The second axis is the plane, transverse and longitudinal.
         """
         raise TypeError(f"{type(self).__name__} does not say how its frequencies follow.")
+
+    def reference_frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        """The same without any approximation made for speed, where the class makes one."""
+        return self.frequencies_hz(theta, modes)
+
+    def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
+        """Does what has to be done once before many evaluations; `progress` hears the fraction."""
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
         """The mode shape of one parameter set (parameters,) at `x_m` (points,), largest value 1."""

@@ -1,0 +1,70 @@
+"""The reduced basis of one solid class of one hanger, from memory, from disk or made now."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from shm.models.solid import cache
+from shm.models.solid.affine import AffineSystem
+from shm.models.solid.geometry import Geometry
+from shm.models.solid.material import Material
+from shm.models.solid.reduction import TARGET_ERROR, Box, Reduction, reduce
+from shm.models.solid.support import Support
+from shm.values import Plane
+
+# To be raised whenever the same description gives another basis than before.
+_VERSION = 1
+_BATCH_OF_MODES = 6
+_CELLS_A_MODE = 6
+
+_made: dict[str, Reduction] = {}
+
+
+@dataclass(frozen=True)
+class Description:
+    """All that a basis depends on; `lower` and `upper` bound tension (N) and log10 k."""
+
+    geometry: Geometry
+    material: Material
+    support: Support
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def system(self, plane: Plane, modes: int) -> AffineSystem:
+        """The full model's bending plane, on a mesh that resolves that many modes."""
+        # scikit-fem takes a second to import; once bases are made, nothing needs it.
+        from shm.models.solid.assembly import assembled
+
+        fine = self.geometry.fineness
+        fine = replace(fine, rod=max(fine.rod, _CELLS_A_MODE * modes))
+        return assembled(replace(self.geometry, fineness=fine), self.material, self.support, plane)
+
+    def key(self, modes: int) -> str:
+        """A name that changes with anything that would change the basis."""
+        text = json.dumps([_VERSION, TARGET_ERROR, modes, asdict(self)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def rounded_up(modes: int) -> int:
+    """The number of modes that a basis for `modes` is made for."""
+    return -(-modes // _BATCH_OF_MODES) * _BATCH_OF_MODES
+
+
+def transverse_basis(
+    description: Description, modes: int, progress: Callable[[float], None]
+) -> Reduction:
+    """The basis for the first `modes` transverse modes."""
+    modes = rounded_up(modes)
+    key = description.key(modes)
+    found = _made.get(key) or cache.load(key)
+    if found is None:
+        box = Box(np.array(description.lower), np.array(description.upper))
+        found = reduce(description.system("transverse", modes), box, modes, progress)
+        cache.save(key, found)
+    _made[key] = found
+    return found

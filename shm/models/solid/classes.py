@@ -1,0 +1,207 @@
+"""The solid model classes: s1, s2 (plain rods), solid0, solid1, solid2 (thesis chapter 3, 5.2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from shm.models.base import Model, silent
+from shm.models.solid.affine import natural_modes
+from shm.models.solid.basis import Description, rounded_up, transverse_basis
+from shm.models.solid.geometry import Fineness, Geometry
+from shm.models.solid.material import Material
+from shm.models.solid.support import (
+    ALL_SPRINGS,
+    AXIAL,
+    AXIAL_SPRINGS,
+    FIXED,
+    Support,
+)
+from shm.values import PLANES, FloatArray, Hanger, Plane
+
+_SPRING_BOUNDS = (5.0, 12.0)
+_BLOCK = 500
+_ROUND_WITHIN = 0.01
+
+# The two plates are alike but for a quarter turn. Seen from the arch end and with the planes
+# exchanged, the hanger is the same, so that one basis serves both planes.
+_MIRRORED = {
+    "log10_k1": "log10_k4",
+    "log10_k2": "log10_k3",
+    "log10_k3": "log10_k2",
+    "log10_k4": "log10_k1",
+    "log10_krx": "log10_kly",
+    "log10_klx": "log10_kry",
+}
+
+
+class SolidModel(Model):
+    """A three-dimensional finite element model; members say what is modelled and how it is held.
+
+    `frequencies_hz` uses a reduced basis, right to 0.02 % of the full model over the prior box;
+    `reference_frequencies_hz` solves the full model.
+    """
+
+    expensive = True
+    support: ClassVar[Support] = FIXED
+    with_plates: ClassVar[bool] = True
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        return _not_a_round_rod(hanger) or (
+            "it needs the end plates' dimensions: give a [hanger.plate] table."
+            if hanger.plate is None
+            else ""
+        )
+
+    def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
+        """Makes the reduced basis for that many modes a plane, where it is not there yet."""
+        transverse_basis(self.description(), modes, progress)
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        projected = transverse_basis(self.description(), modes, silent).projected
+        frequencies = np.empty((len(theta), 2, modes))
+        for start in range(0, len(theta), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            for index, plane in enumerate(PLANES):
+                points = self._points(theta[block], plane)
+                frequencies[block, index] = projected.frequencies_hz(points, modes)
+        return frequencies
+
+    def reference_frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        system = self.description().system("transverse", rounded_up(modes))
+        planes = [
+            [
+                natural_modes(system, float(point[0]), 10 ** point[1:], modes).frequencies_hz
+                for point in self._points(theta, plane)
+            ]
+            for plane in PLANES
+        ]
+        return np.stack(planes, axis=1)
+
+    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        # Slow to import, and seldom needed.
+        from scipy.interpolate import CubicSpline
+
+        basis = transverse_basis(self.description(), order, silent)
+        vector = basis.projected.mode(self._points(theta[None], plane)[0], order)
+        along = CubicSpline(basis.axis_m, basis.deflections @ vector)
+        ends = self._ends_m()
+        depth = x_m - ends[0] if plane == "transverse" else ends[1] - x_m
+        fine = np.linspace(0, ends[1] - ends[0], 40 * order + 1)
+        from_deck = fine[20] if plane == "transverse" else fine[-21]
+        scale = np.copysign(np.abs(along(fine)).max(), along(from_deck))
+        inside = (x_m >= ends[0]) & (x_m <= ends[1])
+        return np.where(inside, along(depth) / scale, 0.0)
+
+    def description(self) -> Description:
+        """What the basis depends on."""
+        lower, upper = self.prior.lower.copy(), self.prior.upper.copy()
+        lower[0] *= self.hanger.nominal_tension_n
+        upper[0] *= self.hanger.nominal_tension_n
+        kept = [0, *(self.parameter_names.index(n) for n in self._slots("transverse"))]
+        geometry = Geometry(
+            length_m=float(np.diff(self._ends_m())[0]),
+            diameter_m=self.hanger.diameter_m,
+            plate=self.hanger.plate if self.with_plates else None,
+            fineness=Fineness(),
+        )
+        material = Material(
+            self.hanger.elastic_modulus_pa,
+            self.hanger.poissons_ratio,
+            self.hanger.mass_per_length_kg_m / self.hanger.area_m2,
+        )
+        return Description(geometry, material, self.support, tuple(lower[kept]), tuple(upper[kept]))
+
+    def _ends_m(self) -> tuple[float, float]:
+        """Where the model begins and ends along the hanger."""
+        return 0.0, self.hanger.length_m
+
+    def _points(self, theta: FloatArray, plane: Plane) -> FloatArray:
+        """Tension in N and log10 k as the transverse system takes them, (n, 1 + springs)."""
+        columns = [self.parameter_names.index(name) for name in self._slots(plane)]
+        tension = theta[:, :1] * self.hanger.nominal_tension_n
+        return np.hstack([tension, theta[:, columns]])
+
+    def _slots(self, plane: Plane) -> list[str]:
+        """The parameters that stand for the springs of the transverse system."""
+        slots = self.support.springs("transverse")
+        return list(slots) if plane == "transverse" else [_MIRRORED[name] for name in slots]
+
+
+def _not_a_round_rod(hanger: Hanger) -> str:
+    """Why the hanger is not the uniform round rod that is meshed; empty where it is."""
+    if math.isnan(hanger.diameter_m):
+        return "it models a round rod: give diameter_m."
+    disc = math.pi * hanger.diameter_m**2 / 4
+    if abs(hanger.area_m2 / disc - 1) > _ROUND_WITHIN:
+        return (
+            f"it models a solid round rod, and area_m2 is not that of diameter_m ({disc:.4g} m2)."
+        )
+    if hanger.bending_stiffness_factor != 1:
+        return "it models a solid rod, not a strand (bending_stiffness_factor is not 1)."
+    return "it does not model turnbuckles." if hanger.turnbuckles else ""
+
+
+class S1(SolidModel):
+    """A plain rod of the whole length, clamped."""
+
+    name = "s1"
+    title = "Solid s1: plain rod of the whole length, fixed ends"
+    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+    with_plates = False
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        return _not_a_round_rod(hanger)
+
+
+class S2(SolidModel):
+    """A plain rod between the end plates, clamped."""
+
+    name = "s2"
+    title = "Solid s2: plain rod between the end plates, fixed ends"
+    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+    with_plates = False
+
+    def _ends_m(self) -> tuple[float, float]:
+        plate_m = self.hanger.plate.length_m if self.hanger.plate else 0.0
+        return plate_m, self.hanger.length_m - plate_m
+
+
+class Solid0(SolidModel):
+    """The hanger with its end plates, end faces fixed."""
+
+    name = "solid0"
+    title = "Solid 0: with end plates, faces fixed"
+    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+
+
+class Solid1(SolidModel):
+    """The end faces on springs along the hanger's axis and in the faces' planes."""
+
+    name = "solid1"
+    title = "Solid 1: with end plates, springs in x, y and z"
+    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "theta_F": (0.5, 5.0),
+        **dict.fromkeys(
+            (*AXIAL, "log10_klx", "log10_kly", "log10_krx", "log10_kry"),
+            _SPRING_BOUNDS,
+        ),
+    }
+    support = ALL_SPRINGS
+
+
+class Solid2(SolidModel):
+    """The end faces on springs along the hanger's axis, held in the faces' planes."""
+
+    name = "solid2"
+    title = "Solid 2: with end plates, springs in z"
+    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "theta_F": (0.5, 5.0),
+        **dict.fromkeys(AXIAL, _SPRING_BOUNDS),
+    }
+    support = AXIAL_SPRINGS

@@ -1,0 +1,144 @@
+"""The shape of a round rod with or without end plates, as a map from a grid of unit cells.
+
+x is transverse, y longitudinal, z along the hanger from the deck end. Only the quarter x, y >= 0 is
+meshed. In the section, unit (0, 0) is the core that rod and plates share, (1, 0) and (0, 1) are
+the rest of the rod within a plate's thickness, (1, 1) is the rod outside of both plates, and the
+units beyond 2 are a plate's wing: along y at the deck end, along x at the arch end. So one grid
+serves rod and both plates, which are rotated by 90 degrees to each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from shm.values import EndPlate, FloatArray
+
+_WING_GRADING = 1.4
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """Cells along the free rod, each overlap, each bare plate; units across each plate's wing.
+
+    `section` is how often each unit of the section is divided, both ways.
+    """
+
+    rod: int = 36
+    overlap: int = 4
+    bare_plate: int = 4
+    wing: int = 3
+    section: int = 1
+
+    @property
+    def plate_cells(self) -> int:
+        """Cells from the axis to the far edge of a plate."""
+        return (2 + self.wing) * self.section
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A stretch of the hanger with the same cells in every section."""
+
+    start_m: float
+    end_m: float
+    cells: int
+    has_rod: bool
+    plate_along: str = ""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A rod of `diameter_m` over `length_m`, or slotted into a plate at each end."""
+
+    length_m: float
+    diameter_m: float
+    plate: EndPlate | None
+    fineness: Fineness
+
+    @property
+    def radius_m(self) -> float:
+        return self.diameter_m / 2
+
+    @property
+    def core_m(self) -> float:
+        """Half the side of the square core: half the plate's thickness, where there is one."""
+        return self.plate.thickness_m / 2 if self.plate else 0.5 * self.radius_m
+
+    def zones(self) -> tuple[Zone, ...]:
+        """The stretches from the deck end to the arch end."""
+        fine, length, plate = self.fineness, self.length_m, self.plate
+        if plate is None:
+            return (Zone(0.0, length, fine.rod, has_rod=True),)
+        bare, end = plate.length_m - plate.slot_m, plate.length_m
+        return (
+            Zone(0.0, bare, fine.bare_plate, has_rod=False, plate_along="y"),
+            Zone(bare, end, fine.overlap, has_rod=True, plate_along="y"),
+            Zone(end, length - end, fine.rod, has_rod=True),
+            Zone(length - end, length - bare, fine.overlap, has_rod=True, plate_along="x"),
+            Zone(length - bare, length, fine.bare_plate, has_rod=False, plate_along="x"),
+        )
+
+    def section_cells(self, zone: Zone) -> Iterator[tuple[int, int]]:
+        """The cells (i, j) of the grid that the sections of `zone` have."""
+        across = self.fineness.section
+        if zone.has_rod:
+            yield from product(range(2 * across), repeat=2)
+        if zone.plate_along:
+            begin = 2 * across if zone.has_rod else 0
+            for far, near in product(range(begin, self.fineness.plate_cells), range(across)):
+                yield (far, near) if zone.plate_along == "x" else (near, far)
+
+    def layers_m(self) -> FloatArray:
+        """Heights z of the grid's levels, shape (layers + 1,)."""
+        parts = [np.linspace(zone.start_m, zone.end_m, zone.cells + 1) for zone in self.zones()]
+        return np.concatenate([parts[0][:1], *(part[1:] for part in parts)])
+
+    def place(self, grid: FloatArray) -> FloatArray:
+        """Positions x, y, z (3, points) of places (3, points) in the grid."""
+        a, b, level = grid[0] / self.fineness.section, grid[1] / self.fineness.section, grid[2]
+        layers = self.layers_m()
+        z = np.interp(level, np.arange(len(layers)), layers)
+        mirrored = b > a
+        near, far = np.where(mirrored, a, b), np.where(mirrored, b, a)
+        along, across = self._half_section(near, far, z)
+        return np.stack([np.where(mirrored, across, along), np.where(mirrored, along, across), z])
+
+    def _half_section(
+        self, near: FloatArray, far: FloatArray, z: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Positions along and across the plate for grid coordinates far >= near."""
+        core, inner = self.core_m, np.clip(near, 0.0, 1.0)
+        across = core * inner
+        surface = np.sqrt(self.radius_m**2 - across**2)
+        along = core * far.clip(0, 1) + (surface - core) * (far - 1).clip(0, 1)
+        if self.plate is not None:
+            share = ((far - 2).clip(0) / self.fineness.wing) ** _WING_GRADING
+            along = along + share * (self._half_width_m(self.plate, z) - surface)
+        corner_along, corner_across = self._corner(far - 1, near - 1)
+        in_corner = near > 1
+        return np.where(in_corner, corner_along, along), np.where(in_corner, corner_across, across)
+
+    def _corner(self, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The unit (1, 1), blended from its two straight and two circular sides.
+
+        Coons 1967: u and v run from 0 to 1 along and across the plate.
+        """
+        radius, core = self.radius_m, self.core_m
+        first = np.arcsin(core / radius)
+        straight = radius * np.cos(first) - core
+        far_side, top_side = (first + t * (np.pi / 4 - first) for t in (v, u))
+        along = (1 - v) * (core + u * straight) + v * radius * np.sin(top_side)
+        along += (1 - u) * core + u * radius * np.cos(far_side)
+        along -= (1 - u) * core + u * ((1 - v) * (core + straight) + v * radius / np.sqrt(2))
+        across = (1 - v) * core + v * radius * np.cos(top_side)
+        across += (1 - u) * (core + v * straight) + u * radius * np.sin(far_side)
+        across -= (1 - v) * core + v * ((1 - u) * (core + straight) + u * radius / np.sqrt(2))
+        return along, across
+
+    def _half_width_m(self, plate: EndPlate, z: FloatArray) -> FloatArray:
+        depth = np.minimum(z, self.length_m - z).clip(0, plate.length_m) / plate.length_m
+        return np.asarray(plate.end_width_m + (plate.neck_width_m - plate.end_width_m) * depth) / 2

@@ -1,0 +1,241 @@
+"""A small basis that stands for the solid model over its whole prior box.
+
+Modes of the full model at a few points of the box span a reservoir. It is compressed by proper
+orthogonal decomposition in the energy of a reference stiffness (Kunisch and Volkwein 2001), and
+K(theta), which is affine in tension and springs, is projected once. Points are chosen greedily:
+the next one is where two compressions of the reservoir differ most, which estimates the error;
+the full model there tells the true one. It ends when that error was small several times running.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.sparse import csc_array
+
+from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
+from shm.values import BoolArray, FloatArray
+
+TARGET_ERROR = 1e-4
+_REFERENCE_SPRING_N_M = 1e8
+_NEGLIGIBLE = 1e-6
+_CANDIDATES = 300
+_MOST_CORNERS = 128
+_MOST_POINTS = 200
+_GOOD_IN_A_ROW = 10
+_SHARE_OF_TARGET = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The range of tension in N and of log10 k of the springs, (1 + springs,) each."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def corners(self, most: int, rng: np.random.Generator) -> FloatArray:
+        """All corners, or `most` of them by chance."""
+        if len(self.lower) > 12:
+            chosen = rng.integers(0, 2, (most, len(self.lower))).astype(bool)
+        else:
+            chosen = np.array(list(product([False, True], repeat=len(self.lower))))
+            chosen = chosen[rng.permutation(len(chosen))[:most]]
+        return np.where(chosen, self.upper, self.lower)
+
+    def spread(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """`n` points (n, 1 + springs) anywhere in the box."""
+        return rng.uniform(self.lower, self.upper, (n, len(self.lower)))
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """K(theta) on a basis whose mass matrix is the unit matrix.
+
+    `matrices` (2 + springs, n, n): stiffness, initial stress of 1 N, springs of 1 N/m per node.
+    """
+
+    matrices: FloatArray
+
+    @property
+    def unknowns(self) -> int:
+        return int(self.matrices.shape[1])
+
+    def stiffness(self, points: FloatArray) -> FloatArray:
+        """K (m, n, n) at points (m, 1 + springs) of tension in N and log10 k."""
+        factors = np.column_stack([np.ones(len(points)), points[:, :1], 10 ** points[:, 1:]])
+        flat = self.matrices.reshape(len(self.matrices), -1)
+        square = (len(points), self.unknowns, self.unknowns)
+        return np.asarray((factors @ flat).reshape(square))
+
+    def frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
+        """The lowest frequencies (m, modes) at points (m, 1 + springs)."""
+        eigenvalues = np.linalg.eigvalsh(self.stiffness(points))[:, :modes]
+        return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
+
+    def mode(self, point: FloatArray, order: int) -> FloatArray:
+        """The coordinates (n,) of one mode at a point (1 + springs,)."""
+        return np.asarray(np.linalg.eigh(self.stiffness(point[None])[0])[1][:, order - 1])
+
+
+@dataclass(eq=False)
+class Reservoir:
+    """The span of all modes computed so far, orthonormal in the energy of a reference."""
+
+    system: AffineSystem
+    reference: csc_array
+    vectors: FloatArray = field(init=False)
+    coordinates: FloatArray = field(init=False)
+    matrices: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vectors = np.zeros((self.system.unknowns, 0))
+        self.coordinates = np.zeros((0, 0))
+        self.matrices = np.zeros((3 + len(self.system.springs), 0, 0))
+
+    def add(self, modes: Modes) -> None:
+        """Takes in further modes; what earlier ones span already adds no vector."""
+        energy = np.sqrt(np.einsum("ij,ij->j", modes.vectors, self.reference @ modes.vectors))
+        new = modes.vectors / energy
+        rest = self._beyond(self._beyond(new))
+        gram = rest.T @ (self.reference @ rest)
+        strength, direction = np.linalg.eigh(gram)
+        kept = strength > _NEGLIGIBLE**2
+        added = self._beyond(rest @ (direction[:, kept] / np.sqrt(strength[kept])))
+        self.matrices = self._grown(added)
+        self.vectors = np.hstack([self.vectors, added])
+        padding = np.zeros((added.shape[1], self.coordinates.shape[1]))
+        known = np.vstack([self.coordinates, padding])
+        self.coordinates = np.hstack([known, self.vectors.T @ (self.reference @ new)])
+
+    def _beyond(self, vectors: FloatArray) -> FloatArray:
+        """The part of `vectors` outside of the span."""
+        known = self.vectors @ (self.vectors.T @ (self.reference @ vectors))
+        return np.asarray(vectors - known)
+
+    def _grown(self, added: FloatArray) -> FloatArray:
+        """The projected matrices (mass first) with rows and columns for the `added` vectors."""
+        system, old, count = self.system, self.vectors.shape[1], added.shape[1]
+        grown = np.zeros((len(self.matrices), old + count, old + count))
+        grown[:, :old, :old] = self.matrices
+        full = (system.mass, system.stiffness, system.initial_stress, *system.springs.values())
+        for target, matrix in zip(grown, full, strict=True):
+            image = matrix @ added
+            target[:old, old:] = self.vectors.T @ image
+            target[old:, :old] = target[:old, old:].T
+            target[old:, old:] = added.T @ image
+        return grown
+
+    @property
+    def size(self) -> int:
+        return int(self.vectors.shape[1])
+
+    def whole(self) -> Projected:
+        """The system on all vectors."""
+        return self.compressed(self.size)[1]
+
+    def compressed(self, unknowns: int) -> tuple[FloatArray, Projected]:
+        """The basis (reservoir, n) of the strongest directions, and the system on it."""
+        strongest = np.linalg.svd(self.coordinates, full_matrices=False)[0][:, :unknowns]
+        mass = strongest.T @ self.matrices[0] @ strongest
+        factor = np.linalg.cholesky(mass)
+        basis = solve_triangular(factor, strongest.T, lower=True).T
+        projected = basis.T @ self.matrices[1:] @ basis
+        return basis, Projected((projected + projected.swapaxes(1, 2)) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A projected system and how it was found.
+
+    `deflections` (points, n) are its vectors along the hanger's axis at `axis_m`; `solutions` of
+    the full model were needed; `estimated_error` is the worst against the reservoir.
+    """
+
+    projected: Projected
+    axis_m: FloatArray
+    deflections: FloatArray
+    solutions: int
+    estimated_error: float
+
+
+def reduce(
+    system: AffineSystem, box: Box, modes: int, progress: Callable[[float], None]
+) -> Reduction:
+    """The smallest basis whose estimated error in frequency is within `TARGET_ERROR` over `box`.
+
+    `progress` hears the fraction done, as far as it can be told.
+    """
+    rng = np.random.default_rng(1)
+    corners = box.corners(_MOST_CORNERS, rng)
+    candidates = np.vstack([box.spread(_CANDIDATES, rng), corners])
+    reservoir, solutions = _filled(system, box, candidates, modes, progress)
+    basis, projected, error = _smallest(reservoir, candidates, modes)
+    return Reduction(
+        projected,
+        system.axis_m,
+        reservoir.vectors[system.axis_unknowns] @ basis,
+        solutions,
+        error,
+    )
+
+
+def _filled(
+    system: AffineSystem,
+    box: Box,
+    candidates: FloatArray,
+    modes: int,
+    progress: Callable[[float], None],
+) -> tuple[Reservoir, int]:
+    """A reservoir good over the candidates, and how many full solutions it holds."""
+    middle = (box.lower + box.upper) / 2
+    springs = np.full(len(system.springs), _REFERENCE_SPRING_N_M)
+    reservoir = Reservoir(system, stiffness(system, float(middle[0]), springs))
+    for point in (middle, box.lower, box.upper):
+        reservoir.add(_solution(system, point, modes))
+    good, solutions, unused = 0, 3, np.ones(len(candidates), dtype=bool)
+    while good < _GOOD_IN_A_ROW and solutions < _MOST_POINTS:
+        worst = _least_certain(reservoir, candidates, unused, modes)
+        unused[worst] = False
+        truth = _solution(system, candidates[worst], modes)
+        error = _error(reservoir.whole(), candidates[[worst]], truth.frequencies_hz[None])
+        good = good + 1 if error[0] < _SHARE_OF_TARGET * TARGET_ERROR else 0
+        reservoir.add(truth)
+        solutions += 1
+        progress(min(0.99, max(good / _GOOD_IN_A_ROW, solutions / _MOST_POINTS)))
+    return reservoir, solutions
+
+
+def _solution(system: AffineSystem, point: FloatArray, modes: int) -> Modes:
+    return natural_modes(system, float(point[0]), 10 ** point[1:], modes)
+
+
+def _error(projected: Projected, points: FloatArray, truth_hz: FloatArray) -> FloatArray:
+    """The worst fractional error (m,) of each point's frequencies (m, modes)."""
+    own = projected.frequencies_hz(points, truth_hz.shape[1])
+    return np.asarray(np.abs(own / truth_hz - 1).max(axis=1))
+
+
+def _least_certain(
+    reservoir: Reservoir, candidates: FloatArray, unused: BoolArray, modes: int
+) -> int:
+    """The unused candidate where the reservoir and most of it differ most."""
+    whole = reservoir.whole().frequencies_hz(candidates, modes)
+    most = reservoir.compressed(max(modes, int(0.8 * reservoir.size)))[1]
+    return int(np.where(unused, _error(most, candidates, whole), -1.0).argmax())
+
+
+def _smallest(
+    reservoir: Reservoir, candidates: FloatArray, modes: int
+) -> tuple[FloatArray, Projected, float]:
+    """The smallest compression within the target of the reservoir, and its worst error."""
+    whole = reservoir.whole().frequencies_hz(candidates, modes)
+    for unknowns in range(modes, reservoir.size + 1):
+        basis, projected = reservoir.compressed(unknowns)
+        error = float(_error(projected, candidates, whole).max())
+        if error < (1 - _SHARE_OF_TARGET) * TARGET_ERROR:
+            break
+    return basis, projected, error
