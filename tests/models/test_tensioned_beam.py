@@ -1,4 +1,4 @@
-"""The exact beam against closed forms, an independent discretisation and the counting of nodes."""
+"""The exact beam against closed forms, an independent discretisation and counts of its modes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Legendre
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
 from shm.models.tensioned_beam import frequencies_hz, mode_shape, wave_numbers
+from tests.helpers.beam_count import modes_below
 
 PINNED, CLAMPED = np.array(0.0), np.array(np.inf)
 
@@ -20,12 +21,21 @@ def dimensionless_frequencies(xi: float, ka: float, kb: float, modes: int) -> np
     return q * np.hypot(xi, q)
 
 
-@pytest.mark.parametrize("xi", [0.0, 1e-6, 1.0, 20.0, 1000.0])
+@pytest.mark.parametrize("xi", [0.0, 1e-6, 0.05, 1.0, 20.0, 2000.0])
 def test_pinned_ends_give_the_closed_form(xi: float) -> None:
-    """Omega_n = n pi sqrt(xi^2 + n^2 pi^2)."""
-    n = np.arange(1, 31) * np.pi
+    """q_n = n pi, so that Omega_n = n pi sqrt(xi^2 + n^2 pi^2)."""
+    n = np.arange(1, 41) * np.pi
     expected = n * np.sqrt(xi**2 + n**2)
-    np.testing.assert_allclose(dimensionless_frequencies(xi, 0, 0, 30), expected, rtol=1e-12)
+    np.testing.assert_allclose(dimensionless_frequencies(xi, 0, 0, 40), expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("xi", [0.0, 5.0, 200.0])
+def test_soft_springs_add_their_energy_in_the_pinned_shape(xi: float) -> None:
+    """Rayleigh with u = sin(n pi x): Omega^2 = Omega_pinned^2 + 2 (ka + kb) (n pi)^2 + O(k^2)."""
+    n, ka, kb = np.arange(1, 11) * np.pi, 3e-7, 5e-7
+    expected = n**2 * (xi**2 + n**2) + 2 * (ka + kb) * n**2
+    squared = dimensionless_frequencies(xi, ka, kb, 10) ** 2
+    np.testing.assert_allclose(squared, expected, rtol=2e-14)
 
 
 def test_a_clamped_beam_without_tension_gives_the_classical_roots() -> None:
@@ -77,18 +87,48 @@ def galerkin(xi: float, ka: float, kb: float, modes: int, degree: int) -> np.nda
         scale * 2**d * np.array([(b.deriv(d) if d else b)(nodes) for b in basis]) for d in range(3)
     )
     ends = scale * 2 * np.array([b.deriv(1)(np.array([-1.0, 1.0])) for b in basis])
-    half = weights / 2
+    half, springs = weights / 2, np.array([ka, kb])
+    clamped = np.isinf(springs)
     stiffness = (curve * half) @ curve.T + xi**2 * (slope * half) @ slope.T
-    stiffness += ka * np.outer(ends[:, 0], ends[:, 0]) + kb * np.outer(ends[:, 1], ends[:, 1])
+    stiffness += (ends * np.where(clamped, 0, springs)) @ ends.T
     mass = (value * half) @ value.T
-    return np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:modes])
+    free = null_space(ends[:, clamped].T) if clamped.any() else np.eye(degree)
+    found = eigh(free.T @ stiffness @ free, free.T @ mass @ free, eigvals_only=True)
+    return np.sqrt(found[:modes])
 
 
 @pytest.mark.parametrize("xi", [0.0, 0.3, 5.0, 30.0, 100.0])
-@pytest.mark.parametrize(("ka", "kb"), [(0.0, 0.0), (0.01, 3.0), (10.0, 500.0), (2e4, 1e-3)])
+@pytest.mark.parametrize(
+    ("ka", "kb"),
+    [(0, 0), (0.01, 3), (10, 500), (2e4, 1e-3), (np.inf, 7), (0, np.inf), (np.inf, np.inf)],
+)
 def test_an_independent_discretisation_agrees(xi: float, ka: float, kb: float) -> None:
     expected = galerkin(xi, ka, kb, modes=10, degree=30 if xi <= 5 else 60)
-    np.testing.assert_allclose(dimensionless_frequencies(xi, ka, kb, 10), expected, rtol=1e-6)
+    np.testing.assert_allclose(dimensionless_frequencies(xi, ka, kb, 10), expected, rtol=1e-7)
+
+
+def assert_counted(xi: np.ndarray, ka: np.ndarray, kb: np.ndarray, modes: int) -> None:
+    """Root n has exactly n - 1 frequencies just below it and n just above: none missed or doubled.
+
+    The count is made 1e-11 of the root to either side, which proves its value too.
+    """
+    q = wave_numbers(xi, ka, kb, modes).astype(np.longdouble)
+    columns = [np.asarray(values, dtype=np.longdouble)[..., None] for values in (xi, ka, kb)]
+    order = np.broadcast_to(np.arange(1, modes + 1), q.shape)
+    np.testing.assert_array_equal(modes_below(q * (1 - 1e-11), *columns), order - 1)
+    np.testing.assert_array_equal(modes_below(q * (1 + 1e-11), *columns), order)
+
+
+def test_the_count_of_modes_agrees_over_all_tensions_and_springs() -> None:
+    rng = np.random.default_rng(2)
+    xi, (ka, kb) = 10 ** rng.uniform(-1.31, 3.31, 4000), 10 ** rng.uniform(-6, 8, (2, 4000))
+    ka[::5], kb[::7], ka[1::9], kb[2::8] = np.inf, np.inf, 0, 0
+    assert_counted(xi, ka, kb, 40)
+
+
+def test_the_count_of_modes_agrees_at_the_corners() -> None:
+    ends = [0, 1e-6, 1e-3, 1, 50, 1e4, 1e8, 1e15, np.inf]
+    assert_counted(*np.meshgrid([0, 1e-8, 0.05, 0.3, 3, 40, 2000], ends, ends), 40)
 
 
 def crossings(shape: np.ndarray) -> int:
@@ -98,6 +138,35 @@ def crossings(shape: np.ndarray) -> int:
 
 
 springs = st.one_of(st.just(0.0), st.floats(-6, 15).map(lambda e: 10.0**e), st.just(np.inf))
+
+
+@settings(max_examples=300, deadline=None)
+@given(xi=st.floats(0, 2000), ka=springs, kb=springs)
+def test_the_count_of_modes_agrees_wherever_it_is_tried(xi: float, ka: float, kb: float) -> None:
+    assert_counted(np.array(xi), np.array(ka), np.array(kb), 40)
+
+
+def phase(q: np.ndarray, xi: np.ndarray, ka: np.ndarray, kb: np.ndarray, n: int) -> np.ndarray:
+    """The phase as the module's docstring states it, both springs finite."""
+    p = np.sqrt(xi**2 + q**2)
+    w, p_coth = p**2 + q**2, p / np.tanh(p)
+    a = w**2 + (ka + kb) * w * p_coth + ka * kb * xi**2
+    b = (ka + kb) * w * q + 2 * ka * kb * q * p_coth
+    c = (-1) ** n * 2 * ka * kb * p * q / np.sinh(p)
+    return 2 * np.arctan((b - c) / (a + np.sqrt(a**2 + b**2 - c**2)))
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_the_phase_is_as_flat_as_the_proof_of_one_root_says(n: int) -> None:
+    """In [0, pi), slope in [-0.18, 0.20], curvature below 0.09: what the docstring argues from."""
+    h, q = 1e-3, np.pi * np.linspace(n, n + 1, 41)
+    tensions, springs = 10 ** np.linspace(-2, 2.5, 19), 10 ** np.linspace(-2, 8, 21)
+    xi, ka, kb, q = np.meshgrid(tensions, springs, springs, q)
+    low, middle, high = (phase(q + shift, xi, ka, kb, n) for shift in (-h, 0, h))
+    slope, curvature = (high - low) / (2 * h), (high - 2 * middle + low) / h**2
+    assert 0 <= middle.min() <= middle.max() < np.pi
+    assert -0.18 < slope.min() < slope.max() < 0.20
+    assert np.abs(curvature).max() < 0.09
 
 
 @settings(max_examples=300, deadline=None)
@@ -160,3 +229,24 @@ def test_parameter_sets_are_solved_at_once_as_one_by_one() -> None:
         for x, a, b in zip(xi, ka, kb, strict=True)
     ]
     np.testing.assert_allclose(together, alone, rtol=1e-14)
+
+
+def test_many_parameter_sets_are_as_few() -> None:
+    """More sets than are solved at a time, the last block not full."""
+    rng = np.random.default_rng(0)
+    xi, (ka, kb) = rng.uniform(0, 200, 4500), 10 ** rng.uniform(-2, 6, (2, 4500))
+    together = wave_numbers(xi, ka, kb, 3)
+    parts = [wave_numbers(*part, 3) for part in np.split(np.array([xi, ka, kb]), 9, axis=1)]
+    np.testing.assert_allclose(together, np.concatenate(parts), rtol=1e-14)
+
+
+def test_no_parameter_sets_have_no_frequencies() -> None:
+    none = np.empty((0, 2))
+    assert wave_numbers(none, none, none, 6).shape == (0, 2, 6)
+
+
+def test_an_unknown_parameter_leaves_the_other_sets_alone() -> None:
+    xi, ka = np.array([3.0, np.nan, 3.0]), np.array([10.0, 10.0, np.nan])
+    found = wave_numbers(xi, ka, np.array(5.0), 4)
+    np.testing.assert_allclose(found[0], wave_numbers(xi[:1], ka[:1], np.array(5.0), 4)[0])
+    assert np.isnan(found[1:]).all()
