@@ -1,7 +1,7 @@
-"""Makes the generated pages: commands, settings, and the validation table.
+"""Makes the generated pages: commands, settings, and the validation tables.
 
-python docs/build.py            # all, the table included (a minute)
-python docs/build.py --quick    # without the table
+python docs/build.py            # all, the tables included (two minutes)
+python docs/build.py --quick    # without the tables
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import rich_click as click
 from shm.settings import TABLE
 from shm_cli.main import VERBS, cli
 from shm_cli.validate import compared, markdown
+from shm_cli.validation import frequencies, selection
 
 DOCS = Path(__file__).parent
-_MARKS = ("<!-- validation -->", "<!-- /validation -->")
 
 
 def commands_page() -> str:
@@ -79,21 +79,27 @@ def _range(low: float | None, high: float | None) -> str:
     )
 
 
-def _fill_in(path: Path, table: str) -> None:
-    text = path.read_text(encoding="utf-8")
-    before, rest = text.split(_MARKS[0])
-    after = rest.split(_MARKS[1])[1]
-    path.write_text(f"{before}{_MARKS[0]}\n{table}\n{_MARKS[1]}{after}", encoding="utf-8")
+def _fill_in(path: Path, name: str, table: str) -> None:
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    before, rest = path.read_text(encoding="utf-8").split(begin)
+    after = rest.split(end)[1]
+    path.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
 
 
 def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
-    if "--quick" not in sys.argv:
-        table = markdown(compared(seed=1))
-        for path in (DOCS / "validation.md", DOCS.parent / "README.md"):
-            _fill_in(path, table)
+    if "--quick" in sys.argv:
+        return
+    tables, chosen = compared(seed=1)
+    computed = markdown(frequencies.HEADS, [frequencies.cells(row) for row in tables])
+    preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
+    _fill_in(DOCS / "validation.md", "frequencies", computed)
+    _fill_in(DOCS / "validation.md", "selection", preferred)
+    latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
+    short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])
+    _fill_in(DOCS.parent / "README.md", "selection", short)
 
 
 if __name__ == "__main__":

@@ -283,6 +283,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         ],
         "seconds": posterior.seconds,
         "seed": posterior.seed,
+        "method": posterior.method,
     }
 
 

@@ -76,7 +76,9 @@ class Settings:
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
-    models: str = _row("beam1,beam2", "", "model classes that compete", None, None)
+    models: str = _row(
+        "beam1,beam2,solid0,solid1,solid2", "", "model classes that compete", None, None
+    )
     samples: int = _row(1000, "", "posterior samples kept a test and class", 100, 1_000_000)
     seed: int = _row(1, "", "seed of the random numbers", 0, None)
     workers: int = _row(1, "", "processes that identify and update", 1, 64)

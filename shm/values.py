@@ -229,7 +229,7 @@ class Posterior:
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
     batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
-    `tmcmc` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
+    `tmcmc` or `textbook` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
     """
 
     model: str

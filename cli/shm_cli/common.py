@@ -22,6 +22,7 @@ from rich.table import Table
 from shm.bridge import load_hanger
 from shm.documents import dump, load_modes
 from shm.errors import NothingThere, UsageError
+from shm.update import METHODS
 from shm.values import Hanger, ModalTest
 
 if TYPE_CHECKING:
@@ -46,6 +47,13 @@ repeat_option = click.option(
     default=1,
     show_default=True,
     help="How often the data set counts (N_D of the thesis).",
+)
+method_option = click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default=METHODS[0],
+    show_default=True,
+    help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
 )
 
 

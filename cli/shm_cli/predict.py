@@ -16,6 +16,7 @@ from shm_cli.common import (
     hanger_option,
     json_option,
     one_hanger,
+    progress_bar,
     show,
     show_table,
     table,
@@ -44,7 +45,9 @@ def command(
     """Frequencies of a model class for given parameters.
 
     theta_F is tension over nominal tension, theta_L effective over nominal length (both 1 unless
-    set), log10_k1 to log10_k4 the end springs in N m/rad (k1, k3 transverse; k2, k4 longitudinal).
+    set), log10_k1 to log10_k4 the end springs: N m/rad for beams (k1, k3 transverse; k2, k4
+    longitudinal), N/m per node for solids. A solid class is solved in full, without its reduced
+    basis: a few tenths of a second a parameter set.
 
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
@@ -59,7 +62,7 @@ def command(
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:
-    frequencies = model.frequencies_hz(model.pack(values)[None], modes)[0]
+    frequencies = model.reference_frequencies_hz(model.pack(values)[None], modes)[0]
     if as_json:
         show({"model": model.name, "parameters": values, "frequencies": _rows(frequencies)})
         return
@@ -73,7 +76,12 @@ def _show_sweep(
     model: Model, values: dict[str, float], name: str, points: FloatArray, modes: int, as_json: bool
 ) -> None:
     theta = np.array([model.pack({**values, name: float(point)}) for point in points])
-    frequencies = model.frequencies_hz(theta, modes)
+    with progress_bar("solving") as progress:
+        rows_hz = []
+        for done, row in enumerate(theta, start=1):
+            rows_hz.append(model.reference_frequencies_hz(row[None], modes)[0])
+            progress(model.name, done / len(theta))
+    frequencies = np.array(rows_hz)
     if as_json:
         rows: list[dict[str, Any]] = [
             {name: float(point), "frequencies": _rows(row)}

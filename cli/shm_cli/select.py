@@ -8,13 +8,16 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import selection_document
-from shm.models import build
+from shm.models import applicable, build, competing_names
+from shm.settings import load_settings
 from shm.update import UpdateOptions, select
 from shm.values import Selection
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
     json_option,
+    method_option,
+    open_workspace,
     progress_bar,
     repeat_option,
     samples_option,
@@ -29,44 +32,55 @@ from shm_cli.update import modes_argument
 
 @click.command()
 @modes_argument
-@click.option(
-    "--models", default="beam1,beam2", show_default=True, help="Classes, separated by commas."
-)
+@click.option("--models", show_default="the setting `models`", help="Classes, separated by commas.")
 @hanger_option()
 @hanger_file_option
 @seed_option
 @samples_option
 @repeat_option
+@method_option
 @json_option
 @click.pass_context
 def command(
     ctx: click.Context,
     modes_file: Path | None,
-    models: str,
+    models: str | None,
     hanger_id: int | None,
     hanger_file: Path | None,
     seed: int,
     samples: int,
     repeat: int,
+    method: str,
     as_json: bool,
 ) -> None:
     """Compare model classes by their evidence.
 
-    The classes are equally probable beforehand. The tests come from MODES.json, or are the latest
-    of a hanger of the workspace.
+    The classes are equally probable beforehand; those that do not apply to the hanger are left out
+    and say why. The tests come from MODES.json, or are the latest of a hanger of the workspace.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     """
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    chosen = [build(name.strip(), hanger) for name in models.split(",") if name.strip()]
-    options = UpdateOptions(samples=samples, seed=seed, repeat=repeat)
+    names = _names(ctx, models, from_files=hanger_file is not None)
+    _, not_applicable = applicable(hanger, names)
+    chosen = [build(name, hanger) for name in competing_names(hanger, names)]
+    options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         selection = select(tests, chosen, options, progress)
     if as_json:
-        show(selection_document(selection))
-    else:
-        show_selection(selection)
+        show({**selection_document(selection), "not_applicable": not_applicable})
+        return
+    show_selection(selection)
+    for name, reason in not_applicable.items():
+        click.echo(f"{name} does not apply: {reason}")
+
+
+def _names(ctx: click.Context, models: str | None, from_files: bool) -> tuple[str, ...]:
+    """The classes asked for, or those of the setting, which a workspace may give."""
+    if models is not None:
+        return load_settings({"models": models}, environment={}).model_names
+    return (load_settings() if from_files else open_workspace(ctx).settings).model_names
 
 
 def show_selection(selection: Selection) -> None:

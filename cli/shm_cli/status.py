@@ -6,6 +6,7 @@ from typing import Any
 
 import rich_click as click
 
+from shm.models import applicable
 from shm.store import DeliveryState, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
 
@@ -41,6 +42,19 @@ def command(ctx: click.Context, as_json: bool) -> None:
             f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
         )
     show_table(made)
+    for said, hangers in _competitions(document["hangers"]).items():
+        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
+
+
+def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
+    """Which classes compete and why others do not, each with the hangers that it is true of."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        said = f"{', '.join(row['competing']) or 'no model class'} may compete"
+        for name, reason in row["not_applicable"].items():
+            said += f"; {name} does not apply: {reason}"
+        found.setdefault(said.removesuffix(".") + ".", []).append(str(row["hanger"]))
+    return {said: ", ".join(hangers) for said, hangers in found.items()}
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
@@ -48,12 +62,15 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     hangers = []
     for hanger in workspace.bridge.hangers:
         tests, baseline = store.tests(hanger.id), store.baseline(hanger.id)
+        names, reasons = applicable(hanger, workspace.settings.model_names)
         hangers.append(
             {
                 "hanger": hanger.id,
                 "tests": len(tests),
                 "latest_test": tests[-1].time if tests else None,
                 "model": models.get(hanger.id),
+                "competing": list(names),
+                "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
             }
         )

@@ -14,6 +14,7 @@ from shm_cli.common import (
     hanger_file_option,
     hanger_option,
     json_option,
+    method_option,
     progress_bar,
     repeat_option,
     samples_option,
@@ -40,6 +41,7 @@ modes_argument = click.argument(
 @seed_option
 @samples_option
 @repeat_option
+@method_option
 @json_option
 @click.pass_context
 def command(
@@ -51,6 +53,7 @@ def command(
     seed: int,
     samples: int,
     repeat: int,
+    method: str,
     as_json: bool,
 ) -> None:
     """Posterior of tension and end stiffness.
@@ -61,7 +64,7 @@ def command(
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    options = UpdateOptions(samples=samples, seed=seed, repeat=repeat)
+    options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         posterior = update(tests, build(model, hanger), options, progress)
     if as_json:

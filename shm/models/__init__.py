@@ -5,19 +5,68 @@ A new class is one file and one line in `MODELS`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from shm.errors import UsageError
 from shm.models.base import Model
 from shm.models.beam import Beam1, Beam2
+from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
 
-MODELS: dict[str, type[Model]] = {model.name: model for model in (Beam1, Beam2)}
+MODELS: dict[str, type[Model]] = {
+    model.name: model for model in (Beam1, Beam2, S1, S2, Solid0, Solid1, Solid2)
+}
 
 
 def build(name: str, hanger: Hanger) -> Model:
-    """The model class `name` of `hanger`; raises UsageError for an unknown name."""
-    if name not in MODELS:
-        raise UsageError(f"unknown model class {name!r}.", remedy=f"Known: {', '.join(MODELS)}.")
+    """The model class `name` of `hanger`.
+
+    Raises UsageError for an unknown name, and where the hanger does not admit the class or the
+    class cannot describe the hanger.
+    """
+    reason = _why_not(name, hanger)
+    if reason:
+        fitting, _ = applicable(hanger, list(MODELS))
+        raise UsageError(
+            f"model class {name} does not apply to hanger {hanger.id}: {reason}",
+            remedy=f"Classes that apply: {', '.join(fitting) or 'none'}.",
+        )
     return MODELS[name](hanger)
 
 
-__all__ = ["MODELS", "Model", "build"]
+def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Which of the model classes `names` apply to `hanger`, and why each other one does not.
+
+    Raises UsageError for an unknown name, be it in `names` or among the hanger's own.
+    """
+    reasons = {name: _why_not(name, hanger) for name in names}
+    fitting = tuple(name for name, reason in reasons.items() if not reason)
+    return fitting, {name: reason for name, reason in reasons.items() if reason}
+
+
+def competing_names(hanger: Hanger, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of the model classes `names` that apply to a hanger; UsageError where none does."""
+    fitting, reasons = applicable(hanger, names)
+    if fitting:
+        return fitting
+    why = " ".join(f"{name}: {reason}" for name, reason in reasons.items())
+    raise UsageError(
+        f"no model class applies to hanger {hanger.id}. {why}".rstrip(),
+        remedy="Name others in the setting models, or correct the hanger's description.",
+    )
+
+
+def _why_not(name: str, hanger: Hanger) -> str:
+    """A sentence from its predicate on; empty where the class applies."""
+    for each in (name, *hanger.models):
+        if each not in MODELS:
+            where = "" if each == name else f" in `models` of hanger {hanger.id}"
+            raise UsageError(
+                f"unknown model class {each!r}{where}.", remedy=f"Known: {', '.join(MODELS)}."
+            )
+    if hanger.models and name not in hanger.models:
+        return f"the hanger's `models` admits {', '.join(hanger.models)} only."
+    return MODELS[name].unfit(hanger)
+
+
+__all__ = ["MODELS", "Model", "applicable", "build", "competing_names"]

@@ -66,6 +66,14 @@ class Model:
         """The mode shape of one parameter set (parameters,) at `x_m` (points,), largest value 1."""
         raise TypeError(f"{type(self).__name__} does not say how its shapes follow.")
 
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rotational stiffness of the deck end and the arch end, each (n, planes).
+
+        Infinite where a class clamps its ends.
+        """
+        clamped = np.full((len(theta), 2), np.inf)
+        return clamped, clamped
+
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput where this class cannot describe the conditions of `test`."""
         if test.added_mass is not None:

@@ -4,13 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.models import tensioned_beam
+from shm.models import stepped, tensioned_beam
 from shm.models.base import Model
-from shm.values import PLANES, FloatArray, Plane
+from shm.values import PLANES, FloatArray, Hanger, Plane
 
 
 class Beam(Model):
-    """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends."""
+    """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends.
+
+    With turnbuckles its section changes in steps (see `shm.models.stepped`), and its ends can be
+    exchanged only where the turnbuckles lie alike from both.
+    """
+
+    def __init__(self, hanger: Hanger):
+        super().__init__(hanger)
+        if not stepped.alike_from_both_ends(hanger):
+            self.swaps = ()
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        together = sum(turnbuckle.length_m for turnbuckle in hanger.turnbuckles)
+        shortest = cls.bounds["theta_L"][0] * hanger.length_m
+        if together < shortest:
+            return ""
+        return (
+            f"its turnbuckles are {together:g} m long together, as long as the shortest effective "
+            f"length that it considers ({shortest:g} m)."
+        )
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deck-end and arch-end springs of `theta` (n, parameters), each (n, planes)."""
@@ -18,6 +38,8 @@ class Beam(Model):
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         deck, arch = self.springs_n_m_rad(theta)
+        if self.hanger.turnbuckles:
+            return self._stepped_frequencies_hz(theta, deck, arch, modes)
         return tensioned_beam.frequencies_hz(
             self._length_m(theta)[:, None],
             self._tension_n(theta)[:, None],
@@ -28,15 +50,32 @@ class Beam(Model):
             modes,
         )
 
+    def _stepped_frequencies_hz(
+        self, theta: FloatArray, deck: FloatArray, arch: FloatArray, modes: int
+    ) -> FloatArray:
+        alike = np.array_equal(deck[:, 0], deck[:, 1]) and np.array_equal(arch[:, 0], arch[:, 1])
+        planes = 1 if alike else 2
+        beam = stepped.stepped_beam(
+            self.hanger,
+            np.repeat(self._length_m(theta), planes),
+            np.repeat(self._tension_n(theta), planes),
+            deck[:, :planes].ravel(),
+            arch[:, :planes].ravel(),
+        )
+        found = beam.frequencies_hz(modes).reshape(len(theta), planes, modes)
+        return np.broadcast_to(found, (len(theta), 2, modes)).copy()
+
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
         deck, arch = (
             springs[0, PLANES.index(plane)] for springs in self.springs_n_m_rad(theta[None])
         )
-        length = float(self._length_m(theta[None])[0])
-        tension = float(self._tension_n(theta[None])[0])
+        length, tension = self._length_m(theta[None]), self._tension_n(theta[None])
+        if self.hanger.turnbuckles:
+            ends = np.array([deck]), np.array([arch])
+            beam = stepped.stepped_beam(self.hanger, length, tension, *ends)
+            return stepped.mode_shape(beam, order, x_m)
         stiffness = self.hanger.bending_stiffness_n_m2
-        xi = length * (tension / stiffness) ** 0.5
-        scale = length / stiffness
+        xi, scale = float(length[0] * np.sqrt(tension[0] / stiffness)), length[0] / stiffness
         return tensioned_beam.mode_shape(xi, deck * scale, arch * scale, order, x_m / length)
 
     def _length_m(self, theta: FloatArray) -> FloatArray:

@@ -81,8 +81,10 @@ class Flow:
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge; raises UsageError where it is wrong."""
+        selected = self.store.selected_models()
         for hanger in workspace.bridge.hangers:
             competing(hanger, workspace.settings, {})
+            competing(hanger, workspace.settings, selected)
         self.workspace = workspace
         self.jobs = Jobs(workspace, self.store, self.clock)
 

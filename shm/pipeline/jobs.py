@@ -12,6 +12,7 @@ from typing import Any
 
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
+from shm.models import competing_names
 from shm.pipeline.terms import seed_of
 from shm.store import (
     Delivery,
@@ -24,7 +25,7 @@ from shm.store import (
     WaitingTest,
     Workspace,
 )
-from shm.values import Alert, Hanger
+from shm.values import Alert, Hanger, Posterior
 
 Clock = Callable[[], datetime]
 Notifier = Callable[[Hook, Alert], None]
@@ -135,7 +136,7 @@ class Jobs:
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.test(test.id) for test in first]
-        names = self.workspace.settings.model_names
+        names = competing_names(hanger, self.workspace.settings.model_names)
         samples, seed, lineage = self._terms(hanger, names, tests)
         plain = [test.test for test in tests]
         run = partial(run_step, "select_model", plain, hanger, names, samples, seed)
@@ -144,9 +145,11 @@ class Jobs:
         )
 
     def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
-        test = self.store.test(waiting.id)
-        samples, seed, lineage = self._terms(hanger, [model], [test])
-        run = partial(run_step, "update_test", test.test, hanger, model, samples, seed)
+        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id)
+        # Not the latest posterior: a result must not depend on which tests were computed before.
+        known = baseline.posterior if baseline and baseline.posterior.model == model else None
+        samples, seed, lineage = self._terms(hanger, [model], [test], known)
+        run = partial(run_step, "update_test", test.test, hanger, model, known, samples, seed)
         return Step(run, lambda found: self.store.updated(test, found, lineage, self.clock()))
 
     def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
@@ -169,13 +172,19 @@ class Jobs:
         return Step(run, lambda _: self.store.delivered(delivery, self.clock()))
 
     def _terms(
-        self, hanger: Hanger, models: Sequence[str], tests: Sequence[StoredTest]
+        self,
+        hanger: Hanger,
+        models: Sequence[str],
+        tests: Sequence[StoredTest],
+        known: Posterior | None = None,
     ) -> tuple[int, int, Lineage]:
         """Samples, seed and lineage of an update; the seed depends on what is updated alone."""
         settings = self.workspace.settings
         samples, seed = settings.samples, seed_of(settings.seed, [test.key for test in tests])
         terms = {"models": list(models), "samples": samples, "seed": seed}
-        inputs = [[test.key, asdict(test.lineage)] for test in tests]
+        inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
+        if known is not None:
+            inputs.append(known.samples.tolist())
         return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
 
 

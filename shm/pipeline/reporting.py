@@ -33,7 +33,7 @@ def hanger_report(
         posterior=posterior,
         generated_at=generated_at,
         version=shm.__version__,
-        trend=tuple(trend_row(each, stored.test) for stored, each in history),
+        trend=tuple(trend_row(each, stored.test, hanger) for stored, each in history),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
         drifts=store.drifts(hanger_id, latest.test.id),

@@ -18,7 +18,7 @@ from shm.read import read
 from shm.settings import Settings
 from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
-from shm.update import UpdateOptions, select, update
+from shm.update import UpdateOptions, refresh, select, update
 from shm.values import Alert, Drift, Hanger, ModalTest, Posterior, Selection
 from shm.watch import assess, decide
 
@@ -102,17 +102,21 @@ def select_model(
     return select(tests, models, UpdateOptions(samples=samples, seed=seed))
 
 
-def update_test(test: ModalTest, hanger: Hanger, name: str, samples: int, seed: int) -> Posterior:
-    """The posterior of one test in the selected class."""
-    return update([test], build(name, hanger), UpdateOptions(samples=samples, seed=seed))
+def update_test(
+    test: ModalTest, hanger: Hanger, name: str, known: Posterior | None, samples: int, seed: int
+) -> Posterior:
+    """The posterior of one test in the selected class, from what is `known` where that helps."""
+    model, options = build(name, hanger), UpdateOptions(samples=samples, seed=seed)
+    if known is None:
+        return update([test], model, options)
+    return refresh([test], model, known, options)
 
 
 def watch_test(
     baseline: Baseline, current: Posterior, hanger: Hanger, test: str, time: datetime
 ) -> tuple[tuple[Drift, ...], Alert | None]:
     """How far a test lies from the baseline, and the alert that this calls for."""
-    limits = hanger.thresholds
-    drifts = assess(baseline.posterior, current, limits, hanger=hanger.id, test=test, time=time)
-    alert = decide(drifts, limits)
+    drifts = assess(baseline.posterior, current, hanger, test=test, time=time)
+    alert = decide(drifts, hanger.thresholds)
     # A new baseline makes a standing condition a new one.
     return drifts, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")

@@ -12,16 +12,20 @@ from pathlib import Path
 from typing import Any
 
 from shm.errors import BadInput, ShmError
-from shm.models import Model, build
+from shm.models import Model, build, competing_names
 from shm.settings import Settings
 from shm.store import StoredRecording
 from shm.values import Hanger
 
 
 def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
-    """The selected class of a hanger, or all that the settings name where none is selected yet."""
-    names = (selected[hanger.id],) if hanger.id in selected else settings.model_names
-    return tuple(build(name, hanger) for name in names)
+    """The selected class of a hanger, or all that compete where none is selected yet.
+
+    Raises UsageError where the selected class does not apply to the hanger, or none does.
+    """
+    if hanger.id in selected:
+        return (build(selected[hanger.id], hanger),)
+    return tuple(build(name, hanger) for name in competing_names(hanger, settings.model_names))
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

@@ -59,8 +59,8 @@ class Interval:
 class TrendRow:
     """One test in the history of a hanger.
 
-    `stiffness` holds log10 of the end stiffness of each plane, as the watch compares it: the common
-    stiffness of both ends, which frequencies alone cannot tell apart.
+    `stiffness` holds log10 of the end stiffness of each plane in N m/rad, as the watch compares
+    it: the common stiffness of both ends, which frequencies alone cannot tell apart.
     """
 
     test: str
@@ -71,14 +71,15 @@ class TrendRow:
     temperature_c: float = NAN
 
 
-def trend_row(posterior: Posterior, test: ModalTest) -> TrendRow:
-    """The row of one test and its posterior."""
+def trend_row(posterior: Posterior, test: ModalTest, hanger: Hanger) -> TrendRow:
+    """The row of one test of `hanger` and its posterior."""
     return TrendRow(
         test=test.id,
         model=posterior.model,
         tension_n=Interval.of_samples(posterior.tension_n),
         stiffness={
-            name: Interval.of_samples(samples) for name, samples in end_stiffness(posterior).items()
+            name: Interval.of_samples(samples)
+            for name, samples in end_stiffness(posterior, hanger).items()
         },
         time=test.time,
         temperature_c=test.temperature_c,

@@ -7,6 +7,7 @@ matrices: J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6,
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from shm.errors import UsageError
+from shm.simulate.pieces import Piece, pieces_of
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -23,6 +25,7 @@ from shm.values import PLANES, FloatArray, Hanger, Plane
 _LEAST_ELEMENTS = 320
 _ELEMENTS_PER_MODE = 8
 _ELEMENTS_PER_EXACT_MODE = 32
+_LEAST_ELEMENTS_A_PIECE = 16
 
 # Element matrices over deflection, slope, deflection, slope, for an element of size 1.
 _BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float)
@@ -80,8 +83,9 @@ def plane_modes(
 ) -> PlaneModes:
     """The lowest `modes` modes of one plane."""
     elements = max(_LEAST_ELEMENTS, elements_per_mode * modes)
-    nodes = _nodes(state.effective_length_m(hanger), elements)
-    stiffness, mass = _matrices(nodes, hanger, state.tension_n)
+    pieces = pieces_of(hanger, state.effective_length_m(hanger))
+    nodes, owner = _nodes([piece.length_m for piece in pieces], elements)
+    stiffness, mass = _matrices(nodes, [pieces[index] for index in owner], state.tension_n)
     springs = state.springs_n_m_rad(plane)
     free = np.delete(np.arange(2 * len(nodes)), _held(2 * len(nodes), springs))
     stiffness = _with_springs(stiffness, springs)
@@ -92,30 +96,58 @@ def plane_modes(
 
 
 def modes_below(hanger: Hanger, state: HangerState, frequency_hz: float) -> int:
-    """At least as many as the plane modes below a frequency: those of a pinned beam (exact).
+    """At least as many as the plane modes below a frequency: those of pinned pieces (exact).
 
-    f_n = n/(2L) sqrt(T/m) sqrt(1 + n^2 pi^2 EI/(T L^2)); end springs only raise it.
+    f_n = n/(2L) sqrt(T/m) sqrt(1 + n^2 pi^2 EI/(T L^2)); end springs only raise it. Each joint of
+    two pieces adds a mode at most: without the deflection of the joints, and with a hinge at each,
+    they would be pinned beams.
     """
-    length = state.effective_length_m(hanger)
-    tension, bending = state.tension_n, hanger.bending_stiffness_n_m2
-    sought = hanger.mass_per_length_kg_m * (2 * math.pi * frequency_hz) ** 2
-    root = math.sqrt(max(tension**2 + 4 * bending * sought, 0.0))
-    wave_number = math.sqrt((root - tension) / (2 * bending))
-    return max(1, math.ceil(wave_number * length / math.pi))
+    pieces = pieces_of(hanger, state.effective_length_m(hanger))
+    modes = sum(_pinned_below(piece, state.tension_n, frequency_hz) for piece in pieces)
+    return max(1, modes + len(pieces) - 1)
 
 
-def _nodes(length_m: float, elements: int) -> FloatArray:
-    """Nodes that crowd towards the ends, where a string-like hanger bends in a thin layer."""
-    return length_m * np.sin(np.linspace(0, np.pi / 2, elements + 1)) ** 2
+def _pinned_below(piece: Piece, tension_n: float, frequency_hz: float) -> int:
+    bending = piece.bending_stiffness_n_m2
+    sought = piece.mass_per_length_kg_m * (2 * math.pi * frequency_hz) ** 2
+    root = math.sqrt(max(tension_n**2 + 4 * bending * sought, 0.0))
+    wave_number = math.sqrt((root - tension_n) / (2 * bending))
+    return math.ceil(wave_number * piece.length_m / math.pi)
 
 
-def _matrices(nodes_m: FloatArray, hanger: Hanger, tension_n: float) -> tuple[Any, Any]:
+def _nodes(lengths_m: Sequence[float], elements: int) -> tuple[FloatArray, list[int]]:
+    """Nodes of pieces end to end, and the piece of each element."""
+    total, start = sum(lengths_m), 0.0
+    nodes, owner = [np.zeros(1)], []
+    for index, length_m in enumerate(lengths_m):
+        share = max(_LEAST_ELEMENTS_A_PIECE, math.ceil(elements * length_m / total))
+        nodes.append(start + length_m * _spread(share, index == 0, index == len(lengths_m) - 1))
+        owner += [index] * share
+        start += length_m
+    return np.concatenate(nodes), owner
+
+
+def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
+    """Where the elements of a piece end, from 0 to 1.
+
+    They crowd towards the held ends, where a string-like hanger bends in a thin layer; small
+    elements elsewhere would drown the tension's stiffness in the rounding of their own.
+    """
+    angle = np.linspace(0, np.pi / 2, elements + 1)[1:]
+    if from_deck and to_arch:
+        return np.asarray(np.sin(angle) ** 2)
+    if from_deck:
+        return np.asarray(1 - np.cos(angle))
+    return np.asarray(np.sin(angle) if to_arch else angle / angle[-1])
+
+
+def _matrices(nodes_m: FloatArray, owners: Sequence[Piece], tension_n: float) -> tuple[Any, Any]:
     """Stiffness and mass of the free-free beam, sparse (2 nodes, 2 nodes)."""
     size = np.diff(nodes_m)
-    bending = hanger.bending_stiffness_n_m2 / size**3
+    bending = np.array([piece.bending_stiffness_n_m2 for piece in owners]) / size**3
     stiffness = _element(bending, _BENDING, size) + _element(tension_n / size, _TENSION, size)
-    mass = _element(hanger.mass_per_length_kg_m * size, _MASS, size)
-    return _assemble(stiffness), _assemble(mass)
+    mass_per_length = np.array([piece.mass_per_length_kg_m for piece in owners])
+    return _assemble(stiffness), _assemble(_element(mass_per_length * size, _MASS, size))
 
 
 def _element(scale: FloatArray, pattern: FloatArray, size: FloatArray) -> FloatArray:

@@ -91,6 +91,11 @@ def check(hanger: Hanger, state: HangerState, plan: HammerPlan) -> None:
     _refuse_unless(all(k >= 0 for k in springs), "springs must not be negative")
     length = state.effective_length_m(hanger)
     _refuse_unless(0 < length < math.inf, "the effective length must be positive")
+    together = sum(each.length_m for each in hanger.turnbuckles)
+    _refuse_unless(
+        together < length,
+        f"the effective length must exceed that of the turnbuckles, {together:g} m",
+    )
     places = (*plan.sensor_places_m(hanger), plan.hammer_place_m(hanger))
     inside = all(0 < place < length for place in places)
     _refuse_unless(inside, f"sensors and hammer must stand between 0 and {length:g} m")

@@ -106,6 +106,7 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
         names=tuple(document["parameters"]),
         predicted=tuple(_predicted(entry) for entry in document["predicted"]),
         tests=tuple(document["tests"]),
+        method=document.get("method", "tmcmc"),  # absent before there was another
         **values,
     )
 

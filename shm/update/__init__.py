@@ -2,6 +2,19 @@
 
 from __future__ import annotations
 
-from shm.update.updating import Progress, UpdateOptions, select, update
+from shm.update.ensemble import refresh
+from shm.update.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
+from shm.update.textbook import BiasedEvidenceWarning
+from shm.update.updating import select, update
 
-__all__ = ["Progress", "UpdateOptions", "select", "update"]
+__all__ = [
+    "METHODS",
+    "NOISE_FLOOR",
+    "TEXTBOOK",
+    "BiasedEvidenceWarning",
+    "Progress",
+    "UpdateOptions",
+    "refresh",
+    "select",
+    "update",
+]

@@ -1,35 +1,45 @@
-"""The last step: adaptive importance sampling from a t mixture fitted to the sampler's population.
+"""The last step: adaptive importance sampling from t mixtures fitted to the sampler's population.
 
 It gives the evidence without the bias and the scatter of the stages, with the error of a plain
-mean, and independent weighted draws of the posterior. The mixture is fitted anew to its own draws,
-resampled and moved, a few times (Cappe et al. 2004, population Monte Carlo); the best one is used.
-A share of the draws comes from the prior (Hesterberg 1995, defensive mixture), so that no weight
-is unbounded.
+mean, and independent weighted draws of the posterior. Each trial batch is drawn from a mixture
+refitted to all trials before, every draw weighed against the mixture of all batches' proposals
+(Cornuet et al. 2012, adaptive multiple importance sampling). The weights of draws that were fitted
+to are too small, so that the answer rests on fresh draws from the last mixture alone. Shares of it
+come from the prior (Hesterberg 1995, defensive mixture) and from the sampler's earlier, wider
+stages: no weight is unbounded.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.update.mixture import Normal, TMixture
+from shm.update.mixture import TMixture
 from shm.update.problem import Points, Problem
 from shm.update.search import Anchors
-from shm.update.tmcmc import Mover, normalised, systematic
+from shm.update.tmcmc import normalised, systematic
 from shm.values import FloatArray
 
 _CLUSTERS = 16
+_TAIL_CLUSTERS = 6
+_FROM_TAILS = 0.35
+_LATER = 0.3
 _FROM_PRIOR = 0.1
 _FROM_ANCHORS = 0.2
-_ENOUGH_ERROR = 0.05
-_BATCH = 4000
-_ADAPTATIONS = 4
-_MOST_BATCHES = 6
-_REFIT = 2000
+_ENOUGH_ERROR = 0.06
+_UNSEEN = 1.25
+_AIMED_ERROR = 0.025
+_TRIAL = 600
+_MOST_TRIALS = 10
+_ENOUGH_TO_FIT = 1.0
+_FEWEST, _MOST = 3000, 12000
+_EXTENSION = 4000
+_MOST_EXTENSIONS = 4
+_FEWEST_TO_FIT = 10
 _BATCHES = 4
-_REFIT_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +57,12 @@ class Weighted:
 
     @property
     def log_evidence_sd(self) -> float:
-        """Standard error of `log_evidence`, by the delta method."""
+        """Standard error of `log_evidence`, by the delta method.
+
+        Somewhat widened: draws seldom hold their share of the largest weights.
+        """
         square_mean = np.sum(np.exp(2 * (self.log_weights - self.log_evidence))) / self.draws
-        return float(np.sqrt((square_mean - 1) / self.draws))
+        return float(_UNSEEN * np.sqrt((square_mean - 1) / self.draws))
 
     @property
     def effective_sample_size(self) -> float:
@@ -91,51 +104,112 @@ def weigh(
     anchors: Anchors,
     enough: float,
     rng: np.random.Generator,
+    wider: Sequence[FloatArray] = (),
 ) -> Weighted:
-    """Draws from the best mixture until `enough` effective ones and a standard error of 0.05.
+    """Draws until `enough` effective ones and a standard error of 0.06, within reason.
 
-    The first mixtures hold the anchors too, lest the population have missed one that matters.
+    `population` (n, d) follows the posterior, each (n, d) of `wider` an earlier stage: these keep
+    a share of all proposals, for the tails. The first mixture holds the anchors too, lest the
+    population have missed one that matters.
     """
-    mixture, weighted = _adapted(problem, population, anchors, enough, rng)
-    for _ in range(_MOST_BATCHES):
-        if _suffices(weighted, enough):
+    tails = _tails(wider, rng)
+    core = TMixture.of(population, _CLUSTERS, rng).joined(anchors.normals(0.0), _FROM_ANCHORS)
+    trial = _Pool(problem)
+    for _ in range(_MOST_TRIALS):
+        trial.draw(core.mixed(tails, _FROM_TAILS) if tails else core, _TRIAL, rng)
+        weighted = trial.weighted()
+        core = core.refitted(weighted.points.z, _to_fit(weighted))
+        if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
             break
-        weighted = weighted.joined(_batch(problem, mixture, rng))
-    return weighted
+    proposal = core.mixed(tails, _FROM_TAILS) if tails else core
+    return _final(problem, proposal, trial.share(), enough, rng)
+
+
+def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture | None:
+    """A mixture for the earlier stages, the later the more; None where there are none."""
+    tails = None
+    for stage in stages:
+        fitted = TMixture.of(stage, _TAIL_CLUSTERS, rng)
+        tails = tails.mixed(fitted, _LATER) if tails else fitted
+    return tails
+
+
+def _final(
+    problem: Problem, mixture: TMixture, share: float, enough: float, rng: np.random.Generator
+) -> Weighted:
+    """Draws from one mixture, of which a `share` is expected to be effective.
+
+    Their number is set beforehand: to stop as soon as the weights look even would prefer samples
+    that have missed a large one.
+    """
+    final = _Pool(problem)
+    needed = max(enough, 1 / _AIMED_ERROR**2) / share
+    final.draw(mixture, int(np.clip(needed, _FEWEST, _MOST)), rng)
+    for _ in range(_MOST_EXTENSIONS):
+        if _suffices(final.weighted(), enough):
+            break
+        final.draw(mixture, _EXTENSION, rng)
+    return final.weighted()
 
 
 def _suffices(weighted: Weighted, enough: float) -> bool:
     return weighted.effective_sample_size >= enough and weighted.log_evidence_sd <= _ENOUGH_ERROR
 
 
-def _adapted(
-    problem: Problem,
-    population: FloatArray,
-    anchors: Anchors,
-    enough: float,
-    rng: np.random.Generator,
-) -> tuple[TMixture, Weighted]:
-    """The mixture with the most effective draws among a few refits, and a first batch of it."""
-    tried: list[tuple[TMixture, Weighted]] = []
-    for _ in range(1 + _ADAPTATIONS):
-        clusters = TMixture.of(population, _CLUSTERS, rng)
-        mixture = clusters.joined(anchors.normals(0.0), _FROM_ANCHORS)
-        weighted = _batch(problem, mixture, rng)
-        tried.append((mixture, weighted))
-        if _suffices(weighted, enough):
-            break
-        mover = Mover(problem, 0.0, Normal.of(population), step=0.3)
-        population = mover.walk(weighted.resampled(_REFIT, rng), _REFIT_STEPS, rng).z
-    return max(tried, key=lambda pair: pair[1].effective_sample_size)
+def _to_fit(weighted: Weighted) -> FloatArray:
+    """Weights to fit to, raised to a power below 1 where too few draws carry them."""
+    fewest = min(_FEWEST_TO_FIT * weighted.points.z.shape[1], len(weighted.log_weights) / 2)
+    power = 1.0
+    weights = normalised(weighted.log_weights)
+    while 1 / np.sum(weights**2) < fewest:
+        power *= 0.8
+        weights = normalised(power * weighted.log_weights)
+    return weights
 
 
-def _batch(problem: Problem, mixture: TMixture, rng: np.random.Generator) -> Weighted:
-    from_prior = rng.binomial(_BATCH, _FROM_PRIOR)
-    z = np.vstack([problem.draw_prior(from_prior, rng), mixture.draw(_BATCH - from_prior, rng)])
-    z = z[np.isfinite(problem.log_prior(z))]
-    points = problem.evaluate(z)
-    log_drawn = np.logaddexp(
-        np.log(_FROM_PRIOR) + problem.log_prior(z),
-        np.log1p(-_FROM_PRIOR) + mixture.log_density(z),
-    )
-    return Weighted(points, problem.log_posterior(points) - log_drawn, _BATCH)
+class _Pool:
+    """All draws so far, each with the log density of the mixture of all batches' proposals."""
+
+    def __init__(self, problem: Problem):
+        self._problem = problem
+        self._proposals: list[tuple[TMixture, int]] = []
+        self._z: FloatArray = np.empty((0, problem.dimension))
+        self._predicted: list[FloatArray] = []
+        self._log_prior: FloatArray = np.empty(0)
+        self._log_posterior: FloatArray = np.empty(0)
+        self._log_drawn: FloatArray = np.empty(0)
+
+    def draw(self, mixture: TMixture, draws: int, rng: np.random.Generator) -> None:
+        """One more batch; draws outside of the prior are counted, not evaluated."""
+        n = rng.binomial(draws, _FROM_PRIOR)
+        z = np.vstack([self._problem.draw_prior(n, rng), mixture.draw(draws - n, rng)])
+        log_prior = self._problem.log_prior(z)
+        inside = np.isfinite(log_prior)
+        z, log_prior = z[inside], log_prior[inside]
+        old = np.log(draws) + _log_proposal(mixture, self._z, self._log_prior)
+        self._proposals.append((mixture, draws))
+        new = [np.log(k) + _log_proposal(other, z, log_prior) for other, k in self._proposals]
+        points = self._problem.evaluate(z)
+        log_posterior = log_prior + self._problem.likelihood.marginal(points.predicted)
+        self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), logsumexp(new, axis=0))
+        self._z = np.vstack([self._z, z])
+        self._predicted.append(points.predicted)
+        self._log_prior = np.append(self._log_prior, log_prior)
+        self._log_posterior = np.append(self._log_posterior, log_posterior)
+
+    def weighted(self) -> Weighted:
+        """The draws with their weights."""
+        points = Points(self._z, np.vstack(self._predicted))
+        log_weights = self._log_posterior - self._log_drawn
+        draws = sum(k for _, k in self._proposals)
+        return Weighted(points, log_weights + np.log(draws), draws)
+
+    def share(self) -> float:
+        """Effective draws as a share of all."""
+        weighted = self.weighted()
+        return weighted.effective_sample_size / weighted.draws
+
+
+def _log_proposal(mixture: TMixture, z: FloatArray, log_prior: FloatArray) -> FloatArray:
+    log_mixture = np.log1p(-_FROM_PRIOR) + mixture.log_density(z)
+    return np.asarray(np.logaddexp(np.log(_FROM_PRIOR) + log_prior, log_mixture))

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from shm.values import FloatArray
 
 _DEGREES_OF_FREEDOM = 4.0
 _REGULAR = 1e-12
+_NO_SHARE = 1e-3
+_INFLATION = 1.5
 
 
 class Normal:
@@ -21,16 +23,17 @@ class Normal:
         self.mean = mean
         self.covariance = covariance + _REGULAR * np.eye(len(mean))
         self.factor = np.linalg.cholesky(self.covariance)
-        self._inverse_factor = np.linalg.inv(self.factor)
+        self.inverse_factor: FloatArray = np.linalg.inv(self.factor)
 
     @classmethod
     def of(cls, z: FloatArray, weights: FloatArray | None = None) -> Normal:
         """The normal of a population (n, d) with optional weights (n,)."""
-        return cls(np.average(z, axis=0, weights=weights), np.cov(z.T, aweights=weights))
+        covariance = np.atleast_2d(np.cov(z.T, aweights=weights))
+        return cls(np.average(z, axis=0, weights=weights), covariance)
 
     def whiten(self, z: FloatArray) -> FloatArray:
         """`z` (n, d) relative to the centre, in standard deviations."""
-        return np.asarray((z - self.mean) @ self._inverse_factor.T)
+        return np.asarray((z - self.mean) @ self.inverse_factor.T)
 
     def colour(self, y: FloatArray) -> FloatArray:
         """The inverse of `whiten`."""
@@ -41,21 +44,19 @@ class Normal:
         scale = np.sqrt(rng.chisquare(_DEGREES_OF_FREEDOM, n) / _DEGREES_OF_FREEDOM)
         return self.colour(rng.standard_normal((n, len(self.mean))) / scale[:, None])
 
-    def log_t(self, z: FloatArray) -> FloatArray:
-        """Log density (n,) of that t distribution at `z` (n, d)."""
-        nu, d = _DEGREES_OF_FREEDOM, len(self.mean)
-        square = (self.whiten(z) ** 2).sum(axis=1)
-        constant = gammaln((nu + d) / 2) - gammaln(nu / 2) - d / 2 * np.log(nu * np.pi)
-        log_volume = np.log(np.diag(self.factor)).sum()
-        return np.asarray(constant - log_volume - (nu + d) / 2 * np.log1p(square / nu))
-
 
 class TMixture:
     """A mixture of t distributions with given shares."""
 
     def __init__(self, parts: Sequence[Normal], shares: FloatArray):
         self.parts = parts
-        self.shares = shares / shares.sum()
+        self.shares: FloatArray = shares / shares.sum()
+        nu, d = _DEGREES_OF_FREEDOM, len(parts[0].mean)
+        self._whitening = np.vstack([part.inverse_factor for part in parts])
+        self._centres = np.concatenate([part.inverse_factor @ part.mean for part in parts])
+        log_volume = np.array([np.log(np.diag(part.factor)).sum() for part in parts])
+        constant = gammaln((nu + d) / 2) - gammaln(nu / 2) - d / 2 * np.log(nu * np.pi)
+        self._log_height = np.log(self.shares) + constant - log_volume
 
     @classmethod
     def of(cls, population: FloatArray, clusters: int, rng: np.random.Generator) -> TMixture:
@@ -66,10 +67,34 @@ class TMixture:
         shares = np.array([len(cluster) for cluster in members], dtype=float)
         return cls([_shrunk(cluster, whole) for cluster in members], shares)
 
+    def mixed(self, other: TMixture, share: float) -> TMixture:
+        """This mixture and `other`, which gets `share` of it."""
+        shares = np.append((1 - share) * self.shares, share * other.shares)
+        return TMixture([*self.parts, *other.parts], shares)
+
     def joined(self, parts: Sequence[Normal], share: float) -> TMixture:
         """This mixture with `parts` added, which get `share` of it in equal measure."""
         added = np.full(len(parts), share / len(parts))
         return TMixture([*self.parts, *parts], np.append((1 - share) * self.shares, added))
+
+    def refitted(self, z: FloatArray, weights: FloatArray) -> TMixture:
+        """One step of expectation maximisation (Peel and McLachlan 2000) towards points (n, d).
+
+        `weights` (n,) add to 1. Parts that no weight supports are dropped; a part that few
+        effective points support borrows covariance from the whole. The scales are somewhat widened.
+        """
+        squares = self._squares(z)
+        log_parts = self._log_parts(squares)
+        parts = np.exp(log_parts - log_parts.max(axis=1, keepdims=True))
+        owned = weights[:, None] * parts / parts.sum(axis=1, keepdims=True)
+        pull = (_DEGREES_OF_FREEDOM + z.shape[1]) / (_DEGREES_OF_FREEDOM + squares)
+        kept = owned.sum(axis=0) > _NO_SHARE
+        whole = Normal.of(z, weights)
+        fitted = [
+            _fitted(z, own, own * u, whole)
+            for own, u in zip(owned.T[kept], pull.T[kept], strict=True)
+        ]
+        return TMixture(fitted, owned.sum(axis=0)[kept])
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draws (n, d) in random order."""
@@ -79,13 +104,33 @@ class TMixture:
 
     def log_density(self, z: FloatArray) -> FloatArray:
         """Log density (n,) at `z` (n, d)."""
-        parts = [np.log(s) + p.log_t(z) for s, p in zip(self.shares, self.parts, strict=True)]
-        return np.asarray(logsumexp(parts, axis=0))
+        log_parts = self._log_parts(self._squares(z))
+        highest = log_parts.max(axis=1)
+        return np.asarray(highest + np.log(np.exp(log_parts - highest[:, None]).sum(axis=1)))
+
+    def _squares(self, z: FloatArray) -> FloatArray:
+        """Squared distances (n, parts) from the centres, in standard deviations of each part."""
+        y = (z @ self._whitening.T - self._centres).reshape(len(z), len(self.parts), z.shape[1])
+        return np.asarray(np.einsum("nkd,nkd->nk", y, y))
+
+    def _log_parts(self, squares: FloatArray) -> FloatArray:
+        nu, d = _DEGREES_OF_FREEDOM, len(self.parts[0].mean)
+        return np.asarray(self._log_height - (nu + d) / 2 * np.log1p(squares / nu))
 
 
 def _shrunk(cluster: FloatArray, whole: Normal) -> Normal:
     """The normal of a cluster; a small one borrows covariance from the whole."""
     n, d = cluster.shape
     borrowed = (d + 2) / (n + d + 2)
-    covariance = (1 - borrowed) * np.cov(cluster.T) + borrowed * whole.covariance
-    return Normal(cluster.mean(axis=0), covariance)
+    own = np.atleast_2d(np.cov(cluster.T))
+    return Normal(cluster.mean(axis=0), (1 - borrowed) * own + borrowed * whole.covariance)
+
+
+def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, whole: Normal) -> Normal:
+    """The t part of points `z` with their weights (n,) in it, plain and by distance."""
+    mean = pulled @ z / pulled.sum()
+    away = z - mean
+    own = _INFLATION * (away * pulled[:, None]).T @ away / owned.sum()
+    effective = owned.sum() ** 2 / (owned**2).sum()
+    borrowed = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
+    return Normal(mean, (1 - borrowed) * own + borrowed * whole.covariance)

@@ -62,8 +62,12 @@ class Problem:
 
     def predict(self, z: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) at `z` (n, d)."""
-        self.evaluations += len(z)
-        return self.likelihood.predict(self.model, self.theta(z))
+        return self.run(self.theta(z))
+
+    def run(self, theta: FloatArray) -> FloatArray:
+        """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
+        self.evaluations += len(theta)
+        return self.likelihood.predict(self.model, theta)
 
     def evaluate(self, z: FloatArray) -> Points:
         """Runs the model at `z` (n, d)."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shm.update.hint import Hint
 from shm.update.mixture import Normal
 from shm.update.problem import Problem
 from shm.values import FloatArray, IntArray
@@ -48,10 +49,10 @@ class Anchors:
         return [Normal(z, covariance) for z, covariance in zip(self.z, covariances, strict=True)]
 
 
-def search(problem: Problem, rng: np.random.Generator) -> Anchors:
-    """The best distinct optima of `problem`."""
-    z = problem.draw_prior(_STARTS, rng)
-    sigma = np.full(_STARTS, _FIRST_SIGMA)
+def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None) -> Anchors:
+    """The best distinct optima of `problem`; with a hint half of the starts do."""
+    z = hint.draw(_STARTS // 2, rng) if hint else problem.draw_prior(_STARTS, rng)
+    sigma = np.full(len(z), _FIRST_SIGMA)
     for _ in range(_PHASES):
         z, sigma = _descend(problem, z, sigma, _STEPS)
     promising = _distinct(problem, problem.fold(z))
@@ -59,6 +60,21 @@ def search(problem: Problem, rng: np.random.Generator) -> Anchors:
     z = problem.fold(np.vstack([z, ends]))
     z = z[_distinct(problem, z)]
     return Anchors(z, _model_error(problem, z), _slopes(problem, z), problem)
+
+
+def carried(
+    problem: Problem, z: FloatArray, sigma: float, rng: np.random.Generator, steps: int
+) -> FloatArray:
+    """Draws `z` (m, d) of another posterior brought to this one's data, by a few damped steps.
+
+    Each goes to the least-squares optimum for its own draw of the noise, of model error `sigma`,
+    with its old place as the centre of the prior (randomised maximum likelihood, Oliver, He and
+    Reynolds 1996): what the data say is made new, what they leave open is kept.
+    """
+    sigmas = np.full(len(z), sigma)
+    noise = _noise(problem, sigmas)
+    errors = noise * rng.standard_normal(noise.shape)
+    return problem.fold(_descend(problem, z, sigmas, steps, centre=z, errors=errors)[0])
 
 
 def _model_error(problem: Problem, z: FloatArray) -> FloatArray:
@@ -75,15 +91,28 @@ def _distinct(problem: Problem, z: FloatArray) -> IntArray:
 
 
 def _descend(
-    problem: Problem, z: FloatArray, sigma: FloatArray, steps: int
+    problem: Problem,
+    z: FloatArray,
+    sigma: FloatArray,
+    steps: int,
+    centre: FloatArray | float = 0.0,
+    errors: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """All points `z` (m, d) moved downhill together, and their model errors `sigma` (m,) after."""
+    """All points `z` (m, d) moved downhill together, and their model errors `sigma` (m,) after.
+
+    The prior stands around `centre`; the misfits (m, measurements) to reach are `errors`.
+    """
+
+    def fit(z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        residual = (problem.likelihood.misfit(problem.predict(z)) - errors) / noise
+        return residual, (residual**2).sum(axis=1) + ((z - centre) ** 2).sum(axis=1)
+
     noise = _noise(problem, sigma)
     damping = np.full(len(z), 1e-2)
-    residual, cost = _residual(problem, z, noise)
+    residual, cost = fit(z)
     for _ in range(steps):
-        step = _step(_slopes(problem, z) / noise[..., None], residual, z, damping)
-        trial_residual, trial_cost = _residual(problem, z + step, noise)
+        step = _step(_slopes(problem, z) / noise[..., None], residual, z - centre, damping)
+        trial_residual, trial_cost = fit(z + step)
         better = trial_cost < cost
         z = np.where(better[:, None], z + step, z)
         residual = np.where(better[:, None], trial_residual, residual)
@@ -98,27 +127,23 @@ def _noise(problem: Problem, sigma: FloatArray) -> FloatArray:
     return np.asarray(np.hypot(sigma[:, None], own) / np.sqrt(problem.likelihood.repeat))
 
 
-def _residual(problem: Problem, z: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Scaled residuals (m, measurements) and the cost (m,), the prior included."""
-    residual = problem.likelihood.misfit(problem.predict(z)) / noise
-    return residual, (residual**2).sum(axis=1) + (z**2).sum(axis=1)
-
-
 def _slopes(problem: Problem, z: FloatArray) -> FloatArray:
     """Derivatives of the fractional misfit, shape (m, measurements, d)."""
     steps = _DIFFERENCE * np.eye(z.shape[1])
-    shifted = np.vstack([z + sign * step for step in steps for sign in (1, -1)])
-    misfit = problem.likelihood.misfit(problem.predict(shifted))
-    pairs = misfit.reshape(z.shape[1], 2, len(z), -1)
-    return np.moveaxis(pairs[:, 0] - pairs[:, 1], 0, -1) / (2 * _DIFFERENCE)
+    shifted = np.vstack([z, *(z + step for step in steps)])
+    misfit = problem.likelihood.misfit(problem.predict(shifted)).reshape(len(steps) + 1, len(z), -1)
+    return np.asarray(np.moveaxis(misfit[1:] - misfit[0], 0, -1) / _DIFFERENCE)
 
 
 def _step(
-    slopes: FloatArray, residual: FloatArray, z: FloatArray, damping: FloatArray
+    slopes: FloatArray, residual: FloatArray, away: FloatArray, damping: FloatArray
 ) -> FloatArray:
-    """The damped Gauss-Newton step (m, d), at most 1 in each direction."""
-    normal = np.einsum("mnd,mne->mde", slopes, slopes) + np.eye(z.shape[1])
-    gradient = np.einsum("mnd,mn->md", slopes, residual) + z
+    """The damped Gauss-Newton step (m, d) of points `away` (m, d) from the prior's centre.
+
+    At most 1 in each direction.
+    """
+    normal = np.einsum("mnd,mne->mde", slopes, slopes) + np.eye(away.shape[1])
+    gradient = np.einsum("mnd,mn->md", slopes, residual) + away
     diagonal = np.einsum("mdd->md", normal) * damping[:, None]
-    damped = normal + diagonal[..., None] * np.eye(z.shape[1])
+    damped = normal + diagonal[..., None] * np.eye(away.shape[1])
     return -np.linalg.solve(damped, gradient[..., None])[..., 0].clip(-1, 1)

@@ -12,13 +12,10 @@ from datetime import datetime
 
 import numpy as np
 
-from shm.values import Alert, Drift, FloatArray, Posterior, Thresholds
+from shm.models import MODELS
+from shm.values import PLANES, Alert, Drift, FloatArray, Hanger, Posterior, Thresholds
 
 TENSION = "tension"
-_END_STIFFNESS = {
-    "transverse_end_stiffness": ("log10_k1", "log10_k3"),
-    "longitudinal_end_stiffness": ("log10_k2", "log10_k4"),
-}
 _NINETY_PERCENT = 1.645
 
 
@@ -40,13 +37,7 @@ class _Comparison:
 
 
 def assess(
-    baseline: Posterior,
-    current: Posterior,
-    thresholds: Thresholds,
-    *,
-    hanger: int,
-    test: str,
-    time: datetime,
+    baseline: Posterior, current: Posterior, hanger: Hanger, *, test: str, time: datetime
 ) -> tuple[Drift, ...]:
     """The shift of tension and, where the model class has springs, of the end stiffness.
 
@@ -55,7 +46,7 @@ def assess(
     """
     return tuple(
         Drift(
-            hanger=hanger,
+            hanger=hanger.id,
             test=test,
             time=time,
             quantity=comparison.quantity,
@@ -66,39 +57,34 @@ def assess(
             threshold=comparison.threshold,
             probability=comparison.probability,
         )
-        for comparison in _comparisons(baseline, current, thresholds)
+        for comparison in _comparisons(baseline, current, hanger)
     )
 
 
-def _comparisons(
-    baseline: Posterior, current: Posterior, thresholds: Thresholds
-) -> list[_Comparison]:
-    rng = np.random.default_rng(current.seed)
+def _comparisons(baseline: Posterior, current: Posterior, hanger: Hanger) -> list[_Comparison]:
+    rng, limits = np.random.default_rng(current.seed), hanger.thresholds
     before, after = _paired(baseline.tension_n, current.tension_n, rng)
-    limit = thresholds.tension_shift_fraction
-    comparisons = [_Comparison(TENSION, before, after, after / before - 1, limit)]
-    limit = thresholds.stiffness_shift_decades
-    now = end_stiffness(current)
-    for quantity, earlier in end_stiffness(baseline).items():
+    shift = after / before - 1
+    comparisons = [_Comparison(TENSION, before, after, shift, limits.tension_shift_fraction)]
+    limit, now = limits.stiffness_shift_decades, end_stiffness(current, hanger)
+    for quantity, earlier in end_stiffness(baseline, hanger).items():
         if quantity in now:
             before, after = _paired(earlier, now[quantity], rng)
             comparisons.append(_Comparison(quantity, before, after, after - before, limit))
     return comparisons
 
 
-def end_stiffness(posterior: Posterior) -> dict[str, FloatArray]:
-    """log10 of the two ends' common stiffness (samples,), for each plane that has springs."""
+def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]:
+    """log10 of the two ends' common stiffness in N m/rad (samples,), for planes with springs."""
+    model = MODELS[posterior.model](hanger)
+    theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
+    deck, arch = model.springs_n_m_rad(theta)
+    flexibility = 1 / deck + 1 / arch
     return {
-        quantity: _common(posterior, springs)
-        for quantity, springs in _END_STIFFNESS.items()
-        if set(springs) <= set(posterior.names)
+        f"{plane}_end_stiffness": np.log10(2 / values)
+        for plane, values in zip(PLANES, flexibility.T, strict=True)
+        if np.all(values > 0)
     }
-
-
-def _common(posterior: Posterior, springs: tuple[str, str]) -> FloatArray:
-    """log10 of the common stiffness of the two ends, shape (samples,)."""
-    flexibility = sum(10.0 ** -posterior.parameter(name) for name in springs)
-    return np.asarray(np.log10(2 / flexibility))
 
 
 def _paired(

@@ -23,8 +23,8 @@ from tests.helpers.workspaces import make_workspace, put, write_test
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
-    monkeypatch.setattr(steps, "update", quick_update.update)
-    monkeypatch.setattr(steps, "select", quick_update.select)
+    for verb in ("update", "refresh", "select"):
+        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
 
 
 @pytest.fixture

@@ -93,7 +93,8 @@ def _nurse(folder: Path) -> None:
     from tests.helpers import quick_update
 
     logging.basicConfig(filename=folder / "daemon.log", level=logging.INFO)
-    steps.update, steps.select = quick_update.update, quick_update.select  # type: ignore[assignment]
+    for verb in ("update", "refresh", "select"):
+        setattr(steps, verb, getattr(quick_update, verb))
     for line in sys.stdin:
         pid = os.fork()
         if pid == 0:

@@ -54,10 +54,10 @@ def a_posterior(model: str = "beam1", tests: tuple[str, ...] = ("t1",), seed: in
     return Posterior(
         model=model,
         hanger=3,
-        names=("theta_F", "sigma"),
-        samples=rng.normal([1.0, 0.01], [0.02, 0.001], (50, 2)),
+        names=("theta_F", "theta_L", "sigma"),
+        samples=rng.normal([1.0, 0.98, 0.01], [0.02, 0.005, 0.001], (50, 3)),
         log_likelihood=rng.normal(size=50),
-        most_probable=np.array([1.0, 0.01]),
+        most_probable=np.array([1.0, 0.98, 0.01]),
         nominal_tension_n=711e3,
         log_evidence=-12.5,
         log_evidence_sd=float("nan"),

@@ -1,11 +1,13 @@
 """A stand-in for the sampler where the flow, not the posterior, is tested: quick, seeded alike.
 
-Tension is looked up from the mean measured frequency; the scatter is one percent.
+Tension is looked up from the mean measured frequency; the scatter is one percent. All other
+parameters stay in the middle of their priors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,16 +23,17 @@ def update(tests: Sequence[ModalTest], model: Model, options: UpdateOptions) -> 
     rng = np.random.default_rng(options.seed)
     measured = np.mean([mode.frequency_hz for test in tests for mode in test.modes])
     centre = np.interp(measured, [_mean_hz(model.hanger, t) for t in _TENSIONS], _TENSIONS)
-    samples = np.column_stack(
-        [rng.normal(centre, 0.01, options.samples), rng.uniform(0, 0.01, options.samples)]
-    )
+    middle = (model.prior.lower + model.prior.upper) / 2
+    samples = np.tile(np.append(middle, 0.0), (options.samples, 1))
+    samples[:, 0] = rng.normal(centre, 0.01, options.samples)
+    samples[:, -1] = rng.uniform(0, 0.01, options.samples)
     return Posterior(
         model=model.name,
         hanger=tests[0].hanger,
-        names=("theta_F", "sigma"),
+        names=(*model.parameter_names, "sigma"),
         samples=samples,
         log_likelihood=rng.normal(size=options.samples),
-        most_probable=np.array([centre, 0.005]),
+        most_probable=np.concatenate([[centre], middle[1:], [0.005]]),
         nominal_tension_n=model.hanger.nominal_tension_n,
         log_evidence=0.0,
         log_evidence_sd=0.1,
@@ -42,6 +45,13 @@ def update(tests: Sequence[ModalTest], model: Model, options: UpdateOptions) -> 
         seed=options.seed,
         seconds=0.0,
     )
+
+
+def refresh(
+    tests: Sequence[ModalTest], model: Model, known: Posterior, options: UpdateOptions
+) -> Posterior:
+    assert known.model == model.name
+    return replace(update(tests, model, options), method="re-weighted")
 
 
 def _mean_hz(hanger: Hanger, tension: float) -> float:

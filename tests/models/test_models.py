@@ -45,13 +45,26 @@ def test_a_swap_changes_no_frequency(model, theta) -> None:
         )
 
 
-def test_shapes_reach_one_and_vanish_at_the_ends(model, theta) -> None:
-    length = theta[0, model.parameter_names.index("theta_L")] * HANGER_3.length_m
-    x = np.linspace(0, length, 501)
+def test_shapes_reach_one_and_vanish_at_ends_that_are_held(model, theta) -> None:
+    scale = dict(zip(model.parameter_names, theta[0], strict=True)).get("theta_L", 1.0)
+    x = np.linspace(0, scale * HANGER_3.length_m, 501)
     for plane in ("transverse", "longitudinal"):
         shape = model.shape(theta[0], plane, 2, x)
         assert np.abs(shape).max() == pytest.approx(1, abs=1e-3)
-        np.testing.assert_allclose(shape[[0, -1]], 0, atol=1e-9)
+        if model.name != "solid1":
+            np.testing.assert_allclose(shape[[0, -1]], 0, atol=1e-9)
+
+
+def test_a_stiffer_end_spring_is_told_in_newton_metres_and_raises_a_frequency(model, theta) -> None:
+    deck, arch = model.springs_n_m_rad(theta)
+    stiffer = theta.copy()
+    for column, name in enumerate(model.parameter_names):
+        stiffer[:, column] += np.log10(2) * name.startswith("log10_k")
+    springs = np.concatenate([deck, arch])
+    doubled = np.concatenate(model.springs_n_m_rad(stiffer))
+    np.testing.assert_allclose(doubled, 2 * springs)
+    assert np.all(model.frequencies_hz(stiffer, 3) >= model.frequencies_hz(theta, 3))
+    assert np.isinf(springs).all() == (model.name in {"beam1", "s1", "s2", "solid0"})
 
 
 def test_named_values_are_packed_in_order_and_wrong_names_are_refused(model) -> None:

@@ -19,8 +19,8 @@ def workspace(tmp_path: Path) -> Workspace:
 def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """The flow is tested with a stand-in for the sampler, unless a test asks for the real one."""
     if "real_sampler" not in request.fixturenames:
-        monkeypatch.setattr(steps, "update", quick_update.update)
-        monkeypatch.setattr(steps, "select", quick_update.select)
+        for verb in ("update", "refresh", "select"):
+            monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
 
 
 @pytest.fixture

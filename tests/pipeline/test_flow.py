@@ -91,16 +91,16 @@ def test_tests_are_watched_in_the_order_of_their_times(
     """Two tests show a loss; the earlier is slower to update, and still the alert names it."""
     spool(workspace, "t0", day=0)
     ingest(workspace)
-    quick, done = steps.update, threading.Event()
+    quick, done = steps.refresh, threading.Event()
 
-    def update(tests: Any, model: Any, options: Any) -> Posterior:
+    def refresh(tests: Any, model: Any, known: Any, options: Any) -> Posterior:
         if tests[0].id == "t1":
             assert done.wait(20)
             time.sleep(0.1)
         done.set()
-        return quick(tests, model, options)
+        return quick(tests, model, known, options)
 
-    monkeypatch.setattr(steps, "update", update)
+    monkeypatch.setattr(steps, "refresh", refresh)
     for day in (1, 2):
         spool(workspace, f"t{day}", day=day, tension=0.8)
     ingest(workspace, lanes=3)
@@ -229,6 +229,29 @@ def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Wo
         assert [event.kind for event in store.events()] == ["duplicate", "duplicate"]
 
 
+def test_later_tests_start_from_the_baseline_whichever_was_computed_before(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick, known_samples = steps.refresh, []
+
+    def refresh(tests: Any, model: Any, known: Posterior, options: Any) -> Posterior:
+        known_samples.append(known.samples)
+        return quick(tests, model, known, options)
+
+    monkeypatch.setattr(steps, "refresh", refresh)
+    for day, name in enumerate(("first", "second", "third")):
+        spool(workspace, name, day=day)
+        ingest(workspace)
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert len(known_samples) == 2
+        for samples in known_samples:
+            np.testing.assert_array_equal(samples, baseline.posterior.samples)
+        ways = {test.test.id: posterior.method for test, posterior in store.history(3)}
+    assert ways == {"first": "tmcmc", "second": "re-weighted", "third": "re-weighted"}
+
+
 def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
     found = []
     for label, names, lanes in (("one", "abc", 1), ("many", "cab", 3)):
@@ -274,14 +297,14 @@ def test_a_flow_ended_after_any_turn_goes_on_where_it_stood(workspace: Workspace
 def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    update = steps.update
+    refresh = steps.refresh
 
-    def fail_on_t2(tests, model, options):  # type: ignore[no-untyped-def]
+    def fail_on_t2(tests, model, known, options):  # type: ignore[no-untyped-def]
         if tests[0].id == "t2":
             raise ZeroDivisionError("division by zero")
-        return update(tests, model, options)
+        return refresh(tests, model, known, options)
 
-    monkeypatch.setattr(steps, "update", fail_on_t2)
+    monkeypatch.setattr(steps, "refresh", fail_on_t2)
     for day in (1, 2, 3):
         spool(workspace, f"t{day}", day=day)
     ingest(workspace)
@@ -408,14 +431,14 @@ def test_a_test_that_no_class_describes_is_refused_with_its_file(workspace: Work
 def test_a_refused_test_does_not_stop_the_others_of_its_file(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    update = steps.update
+    refresh = steps.refresh
 
-    def fail_on_second(tests, model, options):  # type: ignore[no-untyped-def]
+    def fail_on_second(tests, model, known, options):  # type: ignore[no-untyped-def]
         if tests[0].id == "second":
             raise ShmError("will not.", remedy="Leave it out.")
-        return update(tests, model, options)
+        return refresh(tests, model, known, options)
 
-    monkeypatch.setattr(steps, "update", fail_on_second)
+    monkeypatch.setattr(steps, "refresh", fail_on_second)
     test = write_test(workspace.spool / "x.modes.json", workspace)
     tests = [
         replace(test, id=name, time=START + timedelta(days=day))

@@ -102,7 +102,7 @@ def season(hanger: Hanger) -> HangerReport:
     return HangerReport(
         bridge="Arch bridge", hanger=hanger, tests=tests, posterior=posteriors[-1],
         generated_at=START + timedelta(days=130), version="0.1.0",
-        trend=tuple(trend_row(p, t) for p, t in zip(posteriors, tests, strict=True)),
+        trend=tuple(trend_row(p, t, hanger) for p, t in zip(posteriors, tests, strict=True)),
         baseline=posteriors[0], selection=Selection((posteriors[-1], rival), (0.982, 0.018)),
         drifts=drifts,
         alerts=(Alert("3-t009", 3, "t009", time, "tension fell by 7.2 %", drifts[:1]),),
@@ -124,5 +124,11 @@ def bare(hanger: Hanger) -> HangerReport:
         log_evidence_sd=float("nan"), effective_sample_size=float("nan"), r_hat=float("nan"),
     )  # fmt: skip
     return HangerReport(
-        "Arch bridge", hanger, (test,), posterior, START, "0.1.0", (trend_row(posterior, test),)
+        "Arch bridge",
+        hanger,
+        (test,),
+        posterior,
+        START,
+        "0.1.0",
+        (trend_row(posterior, test, hanger),),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from shm.bridge import load_bridge, load_hanger
 from shm.errors import BadInput
+from shm.values import EndPlate, Turnbuckle
 
 ROUND = """
 [[hanger]]
@@ -19,6 +21,9 @@ elastic_modulus_pa = 200e9
 density_kg_m3 = 7800
 nominal_tension_n = 711e3
 """
+
+
+SQUARE = "area_m2 = 0.01\nsecond_moment_m4 = 1e-5\nmass_per_length_kg_m = 80\n"
 
 
 def written(folder: Path, text: str) -> Path:
@@ -36,10 +41,7 @@ def test_a_round_bar_has_the_section_of_its_diameter(tmp_path: Path) -> None:
 
 
 def test_a_given_section_is_taken_as_it_is(tmp_path: Path) -> None:
-    text = ROUND.replace(
-        "diameter_m = 0.130",
-        "area_m2 = 0.01\nsecond_moment_m4 = 1e-5\nmass_per_length_kg_m = 80",
-    )
+    text = ROUND.replace("diameter_m = 0.130\n", SQUARE)
     hanger = load_hanger(written(tmp_path, text))
     assert (hanger.area_m2, hanger.second_moment_m4) == (0.01, 1e-5)
     assert hanger.mass_per_length_kg_m == 80
@@ -48,6 +50,99 @@ def test_a_given_section_is_taken_as_it_is(tmp_path: Path) -> None:
 def test_a_given_mass_per_length_beats_the_density_of_a_round_bar(tmp_path: Path) -> None:
     text = ROUND.replace("density_kg_m3 = 7800", "mass_per_length_kg_m = 120")
     assert load_hanger(written(tmp_path, text)).mass_per_length_kg_m == 120
+
+
+PLATE = """
+[hanger.plate]
+length_m = 1.0915
+thickness_m = 0.040
+end_width_m = 1.0644
+neck_width_m = 0.241
+slot_m = 0.562
+edge_node_spacing_m = 0.0425
+"""
+TURNBUCKLE = """
+[[hanger.turnbuckle]]
+x_m = 1.5
+length_m = 0.6
+mass_kg = 150
+bending_stiffness_n_m2 = 1e7
+"""
+
+
+def test_a_plain_round_bar_keeps_its_diameter_and_has_nothing_else(tmp_path: Path) -> None:
+    hanger = load_hanger(written(tmp_path, ROUND))
+    assert hanger.diameter_m == 0.130
+    assert (hanger.poissons_ratio, hanger.bending_stiffness_factor) == (0.3, 1.0)
+    assert (hanger.plate, hanger.turnbuckles, hanger.models) == (None, (), ())
+
+
+def test_a_section_that_is_not_round_has_no_diameter(tmp_path: Path) -> None:
+    text = ROUND.replace("diameter_m = 0.130\n", SQUARE)
+    assert np.isnan(load_hanger(written(tmp_path, text)).diameter_m)
+
+
+def test_a_strand_has_its_share_of_the_bending_stiffness(tmp_path: Path) -> None:
+    text = ROUND + "bending_stiffness_factor = 0.4\npoissons_ratio = 0.28\n"
+    hanger = load_hanger(written(tmp_path, text))
+    assert hanger.bending_stiffness_n_m2 == pytest.approx(0.4 * 200e9 * hanger.second_moment_m4)
+    assert hanger.poissons_ratio == 0.28
+
+
+def test_admitted_models_plate_and_turnbuckles_are_read(tmp_path: Path) -> None:
+    upper = TURNBUCKLE.replace("x_m = 1.5", "x_m = 9")
+    text = ROUND + 'models = ["beam2", "solid2"]\n' + PLATE + upper + TURNBUCKLE
+    hanger = load_hanger(written(tmp_path, text))
+    assert hanger.models == ("beam2", "solid2")
+    assert hanger.plate == EndPlate(1.0915, 0.040, 1.0644, 0.241, 0.562, 0.0425)
+    assert [turnbuckle.x_m for turnbuckle in hanger.turnbuckles] == [1.5, 9.0]
+    assert hanger.turnbuckles[0] == Turnbuckle(1.5, 0.6, 150.0, 1e7)
+
+
+def test_a_described_hanger_survives_the_way_to_another_process(tmp_path: Path) -> None:
+    hanger = load_hanger(written(tmp_path, ROUND + PLATE + TURNBUCKLE))
+    assert pickle.loads(pickle.dumps(hanger)) == hanger
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (("thickness_m = 0.040\n", ""), "plate: thickness_m is missing"),
+        (("slot_m", "slit_m"), "plate: unknown key slit_m"),
+        (("slot_m = 0.562", "slot_m = 1.2"), "slot_m = 1.2 is not shorter than the plate"),
+        (("length_m = 1.0915", "length_m = 6"), "no free rod in a hanger of 12 m"),
+        (("thickness_m = 0.040", "thickness_m = 0.13"), "thickness_m = 0.13 is not below the rod"),
+        (("neck_width_m = 0.241", "neck_width_m = 0.1"), "neck_width_m = 0.1 is below the rod"),
+        (("end_width_m = 1.0644", "end_width_m = 0.1"), "end_width_m = 0.1 is below the rod"),
+        (("spacing_m = 0.0425", "spacing_m = 2"), "edge_node_spacing_m = 2 is above end_width_m"),
+        (("[hanger.plate]", "[[hanger.plate]]"), "plate is not a table"),
+        (("diameter_m = 0.130\n", SQUARE), "only a round rod can have plates"),
+        (("x_m = 1.5", "x_m = 0.2"), r"from -0.1 m to 0.5 m, beyond the deck end \(0 m\)"),
+        (("x_m = 1.5", "x_m = 11.8"), r"beyond the arch end \(12 m\)"),
+        (("x_m = 9", "x_m = 2"), "beyond the turnbuckle that ends at 1.8 m"),
+        (("mass_kg = 150", "mass_kg = 0"), "turnbuckle 2: mass_kg = 0 is not a positive"),
+        (("mass_kg = 150\n", ""), "turnbuckle 2: mass_kg is missing"),
+        (("mass_kg", "weight_kg"), "unknown key weight_kg"),
+        (("[[hanger.turnbuckle]]", "[hanger.turnbuckle]"), "turnbuckle is not a list of tables"),
+        (("id = 3", "id = 3\npoissons_ratio = 0.5"), "poissons_ratio = 0.5 is not from 0 to 0.499"),
+        (("id = 3", "id = 3\nbending_stiffness_factor = 1.5"), "1.5 is not from 1e-06 to 1"),
+        (("id = 3", "id = 3\nbending_stiffness_factor = 0"), "0 is not from 1e-06 to 1"),
+        (("id = 3", "id = 3\nbending_stiffness_factor = 'half'"), "'half' is not a number"),
+        (("id = 3", "id = 3\nmodels = 'beam1'"), "models = 'beam1' is not a list"),
+        (("id = 3", "id = 3\nmodels = []"), "is not a list of different names"),
+        (("id = 3", "id = 3\nmodels = ['beam1', 'beam1']"), "is not a list of different names"),
+    ],
+)
+def test_a_part_that_cannot_be_is_named(
+    tmp_path: Path, change: tuple[str, str], complaint: str
+) -> None:
+    upper = TURNBUCKLE.replace("x_m = 1.5", "x_m = 9").replace("mass_kg = 150", "mass_kg = 60")
+    text = ROUND + PLATE + (upper + TURNBUCKLE if "list of" not in complaint else TURNBUCKLE)
+    path = written(tmp_path, text.replace(*change))
+    with pytest.raises(BadInput, match=complaint) as refusal:
+        load_hanger(path)
+    assert "[[hanger]] id 3" in str(refusal.value)
+    assert refusal.value.remedy
 
 
 def test_thresholds_and_hooks_are_read(tmp_path: Path) -> None:

@@ -35,8 +35,15 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert (page.parent / target).exists(), target
 
 
-def test_the_validation_table_stands_in_readme_and_docs() -> None:
-    for page in (ROOT / "README.md", ROOT / "docs" / "validation.md"):
-        text = page.read_text()
-        table = text.split("<!-- validation -->")[1].split("<!-- /validation -->")[0]
-        assert table.count("beam2") == 4
+@pytest.mark.parametrize(
+    ("page", "name", "word", "times"),
+    [
+        ("README.md", "selection", "solid2", 1),
+        ("docs/validation.md", "selection", "| solid2", 4),
+        ("docs/validation.md", "frequencies", "| A.5", 7),
+    ],
+)
+def test_the_validation_tables_stand_in_their_pages(page, name, word, times) -> None:
+    text = (ROOT / page).read_text()
+    table = text.split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+    assert table.count(word) == times

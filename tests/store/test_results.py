@@ -194,9 +194,9 @@ def test_what_was_never_updated_is_nothing_there(store: Store, test: str | None)
 def test_samples_are_exported_as_a_plain_table() -> None:
     posterior = a_posterior()
     names, table = samples_table(posterior)
-    assert names == ("theta_F", "sigma", "tension_n", "log_likelihood")
-    assert table.shape == (50, 4)
-    np.testing.assert_array_equal(table[:, 2], posterior.samples[:, 0] * 711e3)
+    assert names == ("theta_F", "theta_L", "sigma", "tension_n", "log_likelihood")
+    assert table.shape == (50, 5)
+    np.testing.assert_array_equal(table[:, 3], posterior.samples[:, 0] * 711e3)
     arrays = unpack(samples_npz(posterior))
     np.testing.assert_array_equal(arrays["tension_n"], posterior.tension_n)
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
-from shm.values import FloatArray, Posterior, Thresholds
-from shm.watch import assess, decide
+from shm.values import FloatArray, Posterior
+from shm.watch import assess, decide, end_stiffness
+from tests.helpers.hangers import HANGER_3
 
 NOMINAL_N = 700e3
 WHEN = datetime(2026, 5, 1, tzinfo=UTC)
-THRESHOLDS = Thresholds(0.05, 0.5, 0.95)
+THRESHOLDS = HANGER_3.thresholds
 
 
 def posterior(
@@ -21,7 +23,10 @@ def posterior(
 ) -> Posterior:
     """A posterior of a given tension ratio; with springs unless `log10_k` is None."""
     rng = np.random.default_rng(seed)
-    columns: dict[str, FloatArray] = {"theta_F": tension * (1 + sd * rng.standard_normal(1000))}
+    columns: dict[str, FloatArray] = {
+        "theta_F": tension * (1 + sd * rng.standard_normal(1000)),
+        "theta_L": np.ones(1000),
+    }
     if log10_k is not None:
         for name in ("log10_k1", "log10_k2", "log10_k3", "log10_k4"):
             columns[name] = log10_k + 0.05 * rng.standard_normal(1000)
@@ -47,7 +52,7 @@ def posterior(
 
 
 def compare(before: Posterior, after: Posterior):
-    return assess(before, after, THRESHOLDS, hanger=3, test="t2", time=WHEN)
+    return assess(before, after, HANGER_3, test="t2", time=WHEN)
 
 
 def test_a_loss_beyond_the_threshold_is_an_alert_that_says_how_much() -> None:
@@ -102,6 +107,23 @@ def test_exchanging_the_ends_is_no_shift() -> None:
 def test_a_clamped_class_has_no_stiffness_to_watch() -> None:
     drifts = compare(posterior(1.0, log10_k=None), posterior(1.0, log10_k=None, seed=2))
     assert [drift.quantity for drift in drifts] == ["tension"]
+
+
+def test_a_solid_class_is_watched_by_the_rotational_stiffness_of_its_faces() -> None:
+    beam = posterior(1.0)
+    solid = replace(
+        beam,
+        model="solid2",
+        names=("theta_F", "log10_k1", "log10_k2", "log10_k3", "log10_k4"),
+        samples=np.column_stack([beam.samples[:, :1], np.full((1000, 4), 8.0)]),
+    )
+    found = end_stiffness(solid, HANGER_3)
+    spacing, thickness, width = 0.0425, 0.040, 1.0644
+    thin = 2e8 / spacing * (width * thickness**2 / 4 + thickness**3 / 12)
+    wide = 2e8 / spacing * (width**3 / 12 + thickness * width**2 / 4)
+    expected = np.log10(2 / (1 / thin + 1 / wide))
+    assert list(found) == ["transverse_end_stiffness", "longitudinal_end_stiffness"]
+    np.testing.assert_allclose(list(found.values()), expected)
 
 
 def test_the_same_posteriors_give_the_same_decision() -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
-from shm.values import FloatArray, IntArray
+from shm.values import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,15 +17,15 @@ class AffineSystem:
     """K(theta) = K_e + T K_sigma + sum of k_j S_j over the springs j, and the mass.
 
     Matrices are (unknowns, unknowns). `springs` belong to 1 N/m a node, by the name of their
-    parameter. `axis_unknowns` are the deflections of the hanger's axis at `axis_m` from the deck
-    end.
+    parameter. `axis_deflection` (points, unknowns) gives the deflection of the hanger's axis at
+    `axis_m` (points,) from the deck end.
     """
 
     stiffness: csr_array
     initial_stress: csr_array
     springs: Mapping[str, csr_array]
     mass: csr_array
-    axis_unknowns: IntArray
+    axis_deflection: csr_array
     axis_m: FloatArray
 
     @property
@@ -58,20 +58,21 @@ def natural_modes(
 ) -> Modes:
     """The lowest modes, by Lanczos iterations with the factorised stiffness."""
     matrix = stiffness(system, tension_n, springs_n_m)
+    inverse = LinearOperator(matrix.shape, matvec=factorised(matrix).solve)
     # A fixed start makes the result the same each time.
     start = np.ones(system.unknowns)
     eigenvalues, vectors = eigsh(
-        matrix, k=modes, M=csc_array(system.mass), sigma=0.0, OPinv=_inverse(matrix), v0=start
+        matrix, k=modes, M=csc_array(system.mass), sigma=0.0, OPinv=inverse, v0=start
     )
     order = np.argsort(eigenvalues)
     return Modes(eigenvalues[order], vectors[:, order])
 
 
-def _inverse(matrix: csc_array) -> LinearOperator:
-    factors = splu(
+def factorised(matrix: csc_array) -> SuperLU:
+    """The factors of a symmetric positive definite matrix."""
+    return splu(
         matrix,
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    return LinearOperator(matrix.shape, matvec=factors.solve)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, kron
+from scipy.sparse import csr_array, eye_array, kron
 
 from shm.models.solid.affine import AffineSystem
 from shm.models.solid.elasticity import Solid
@@ -11,7 +11,7 @@ from shm.models.solid.geometry import Geometry
 from shm.models.solid.material import Material
 from shm.models.solid.mesh import Mesh
 from shm.models.solid.support import AXIAL, LATERAL, Edge, Support
-from shm.values import PLANES, BoolArray, FloatArray, IntArray, Plane
+from shm.values import PLANES, BoolArray, FloatArray, Plane
 
 
 def assembled(
@@ -30,24 +30,24 @@ def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
     def kept(matrix: csr_array) -> csr_array:
         return csr_array(matrix[free][:, free])
 
-    unknowns, axis_m = _deflections(solid, free, axis)
+    axis_deflection, axis_m = _deflections(solid, free, axis)
     return AffineSystem(
         kept(solid.stiffness),
         kept(solid.initial_stress),
         {name: kept(matrix) for name, matrix in springs.items()},
         kept(solid.mass),
-        unknowns,
+        axis_deflection,
         axis_m,
     )
 
 
-def _deflections(solid: Solid, free: BoolArray, axis: int) -> tuple[IntArray, FloatArray]:
-    """The free unknowns along `axis` on the hanger's axis, and where they lie, deck end first."""
+def _deflections(solid: Solid, free: BoolArray, axis: int) -> tuple[csr_array, FloatArray]:
+    """Deflections along `axis` of the hanger's axis from the free unknowns, and where they lie."""
     mesh = solid.mesh
-    nodes = np.flatnonzero(mesh.on_plane(0) & mesh.on_plane(1) & free.reshape(-1, 3)[:, axis])
-    z = mesh.cells.doflocs[2, nodes]
-    nodes = nodes[np.argsort(z)]
-    return (np.cumsum(free) - 1)[3 * nodes + axis], np.sort(z)
+    nodes = np.flatnonzero(mesh.on_plane(0) & mesh.on_plane(1))
+    nodes = nodes[np.argsort(mesh.cells.doflocs[2, nodes])]
+    picked = csr_array(eye_array(3 * mesh.nodes, format="csr")[3 * nodes + axis][:, free])
+    return picked, mesh.cells.doflocs[2, nodes]
 
 
 def _held(solid: Solid, support: Support, axis: int) -> BoolArray:

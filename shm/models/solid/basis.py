@@ -1,4 +1,8 @@
-"""The reduced basis of one solid class of one hanger, from memory, from disk or made now."""
+"""The reduced basis of one solid class of one hanger, from memory, from disk or made now.
+
+scikit-fem and scipy's sparse matrices are slow to import and needed only while a basis is made or
+the full model solved: they are imported there, so that all else begins quickly.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,19 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shm.models.solid import cache
-from shm.models.solid.affine import AffineSystem
 from shm.models.solid.geometry import Geometry
 from shm.models.solid.material import Material
-from shm.models.solid.reduction import TARGET_ERROR, Box, Reduction, reduce
+from shm.models.solid.projected import TARGET_ERROR, Reduction
 from shm.models.solid.support import Support
-from shm.values import Plane
+from shm.values import FloatArray, Plane
+
+if TYPE_CHECKING:
+    from shm.models.solid.affine import AffineSystem
 
 # To be raised whenever the same description gives another basis than before.
 _VERSION = 1
@@ -37,12 +44,23 @@ class Description:
 
     def system(self, plane: Plane, modes: int) -> AffineSystem:
         """The full model's bending plane, on a mesh that resolves that many modes."""
-        # scikit-fem takes a second to import; once bases are made, nothing needs it.
         from shm.models.solid.assembly import assembled
 
         fine = self.geometry.fineness
         fine = replace(fine, rod=max(fine.rod, _CELLS_A_MODE * modes))
         return assembled(replace(self.geometry, fineness=fine), self.material, self.support, plane)
+
+    def full_frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
+        """Transverse frequencies (n, modes) of the full model at points of tension and log10 k."""
+        from shm.models.solid.affine import natural_modes
+
+        system = self.system("transverse", rounded_up(modes))
+        return np.array(
+            [
+                natural_modes(system, float(point[0]), 10 ** point[1:], modes).frequencies_hz
+                for point in points
+            ]
+        )
 
     def key(self, modes: int) -> str:
         """A name that changes with anything that would change the basis."""
@@ -63,6 +81,8 @@ def transverse_basis(
     key = description.key(modes)
     found = _made.get(key) or cache.load(key)
     if found is None:
+        from shm.models.solid.reduction import Box, reduce
+
         box = Box(np.array(description.lower), np.array(description.upper))
         found = reduce(description.system("transverse", modes), box, modes, progress)
         cache.save(key, found)

@@ -14,7 +14,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from shm.models.solid.reduction import Projected, Reduction
+from shm.models.solid.projected import Projected, Reduction
 
 _log = logging.getLogger(__name__)
 

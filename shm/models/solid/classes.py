@@ -9,8 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from shm.models.base import Model, silent
-from shm.models.solid.affine import natural_modes
-from shm.models.solid.basis import Description, rounded_up, transverse_basis
+from shm.models.solid.basis import Description, transverse_basis
 from shm.models.solid.geometry import Fineness, Geometry
 from shm.models.solid.material import Material
 from shm.models.solid.support import (
@@ -19,6 +18,7 @@ from shm.models.solid.support import (
     AXIAL_SPRINGS,
     FIXED,
     Support,
+    face_springs_n_m_rad,
 )
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -72,15 +72,9 @@ class SolidModel(Model):
         return frequencies
 
     def reference_frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        system = self.description().system("transverse", rounded_up(modes))
-        planes = [
-            [
-                natural_modes(system, float(point[0]), 10 ** point[1:], modes).frequencies_hz
-                for point in self._points(theta, plane)
-            ]
-            for plane in PLANES
-        ]
-        return np.stack(planes, axis=1)
+        points = np.vstack([self._points(theta, plane) for plane in PLANES])
+        found = self.description().full_frequencies_hz(points, modes)
+        return np.stack(np.split(found, 2), axis=1)
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
         # Slow to import, and seldom needed.
@@ -96,6 +90,16 @@ class SolidModel(Model):
         scale = np.copysign(np.abs(along(fine)).max(), along(from_deck))
         inside = (x_m >= ends[0]) & (x_m <= ends[1])
         return np.where(inside, along(depth) / scale, 0.0)
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        plate = self.hanger.plate
+        if plate is None or not self.support.axial_springs:
+            return super().springs_n_m_rad(theta)
+        values = {name: 10 ** theta[:, self.parameter_names.index(name)] for name in AXIAL}
+        deck = face_springs_n_m_rad(plate, values["log10_k1"], values["log10_k2"])
+        arch = face_springs_n_m_rad(plate, values["log10_k4"], values["log10_k3"])
+        # The deck-end plate is thin across the bridge, the arch-end plate along it.
+        return np.stack(deck, axis=1), np.stack(arch[::-1], axis=1)
 
     def description(self) -> Description:
         """What the basis depends on."""

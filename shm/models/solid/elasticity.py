@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array, kron
-from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementHex2
 
+from shm.models.solid.affine import factorised
 from shm.models.solid.material import Material
 from shm.models.solid.mesh import Mesh
 from shm.values import FloatArray
@@ -97,7 +97,7 @@ def _pulled(mesh: Mesh, stiffness: csr_array) -> FloatArray:
     held[axis_node, 2] = True
     free = ~held.ravel()
     displacement = np.zeros(3 * mesh.nodes)
-    displacement[free] = splu(csc_array(stiffness[free][:, free])).solve(load.ravel()[free])
+    displacement[free] = factorised(csc_array(stiffness[free][:, free])).solve(load.ravel()[free])
     return displacement
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 from scipy.sparse import coo_array, csr_array
 from skfem import Basis, ElementQuad2, LinearForm, MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
@@ -18,8 +19,13 @@ _HEXAHEDRON = np.array(
     [[0, 0, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 1, 1], [1, 0, 1], [1, 1, 0], [1, 1, 1]]
 )
 _QUADRILATERAL = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-# The integrals of products of a line's three shape functions, over its length.
-_LINE_SHARE = np.array([[4.0, 2.0, -1.0], [2.0, 16.0, 2.0], [-1.0, 2.0, 4.0]]) / 30
+# Gauss points and weights on a line from 0 to 1, its three shape functions and their slopes there.
+_POINTS, _WEIGHTS = leggauss(3)
+_POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
+_SHAPES = np.stack(
+    [(2 * _POINTS - 1) * (_POINTS - 1), 4 * _POINTS * (1 - _POINTS), _POINTS * (2 * _POINTS - 1)]
+)
+_SLOPES = np.stack([4 * _POINTS - 3, 4 - 8 * _POINTS, 4 * _POINTS - 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +91,9 @@ class Mesh:
         # The arch-end plate lies along x, the deck-end plate along y.
         first, second = (running, fixed) if large == arch else (fixed, running)
         lines = self._find(np.stack([first, second, level])).reshape(-1, 3)
-        lengths = np.ptp(self.cells.doflocs[:, lines], axis=2).max(axis=0)
+        places = self.cells.doflocs[int(large != arch), lines]
         where = np.repeat(lines, 3, axis=1).ravel(), np.tile(lines, 3).ravel()
-        values = (lengths[:, None] * _LINE_SHARE.ravel()).ravel()
+        values = np.einsum("ap,bp,p,lp->lab", _SHAPES, _SHAPES, _WEIGHTS, places @ _SLOPES).ravel()
         return csr_array(coo_array((values, where), shape=(self.nodes, self.nodes)))
 
     def _level(self, arch: bool) -> float:

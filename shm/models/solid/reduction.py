@@ -18,9 +18,9 @@ from scipy.linalg import solve_triangular
 from scipy.sparse import csc_array
 
 from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
+from shm.models.solid.projected import TARGET_ERROR, Projected, Reduction
 from shm.values import BoolArray, FloatArray
 
-TARGET_ERROR = 1e-4
 _REFERENCE_SPRING_N_M = 1e8
 _NEGLIGIBLE = 1e-6
 _CANDIDATES = 300
@@ -49,36 +49,6 @@ class Box:
     def spread(self, n: int, rng: np.random.Generator) -> FloatArray:
         """`n` points (n, 1 + springs) anywhere in the box."""
         return rng.uniform(self.lower, self.upper, (n, len(self.lower)))
-
-
-@dataclass(frozen=True, eq=False)
-class Projected:
-    """K(theta) on a basis whose mass matrix is the unit matrix.
-
-    `matrices` (2 + springs, n, n): stiffness, initial stress of 1 N, springs of 1 N/m per node.
-    """
-
-    matrices: FloatArray
-
-    @property
-    def unknowns(self) -> int:
-        return int(self.matrices.shape[1])
-
-    def stiffness(self, points: FloatArray) -> FloatArray:
-        """K (m, n, n) at points (m, 1 + springs) of tension in N and log10 k."""
-        factors = np.column_stack([np.ones(len(points)), points[:, :1], 10 ** points[:, 1:]])
-        flat = self.matrices.reshape(len(self.matrices), -1)
-        square = (len(points), self.unknowns, self.unknowns)
-        return np.asarray((factors @ flat).reshape(square))
-
-    def frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
-        """The lowest frequencies (m, modes) at points (m, 1 + springs)."""
-        eigenvalues = np.linalg.eigvalsh(self.stiffness(points))[:, :modes]
-        return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
-
-    def mode(self, point: FloatArray, order: int) -> FloatArray:
-        """The coordinates (n,) of one mode at a point (1 + springs,)."""
-        return np.asarray(np.linalg.eigh(self.stiffness(point[None])[0])[1][:, order - 1])
 
 
 @dataclass(eq=False)
@@ -147,21 +117,6 @@ class Reservoir:
         return basis, Projected((projected + projected.swapaxes(1, 2)) / 2)
 
 
-@dataclass(frozen=True, eq=False)
-class Reduction:
-    """A projected system and how it was found.
-
-    `deflections` (points, n) are its vectors along the hanger's axis at `axis_m`; `solutions` of
-    the full model were needed; `estimated_error` is the worst against the reservoir.
-    """
-
-    projected: Projected
-    axis_m: FloatArray
-    deflections: FloatArray
-    solutions: int
-    estimated_error: float
-
-
 def reduce(
     system: AffineSystem, box: Box, modes: int, progress: Callable[[float], None]
 ) -> Reduction:
@@ -177,7 +132,7 @@ def reduce(
     return Reduction(
         projected,
         system.axis_m,
-        reservoir.vectors[system.axis_unknowns] @ basis,
+        (system.axis_deflection @ reservoir.vectors) @ basis,
         solutions,
         error,
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shm.values import Plane
+from shm.values import EndPlate, FloatArray, Plane
 
 Edge = tuple[bool, bool]
 """Whether it is at the arch end, and whether it is a large one."""
@@ -46,3 +46,20 @@ class Support:
 FIXED = Support(axial_springs=False, lateral_springs=False)
 AXIAL_SPRINGS = Support(axial_springs=True, lateral_springs=False)
 ALL_SPRINGS = Support(axial_springs=True, lateral_springs=True)
+
+
+def face_springs_n_m_rad(
+    plate: EndPlate, large_n_m: FloatArray, small_n_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rotational stiffness (n,) of a rigid face on its axial springs (n,), per node.
+
+    First against rotation in the direction of the plate's thickness, then of its width.
+    """
+    thickness, width = plate.thickness_m, plate.end_width_m
+    large, small = (
+        2 * large_n_m / plate.edge_node_spacing_m,
+        2 * small_n_m / plate.edge_node_spacing_m,
+    )
+    across = large * width * thickness**2 / 4 + small * thickness**3 / 12
+    along = large * width**3 / 12 + small * thickness * width**2 / 4
+    return across, along

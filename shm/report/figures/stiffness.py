@@ -23,8 +23,7 @@ def _draw(data: HangerReport) -> Figure | None:
         axes.set_title(words.quantity(name), fontsize=9, color=style.INK, loc="left")
         _trend(axes, data, name)
         _levels(axes, data, name)
-    unit = words.stiffness_unit(data.posterior.model)
-    panels[0].set_ylabel(f"log10 of stiffness in {unit}", fontsize=9, color=style.INK)
+    panels[0].set_ylabel("log10 of stiffness in N m/rad", fontsize=9, color=style.INK)
     return figure
 
 
@@ -43,7 +42,7 @@ def _trend(axes: Axes, data: HangerReport, name: str) -> None:
 
 
 def _levels(axes: Axes, data: HangerReport, name: str) -> None:
-    baseline = end_stiffness(data.baseline).get(name) if data.baseline else None
+    baseline = end_stiffness(data.baseline, data.hanger).get(name) if data.baseline else None
     if baseline is None:
         return
     level, reach = float(baseline.mean()), data.hanger.thresholds.stiffness_shift_decades

@@ -1,0 +1,81 @@
+"""`shm validate`: our figures beside the thesis's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import rich_click as click
+
+from shm.bridge import load_hanger
+from shm.errors import GateNotMet
+from shm_cli import thesis
+from shm_cli.common import json_option, progress_bar, seed_option, show, show_table, table
+from shm_cli.validation import frequencies, selection
+
+Texts = tuple[str, ...]
+
+
+@click.command()
+@click.option(
+    "--markdown", "as_markdown", is_flag=True, help="The tables as Markdown, for the docs."
+)
+@seed_option
+@json_option
+def command(as_markdown: bool, seed: int, as_json: bool) -> None:
+    """Our figures beside the thesis's, with a gate.
+
+    The thesis's tables of computed frequencies, then hanger 3: all five model classes on both
+    printings of its measured table, once and counted ten times. Exit code 6 where a table is off
+    by more than its mark, or the evidence does not prefer springs to fixed ends.
+
+    \b
+    Example: shm validate --markdown
+    """
+    tables, chosen = compared(seed)
+    parts = {
+        "computed frequencies of the thesis": (
+            frequencies.HEADS,
+            [*map(frequencies.cells, tables)],
+        ),
+        "hanger 3 of the thesis": (selection.HEADS, [*map(selection.cells, chosen)]),
+    }
+    if as_json:
+        show(
+            {
+                "frequencies": [asdict(row) for row in tables],
+                "selection": [asdict(row) for row in chosen],
+            }
+        )
+    elif as_markdown:
+        click.echo("\n\n".join(markdown(heads, rows) for heads, rows in parts.values()))
+    else:
+        for title, (heads, rows) in parts.items():
+            _show(title, heads, rows)
+    misses = [*frequencies.misses(tables), *selection.misses(chosen)]
+    if misses:
+        message = "; ".join(misses)
+        raise GateNotMet(f"{message}.", remedy="See docs/validation.md for the marks.")
+
+
+def compared(
+    seed: int,
+) -> tuple[list[frequencies.FrequencyRow], list[selection.SelectionRow]]:
+    """All rows of both parts."""
+    hanger = load_hanger(thesis.HANGER_FILE)
+    with progress_bar("validating") as progress:
+        tables = frequencies.compared(hanger, progress)
+        return tables, selection.compared(hanger, seed, progress)
+
+
+def _show(title: str, heads: Texts, rows: Sequence[Texts]) -> None:
+    made = table(title, *heads)
+    for row in rows:
+        made.add_row(*row)
+    show_table(made)
+
+
+def markdown(heads: Texts, rows: Sequence[Texts]) -> str:
+    """A Markdown table."""
+    lines = [heads, ("---",) * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,157 @@
+"""The thesis's tables of computed frequencies beside ours, at the nominal tension."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shm.models import build
+from shm.values import FloatArray, Hanger
+from shm_cli import thesis
+
+_MODES = 6
+_SPRINGS = {"solid1": 8, "solid2": 4}
+_STIFFEST_SOLVED = 1e13
+_CORNERS_OF_TABLE_A_2 = 10
+_TENSIONS_OF_BEAM_TABLES_N = {"length_12": 745e3, "length_9_817": 724e3}
+_MISPRINT = {("length_9_817", 2)}
+
+
+@dataclass(frozen=True)
+class FrequencyRow:
+    """One column of a table: transverse frequencies of modes 1 to 6, ours and the printed ones.
+
+    `limit_percent` is the mark that `difference_percent` has to keep; NaN where the difference is
+    only stated.
+    """
+
+    table: str
+    model: str
+    condition: str
+    ours_hz: tuple[float, ...]
+    printed_hz: tuple[float, ...]
+    difference_percent: float
+    limit_percent: float
+
+    @property
+    def missed(self) -> bool:
+        return self.difference_percent > self.limit_percent
+
+
+def compared(hanger: Hanger, progress: Callable[[str, float], None]) -> list[FrequencyRow]:
+    """All columns of tables A.1 to A.7."""
+    tables = tomllib.loads(thesis.TABLES_FILE.read_text(encoding="utf-8"))
+    rows: list[FrequencyRow] = []
+    for done, make in enumerate(_PARTS, start=1):
+        rows += make(hanger, tables)
+        progress("frequency tables", done / len(_PARTS))
+    return rows
+
+
+def _fixed_ends(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
+    nominal = np.array([[1.0]])
+    for name, table, limit in (("s1", "A.1", 0.3), ("s2", "A.2", np.nan), ("solid0", "A.3", 0.3)):
+        found = build(name, hanger).reference_frequencies_hz(nominal, _MODES)[0, 0]
+        yield _row(table, name, "711 kN", found, tables[name]["converged"], limit)
+
+
+def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
+    """Table A.2 is that of a rod meshed as a regular decagon under the same stress."""
+    plate_m = hanger.plate.length_m if hanger.plate else 0.0
+    corners, radius = _CORNERS_OF_TABLE_A_2, hanger.diameter_m / 2
+    angle = 2 * np.pi / corners
+    area = corners / 2 * radius**2 * np.sin(angle)
+    faceted = replace(
+        hanger,
+        area_m2=area,
+        second_moment_m4=corners * radius**4 / 24 * np.sin(angle) * (2 + np.cos(angle)),
+        mass_per_length_kg_m=hanger.mass_per_length_kg_m * area / hanger.area_m2,
+        nominal_tension_n=hanger.nominal_tension_n * area / hanger.area_m2,
+    )
+    theta = np.array([[1.0, 1 - 2 * plate_m / hanger.length_m]])
+    euler = build("beam1", faceted).frequencies_hz(theta, _MODES)[0, 0]
+    shear = _solid_over_beam(hanger, theta)
+    condition = f"section of {corners} corners, same stress"
+    yield _row("A.2", "s2", condition, euler * shear, tables["s2"]["converged"], 0.3)
+
+
+def _solid_over_beam(hanger: Hanger, theta: FloatArray) -> FloatArray:
+    """What shear and rotary inertia take off the clamped beam's frequencies."""
+    solid = build("s2", hanger).reference_frequencies_hz(theta[:, :1], _MODES)[0, 0]
+    return np.asarray(solid / build("beam1", hanger).frequencies_hz(theta, _MODES)[0, 0])
+
+
+def _springs(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
+    for name, table in (("solid1", "A.4"), ("solid2", "A.5")):
+        stiffness = {key: min(float(key[1:]), _STIFFEST_SOLVED) for key in tables[name]}
+        theta = np.array([[1.0, *[np.log10(k)] * _SPRINGS[name]] for k in stiffness.values()])
+        found = build(name, hanger).reference_frequencies_hz(theta, _MODES)[:, 0]
+        for key, ours in zip(stiffness, found, strict=True):
+            condition = f"k = {float(key[1:]):.0e} N/m"
+            yield _row(table, name, condition, ours, tables[name][key], 1.5)
+
+
+def _clamped_beams(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
+    """Tables A.6 and A.7 at the stated tension, and at the one that they carry."""
+    model = build("beam1", hanger)
+    for key, length_m, table in (("length_12", 12.0, "A.6"), ("length_9_817", 9.817, "A.7")):
+        printed = list(tables["beam1_in_thesis"][key])
+        carried_n = _TENSIONS_OF_BEAM_TABLES_N[key]
+        for tension_n, limit in ((hanger.nominal_tension_n, np.nan), (carried_n, 0.1)):
+            theta = np.array([[tension_n / hanger.nominal_tension_n, length_m / hanger.length_m]])
+            ours = model.frequencies_hz(theta, _MODES)[0, 0]
+            kept = [m for m in range(_MODES) if (key, m) not in _MISPRINT or np.isnan(limit)]
+            left_out = "" if len(kept) == _MODES else ", mode 3 left out as a misprint"
+            condition = f"{tension_n / 1e3:.0f} kN{left_out}"
+            yield _row(table, "beam1", condition, ours, printed, limit, kept)
+
+
+_PARTS = (_fixed_ends, _table_a_2_explained, _springs, _clamped_beams)
+
+
+def _row(
+    table: str,
+    model: str,
+    condition: str,
+    ours: FloatArray,
+    printed: list[float],
+    limit: float,
+    kept: list[int] | None = None,
+) -> FrequencyRow:
+    difference = 100 * np.abs(ours / np.array(printed) - 1)[kept or slice(None)].max()
+    ours_hz = tuple(float(value) for value in ours)
+    return FrequencyRow(table, model, condition, ours_hz, tuple(printed), float(difference), limit)
+
+
+HEADS = (
+    "table", "class", "condition", "ours, modes 1 to 6 (Hz)", "printed (Hz)",
+    "largest difference", "mark",
+)  # fmt: skip
+
+
+def cells(row: FrequencyRow) -> tuple[str, ...]:
+    """The row as texts under `HEADS`."""
+    mark = "stated" if np.isnan(row.limit_percent) else f"{row.limit_percent:g} %"
+    return (
+        row.table,
+        row.model,
+        row.condition,
+        ", ".join(f"{value:.2f}" for value in row.ours_hz),
+        ", ".join(f"{value:.2f}" for value in row.printed_hz),
+        f"{row.difference_percent:.2f} %",
+        mark,
+    )
+
+
+def misses(rows: list[FrequencyRow]) -> list[str]:
+    """The marks that were missed."""
+    return [
+        f"table {row.table}, {row.condition}: {row.difference_percent:.2f} % off, "
+        f"the mark is {row.limit_percent:g} %"
+        for row in rows
+        if row.missed
+    ]

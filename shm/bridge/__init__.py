@@ -1,0 +1,7 @@
+"""Reads `bridge.toml`: the bridge, its hangers, their thresholds, the hooks, the settings."""
+
+from __future__ import annotations
+
+from shm.bridge.description import Bridge, Hook, load_bridge, load_hanger
+
+__all__ = ["Bridge", "Hook", "load_bridge", "load_hanger"]

@@ -1,0 +1,145 @@
+"""A `[[hanger]]` table: section, plates, turnbuckles, admitted model classes, thresholds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from shm.bridge.table import Table
+from shm.values import NAN, EndPlate, Hanger, Thresholds, Turnbuckle
+
+_REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
+_SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
+_OPTIONAL = (
+    "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
+    "plate", "turnbuckle", "thresholds",
+)  # fmt: skip
+_KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
+_LARGEST_POISSONS_RATIO = 0.499
+_LEAST_FACTOR = 1e-6
+
+
+def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
+    """The hanger of a `[[hanger]]` table; raises BadInput naming table and key at fault."""
+    table = Table(values, f"[[hanger]] id {values.get('id', '?')}", path)
+    table.refuse_unknown(_KNOWN)
+    length_m, elastic_modulus, tension = (table.positive(key) for key in _REQUIRED[1:])
+    area, second_moment, mass = _section(table)
+    diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
+    return Hanger(
+        id=_whole_number(table),
+        length_m=length_m,
+        elastic_modulus_pa=elastic_modulus,
+        area_m2=area,
+        second_moment_m4=second_moment,
+        mass_per_length_kg_m=mass,
+        nominal_tension_n=tension,
+        name=str(values.get("name", "")),
+        thresholds=_thresholds(table.table("thresholds")),
+        diameter_m=diameter,
+        poissons_ratio=table.fraction("poissons_ratio", 0.3, 0.0, _LARGEST_POISSONS_RATIO),
+        bending_stiffness_factor=table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1),
+        plate=_plate(table.table("plate"), length_m, diameter),
+        turnbuckles=_turnbuckles(table.tables("turnbuckle"), length_m),
+        models=_models(table),
+    )
+
+
+def _section(table: Table) -> tuple[float, float, float]:
+    """Area, second moment and mass per length, given or those of a round bar."""
+    if "diameter_m" not in table:
+        area, second_moment, mass = (table.positive(key) for key in _SECTION)
+        return area, second_moment, mass
+    diameter = table.positive("diameter_m")
+    round_area, round_moment = math.pi * diameter**2 / 4, math.pi * diameter**4 / 64
+    area = table.positive("area_m2") if "area_m2" in table else round_area
+    moment = table.positive("second_moment_m4") if "second_moment_m4" in table else round_moment
+    if "mass_per_length_kg_m" in table:
+        return area, moment, table.positive("mass_per_length_kg_m")
+    return area, moment, area * table.positive("density_kg_m3")
+
+
+def _whole_number(table: Table) -> int:
+    value = table.values.get("id")
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+        return value
+    raise table.refusal("id must be a whole number", "Give id = 1, 2, 3, ...")
+
+
+def _models(table: Table) -> tuple[str, ...]:
+    if "models" not in table:
+        return ()
+    names = table.values["models"]
+    texts = isinstance(names, list) and all(isinstance(name, str) and name for name in names)
+    if not texts or not names or len(set(names)) < len(names):
+        raise table.refusal(
+            f"models = {names!r} is not a list of different names",
+            'Write models = ["beam1", "beam2"], or leave it out to admit all.',
+        )
+    return tuple(names)
+
+
+def _thresholds(table: Table | None) -> Thresholds:
+    if table is None:
+        return Thresholds()
+    table.refuse_unknown(field.name for field in fields(Thresholds))
+    values = {key: table.positive(key) for key in table.values}
+    if values.get("alert_probability", 0.5) >= 1:
+        raise table.refusal("alert_probability must lie below 1", "Give 0.95, say.")
+    return Thresholds(**values)
+
+
+def _plate(table: Table | None, hanger_length_m: float, diameter_m: float) -> EndPlate | None:
+    if table is None:
+        return None
+    names = [field.name for field in fields(EndPlate)]
+    table.refuse_unknown(names)
+    plate = EndPlate(**{name: table.positive(name) for name in names})
+    if math.isnan(diameter_m):
+        raise table.refusal(
+            "only a round rod can have plates",
+            "Give diameter_m, or leave the plate out.",
+        )
+    for problem, wrong in _plate_faults(plate, hanger_length_m, diameter_m).items():
+        if wrong:
+            raise table.refusal(problem, "Check the drawing; all lengths are in m.")
+    return plate
+
+
+def _plate_faults(plate: EndPlate, hanger_length_m: float, diameter_m: float) -> dict[str, bool]:
+    rod = f"the rod's diameter_m ({diameter_m:g})"
+    return {
+        f"the two plates (length_m = {plate.length_m:g} each) leave no free rod in a hanger of "
+        f"{hanger_length_m:g} m": 2 * plate.length_m >= hanger_length_m,
+        f"slot_m = {plate.slot_m:g} is not shorter than the plate (length_m = "
+        f"{plate.length_m:g})": plate.slot_m >= plate.length_m,
+        f"thickness_m = {plate.thickness_m:g} is not below {rod}": plate.thickness_m >= diameter_m,
+        f"neck_width_m = {plate.neck_width_m:g} is below {rod}": plate.neck_width_m < diameter_m,
+        f"end_width_m = {plate.end_width_m:g} is below {rod}": plate.end_width_m < diameter_m,
+        f"edge_node_spacing_m = {plate.edge_node_spacing_m:g} is above end_width_m "
+        f"({plate.end_width_m:g})": plate.edge_node_spacing_m > plate.end_width_m,
+    }
+
+
+def _turnbuckles(tables: list[Table], hanger_length_m: float) -> tuple[Turnbuckle, ...]:
+    """The turnbuckles from the deck end up; they may touch, but not overlap."""
+    names = [field.name for field in fields(Turnbuckle)]
+    found = []
+    for table in tables:
+        table.refuse_unknown(names)
+        found.append((Turnbuckle(**{name: table.positive(name) for name in names}), table))
+    found.sort(key=lambda pair: pair[0].x_m)
+    reached, before = 0.0, "the deck end (0 m)"
+    for turnbuckle, table in found:
+        first = turnbuckle.x_m - turnbuckle.length_m / 2
+        last = turnbuckle.x_m + turnbuckle.length_m / 2
+        if first < reached or last > hanger_length_m:
+            raise table.refusal(
+                f"it goes from {first:g} m to {last:g} m, beyond "
+                + (before if first < reached else f"the arch end ({hanger_length_m:g} m)"),
+                "x_m is its middle, measured from the deck end; turnbuckles may not overlap.",
+            )
+        reached, before = last, f"the turnbuckle that ends at {last:g} m"
+    return tuple(turnbuckle for turnbuckle, _ in found)

@@ -1,0 +1,82 @@
+"""One table of `bridge.toml` and the checks of its values; what is wrong is named with a remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shm.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Table:
+    """The values of a table, what to call it in a message, and the file that it stands in."""
+
+    values: Mapping[str, Any]
+    label: str
+    path: Path
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def refusal(self, problem: str, remedy: str) -> BadInput:
+        """The error that says what is wrong with this table."""
+        return BadInput(f"{self.label}: {problem}.", file=self.path, remedy=remedy)
+
+    def refuse_unknown(self, known: Iterable[str]) -> None:
+        """Raises BadInput where a key is none of `known`."""
+        for key in self.values.keys() - set(known):
+            raise self.refusal(f"unknown key {key}", f"Known: {', '.join(sorted(known))}.")
+
+    def positive(self, key: str) -> float:
+        """A number above 0; raises BadInput where it is missing or none."""
+        value = self._number(key, f"Give {key} in SI units.")
+        if value > 0:
+            return value
+        raise self.refusal(
+            f"{key} = {self.values[key]!r} is not a positive number", f"Give {key} in SI units."
+        )
+
+    def fraction(self, key: str, default: float, low: float, high: float) -> float:
+        """A number from `low` to `high`, both included; `default` where the key is missing."""
+        if key not in self:
+            return default
+        remedy = f"Give a number from {low:g} to {high:g}."
+        value = self._number(key, remedy)
+        if low <= value <= high:
+            return value
+        raise self.refusal(f"{key} = {value:g} is not from {low:g} to {high:g}", remedy)
+
+    def _number(self, key: str, remedy: str) -> float:
+        value = self.values.get(key)
+        if value is None:
+            raise self.refusal(f"{key} is missing", remedy)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise self.refusal(f"{key} = {value!r} is not a number", remedy)
+        if not math.isfinite(value):
+            raise self.refusal(f"{key} = {value!r} is not a number", remedy)
+        return float(value)
+
+    def table(self, key: str) -> Table | None:
+        """The sub-table `key`; None where there is none."""
+        if key not in self:
+            return None
+        values = self.values[key]
+        if not isinstance(values, dict):
+            raise self.refusal(f"{key} is not a table", f"Write [hanger.{key}] and its keys below.")
+        return Table(values, f"{self.label} {key}", self.path)
+
+    def tables(self, key: str) -> list[Table]:
+        """The list of sub-tables `key`; empty where there is none."""
+        found = self.values.get(key, [])
+        if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
+            raise self.refusal(
+                f"{key} is not a list of tables", f"Write [[hanger.{key}]] and its keys below."
+            )
+        return [
+            Table(values, f"{self.label} {key} {number}", self.path)
+            for number, values in enumerate(found, start=1)
+        ]

@@ -1,0 +1,37 @@
+"""How to update, and who hears how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from shm.errors import UsageError
+
+Progress = Callable[[str, float], None]
+
+NOISE_FLOOR = "noise-floor"
+TEXTBOOK = "textbook"
+METHODS = (NOISE_FLOOR, TEXTBOOK)
+"""From the prior to the posterior by a falling noise floor, or by a rising power."""
+
+
+def silent(label: str, fraction: float) -> None:
+    """No progress is shown."""
+
+
+@dataclass(frozen=True)
+class UpdateOptions:
+    """How to update: posterior samples to keep, seed, how often the data set counts (N_D), method.
+
+    Raises UsageError for a method that is not one of `METHODS`.
+    """
+
+    samples: int = 1000
+    seed: int = 1
+    repeat: int = 1
+    method: str = NOISE_FLOOR
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            known = ", ".join(METHODS)
+            raise UsageError(f"unknown method {self.method!r}.", remedy=f"Known: {known}.")

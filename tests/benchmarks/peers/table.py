@@ -1,0 +1,221 @@
+"""What the runs of one sampler add up to, as tables for the terminal and for the docs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from tests.helpers.evidence_oracle import ORACLE
+
+EVIDENCE = {repeat: ORACLE["1.1", "beam2", repeat] for repeat in (1, 10)}
+"""By quadrature; N_D: log evidence."""
+
+LARGEST_BIAS = 0.2
+LARGEST_SPREAD = 0.3
+TIMES_FASTER = 30
+OURS = "shm"
+TITLES = {
+    OURS: "**shm**",
+    "dynesty": "dynesty, static",
+    "dynesty_dynamic": "dynesty, dynamic",
+    "ultranest": "ultranest",
+    "nautilus": "nautilus",
+    "pymc": "PyMC `sample_smc`",
+    "uqpy": "UQpy TMCMC",
+    "blackjax": "blackjax tempered SMC",
+    "emcee": "emcee",
+}
+COLUMNS = (
+    "sampler", "sigma", "runs", "processor time s", "times ours", "evaluations", "log evidence",
+    "bias", "spread", "claimed", "effective samples", "ms an effective sample",
+    "theta_F", "evidence is",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """How often the data set counts, and whether sigma is sampled or integrated out."""
+
+    repeat: int
+    sigma: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Medians over the seeds of one sampler in one case; NaN where there is nothing to say."""
+
+    peer: str
+    case: Case
+    version: str
+    runs: int
+    failures: tuple[str, ...]
+    cpu_seconds: float
+    evaluations: float
+    log_evidence: float
+    bias: float
+    spread: float
+    claimed: float
+    effective_samples: float
+    theta_f: float
+    theta_f_spread: float
+
+    @property
+    def right(self) -> bool:
+        """Whether the evidence is right: at least two runs, small bias, small spread."""
+        return abs(self.bias) <= LARGEST_BIAS and self.spread <= LARGEST_SPREAD
+
+    @property
+    def verdict(self) -> str:
+        """The evidence in a word."""
+        if not self.runs:
+            return "-"
+        if np.isnan(self.log_evidence):
+            return "not given"
+        if np.isnan(self.spread):
+            return "one run"
+        return "right" if self.right else "wrong"
+
+
+def summarised(rows: Sequence[dict[str, Any]]) -> list[Summary]:
+    """One summary for each sampler and case, in the order of TITLES."""
+    groups: dict[tuple[str, int, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["peer"], row["repeat"], row["sigma"]), []).append(row)
+    summaries = [_summary(*key, group) for key, group in groups.items()]
+    order = list(TITLES)
+    return sorted(summaries, key=lambda s: (s.case.repeat, order.index(s.peer), s.case.sigma))
+
+
+def _summary(peer: str, repeat: int, sigma: str, rows: Sequence[dict[str, Any]]) -> Summary:
+    done = [row for row in rows if "failure" not in row]
+    evidence, theta_f = _column(done, "log_evidence"), _column(done, "theta_f")
+    return Summary(
+        peer=peer,
+        case=Case(repeat, sigma),
+        version=done[0]["version"] if done else "",
+        runs=len(done),
+        failures=tuple(row["failure"] for row in rows if "failure" in row),
+        cpu_seconds=_median(_column(done, "cpu_seconds")),
+        evaluations=_median(_column(done, "evaluations")),
+        log_evidence=_median(evidence),
+        bias=_median(evidence) - EVIDENCE[repeat],
+        spread=_spread(evidence),
+        claimed=_median(_column(done, "log_evidence_sd")),
+        effective_samples=_median(_column(done, "effective_samples")),
+        theta_f=_median(theta_f),
+        theta_f_spread=_spread(theta_f),
+    )
+
+
+def _column(rows: Sequence[dict[str, Any]], name: str) -> np.ndarray:
+    values = [row[name] for row in rows]
+    return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+
+def _median(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else float("nan")
+
+
+def _spread(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.std(ddof=1)) if len(finite) > 1 else float("nan")
+
+
+def _cells(summary: Summary, ours: float) -> list[str]:
+    runs = f"{summary.runs} of {summary.runs + len(summary.failures)}"
+    per_sample = 1e3 * summary.cpu_seconds / summary.effective_samples
+    return [
+        f"{TITLES[summary.peer]} {summary.version}".strip(),
+        summary.case.sigma,
+        runs if summary.failures else str(summary.runs),
+        _number(summary.cpu_seconds, ".3g"),
+        _number(summary.cpu_seconds / ours, ".0f"),
+        _number(summary.evaluations, ",.0f"),
+        _number(summary.log_evidence, ".2f"),
+        _number(summary.bias, "+.2f"),
+        _number(summary.spread, ".2f"),
+        _number(summary.claimed, ".2f"),
+        _number(summary.effective_samples, ",.0f"),
+        _number(per_sample, ".3g"),
+        f"{_number(summary.theta_f, '.3f')} ± {_number(summary.theta_f_spread, '.3f')}",
+        summary.verdict,
+    ]
+
+
+def _number(value: float, form: str) -> str:
+    return "-" if np.isnan(value) else format(value, form)
+
+
+def _our_seconds(summaries: Sequence[Summary], repeat: int) -> float:
+    found = [s.cpu_seconds for s in summaries if s.peer == OURS and s.case.repeat == repeat]
+    return found[0] if found else float("nan")
+
+
+def _tables(rows: Sequence[dict[str, Any]]) -> dict[int, list[list[str]]]:
+    summaries = summarised(rows)
+    return {
+        repeat: [
+            _cells(s, _our_seconds(summaries, repeat)) for s in summaries if s.case.repeat == repeat
+        ]
+        for repeat in EVIDENCE
+    }
+
+
+def show(rows: Sequence[dict[str, Any]], console: Console) -> None:
+    """Prints a table for each N_D, and what failed."""
+    for repeat, lines in _tables(rows).items():
+        table = Table(*COLUMNS, title=f"N_D = {repeat}, log evidence {EVIDENCE[repeat]:.2f}")
+        for cells in lines:
+            table.add_row(*cells)
+        console.print(table)
+    for line in failures(rows):
+        console.print(line)
+
+
+def failures(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """A sentence for each sampler and case with failed runs."""
+    return [
+        f"{TITLES[s.peer]}, N_D = {s.case.repeat}, sigma {s.case.sigma}: {len(s.failures)} of "
+        f"{s.runs + len(s.failures)} runs failed ({'; '.join(sorted(set(s.failures)))})."
+        for s in summarised(rows)
+        if s.failures
+    ]
+
+
+def write_docs(rows: Sequence[dict[str, Any]], page: Path) -> None:
+    """Puts the tables between the page's marks; the text around them stays."""
+    text = page.read_text(encoding="utf-8")
+    before, rest = text.split("<!-- peers -->")
+    after = rest.split("<!-- /peers -->")[1]
+    parts = [_markdown(repeat, lines) for repeat, lines in _tables(rows).items()]
+    parts += ["\n".join(f"- {line}" for line in failures(rows))]
+    inside = "\n\n".join(part for part in parts if part)
+    page.write_text(f"{before}<!-- peers -->\n{inside}\n<!-- /peers -->{after}", encoding="utf-8")
+
+
+def _markdown(repeat: int, lines: Sequence[Sequence[str]]) -> str:
+    head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+    body = ["| " + " | ".join(cells) + " |" for cells in lines]
+    title = f"### N_D = {repeat} (log evidence {EVIDENCE[repeat]:.2f})\n"
+    return "\n".join([title, *head, *body])
+
+
+def failed_bounds(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Which bounds fail: our evidence, and our lead over each peer whose evidence is right."""
+    summaries, failed = summarised(rows), []
+    for summary in summaries:
+        ours = _our_seconds(summaries, summary.case.repeat)
+        where = f"{summary.peer}, N_D = {summary.case.repeat}, sigma {summary.case.sigma}"
+        if summary.peer == OURS and not summary.right:
+            failed.append(f"{where}: bias {summary.bias:+.2f}, spread {summary.spread:.2f}")
+        elif summary.right and summary.peer != OURS:
+            times = summary.cpu_seconds / ours
+            failed += [f"{where}: only {times:.0f} times ours"] if times < TIMES_FASTER else []
+    return failed

@@ -1,0 +1,157 @@
+"""Strands, turnbuckles, plates, any section: the examples of docs/hangers.md are run."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from shm.bridge import load_hanger
+from shm.models import MODELS
+from shm.models.beam import Beam1
+from shm.store import Workspace
+from shm.values import Hanger
+from tests.cli.conftest import Shm
+from tests.helpers.workspaces import make_workspace
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "hangers.md"
+EXAMPLES = re.findall(r"^## ([^\n]+)\n+```toml\n(.*?)```", DOCS.read_text(), re.S | re.M)
+QUICK = ("--samples", 100)
+SPRINGS = [part for k in range(1, 5) for part in ("--set", f"log10_k{k}=7")]
+
+
+class Plated(Beam1):
+    """A class that needs end plates."""
+
+    name = "plated"
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        return "" if hanger.plate else "it needs end plates: give [hanger.plate]."
+
+
+@pytest.fixture
+def _plated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MODELS, "plated", Plated)
+
+
+@pytest.fixture
+def described(tmp_path: Path) -> dict[str, Path]:
+    """The examples as hanger files, by their headings."""
+    files = {}
+    for number, (heading, text) in enumerate(EXAMPLES):
+        files[heading] = tmp_path / f"H{number}.toml"
+        files[heading].write_text(text)
+    return files
+
+
+def test_the_docs_describe_four_kinds_of_hanger(described: dict[str, Path]) -> None:
+    plate, strand, turnbuckle, flat = (load_hanger(path) for path in described.values())
+    assert plate.plate is not None
+    assert strand.bending_stiffness_factor < 1
+    assert len(turnbuckle.turnbuckles) == 1
+    assert flat.models == ("beam1", "beam2")
+
+
+@pytest.mark.parametrize("heading", [heading for heading, _ in EXAMPLES])
+def test_every_example_of_the_docs_has_frequencies_near_those_of_a_string(
+    shm: Shm, described: dict[str, Path], heading: str
+) -> None:
+    """n/(2 L) sqrt(T/m), raised by the bending stiffness, lowered by a turnbuckle's mass."""
+    hanger = load_hanger(described[heading])
+    string = (hanger.nominal_tension_n / hanger.mass_per_length_kg_m) ** 0.5 / (2 * hanger.length_m)
+    ended = shm("predict", "beam2", "--hanger-file", described[heading], *SPRINGS, "--json")
+    assert ended.code == 0, ended.err
+    first = ended.document["frequencies"][0]["frequency_hz"]
+    assert 0.9 < first / string < 1.7
+
+
+def test_a_turnbuckle_lowers_the_first_frequency_and_a_stiffer_strand_raises_it(
+    shm: Shm, described: dict[str, Path], tmp_path: Path
+) -> None:
+    def first(text: str) -> float:
+        path = tmp_path / "changed.toml"
+        path.write_text(text)
+        ended = shm("predict", "beam1", "--hanger-file", path, "--json")
+        return float(ended.document["frequencies"][0]["frequency_hz"])
+
+    strand, turnbuckle = (described[h].read_text() for h in list(described)[1:3])
+    assert first(turnbuckle) < first(turnbuckle.split("[[hanger.turnbuckle]]")[0])
+    assert first(strand) < first(strand.replace("factor = 0.5", "factor = 1.0"))
+
+
+def test_a_simulated_bar_with_a_turnbuckle_is_identified_at_its_exact_frequencies(
+    shm: Shm, described: dict[str, Path], tmp_path: Path
+) -> None:
+    path = list(described.values())[2]
+    ended = shm(
+        "simulate", "--hanger-file", path, "--hits", 3, "--seconds", 8, "--out", tmp_path / "tests"
+    )
+    assert ended.code == 0, ended.err
+    (recording,) = (tmp_path / "tests").glob("*.csv")
+    found = shm("identify", recording, "--hanger-file", path, "--json").document["tests"][0]
+    exact = shm("predict", "beam1", "--hanger-file", path, "--json").document["frequencies"]
+    frequencies = {(row["plane"], row["order"]): row["frequency_hz"] for row in exact}
+    modes = [mode for mode in found["modes"] if mode["order"] <= 6]
+    assert len(modes) > 4
+    for mode in modes:
+        expected = frequencies[mode["plane"], mode["order"]]
+        assert mode["frequency_hz"] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.usefixtures("_plated")
+def test_predict_refuses_a_class_that_does_not_apply_with_the_reason(
+    shm: Shm, hanger_file: Path
+) -> None:
+    ended = shm("predict", "plated", "--hanger-file", hanger_file)
+    assert ended.code == 2
+    assert "does not apply to hanger 3: it needs end plates" in ended.err
+    assert "beam1, beam2" in ended.err
+
+
+@pytest.mark.usefixtures("_plated")
+def test_select_leaves_out_what_does_not_apply_and_says_why(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    call = ("select", modes_file, "--hanger-file", hanger_file, "--models", "plated,beam1", *QUICK)
+    ended = shm(*call)
+    assert ended.code == 0, ended.err
+    assert "plated does not apply: it needs end plates: give [hanger.plate]." in ended.out
+    document = shm(*call, "--json").document
+    assert document["not_applicable"] == {"plated": "it needs end plates: give [hanger.plate]."}
+    assert [model["model"] for model in document["models"]] == ["beam1"]
+
+
+@pytest.mark.usefixtures("_plated")
+def test_select_without_a_class_that_applies_names_all_reasons(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    ended = shm("select", modes_file, "--hanger-file", hanger_file, "--models", "plated", *QUICK)
+    assert ended.code == 2
+    assert "no model class applies to hanger 3" in ended.err
+    assert "plated: it needs end plates" in ended.err
+
+
+def test_select_takes_the_classes_of_the_setting_unless_told(shm: Shm, bridge: Workspace) -> None:
+    """The workspace's setting is beam1 alone."""
+    ended = shm("--workspace", bridge.folder, "select", "--hanger", 3, *QUICK, "--json")
+    assert [model["model"] for model in ended.document["models"]] == ["beam1"]
+    assert ended.document["not_applicable"] == {}
+
+
+@pytest.mark.usefixtures("_plated")
+def test_status_says_which_classes_may_compete_and_why_others_do_not(
+    shm: Shm, tmp_path: Path
+) -> None:
+    workspace = make_workspace(
+        tmp_path / "bridge", hangers=(3, 4), settings={"models": "beam1,beam2,plated"}
+    )
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace("id = 4", 'id = 4\nmodels = ["beam2"]'))
+    told = shm("--workspace", workspace.folder, "status").out
+    assert "hanger 3: beam1, beam2 may compete; plated does not apply: it needs" in told
+    assert "hanger 4: beam2 may compete; beam1 does not apply: the hanger's" in told
+    rows = shm("--workspace", workspace.folder, "status", "--json").document["hangers"]
+    assert [row["competing"] for row in rows] == [["beam1", "beam2"], ["beam2"]]
+    assert set(rows[0]["not_applicable"]) == {"plated"}

@@ -1,0 +1,54 @@
+"""The thesis's tables of computed frequencies, as `shm validate` compares them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shm.bridge import load_hanger
+from shm_cli import thesis
+from shm_cli.validate import markdown
+from shm_cli.validation import frequencies, selection
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[frequencies.FrequencyRow]:
+    return frequencies.compared(load_hanger(thesis.HANGER_FILE), lambda label, fraction: None)
+
+
+def test_every_table_keeps_its_mark(rows) -> None:
+    assert frequencies.misses(rows) == []
+    assert {row.table for row in rows} == {f"A.{number}" for number in range(1, 8)}
+
+
+def test_a_table_beyond_its_mark_is_named(rows) -> None:
+    (miss,) = frequencies.misses([replace(rows[0], difference_percent=0.31), rows[1]])
+    assert miss == "table A.1, 711 kN: 0.31 % off, the mark is 0.3 %"
+
+
+def test_a_difference_that_is_only_stated_is_no_miss(rows) -> None:
+    (stated,) = [row for row in rows if row.table == "A.2" and row.condition == "711 kN"]
+    assert stated.difference_percent > 2
+    assert not stated.missed
+    assert frequencies.cells(stated)[-1] == "stated"
+
+
+def test_fixed_ends_that_beat_springs_are_a_miss() -> None:
+    evidence = {"beam1": -20.0, "beam2": -20.5, "solid0": -30.0, "solid1": -17.0, "solid2": -16.0}
+    chosen = [
+        selection.SelectionRow(
+            printing, repeat, model, 0.2, value, 0.01, 0, 0, 711, 700, 720, 0, 0, {}
+        )
+        for printing in thesis.PRINTINGS
+        for repeat in (1, 10)
+        for model, value in evidence.items()
+    ]
+    assert selection.misses(chosen)[0] == "table 1.1, N_D = 1: beam1 beats beam2"
+    assert len(selection.misses(chosen)) == 4
+
+
+def test_markdown_has_a_line_a_row(rows) -> None:
+    lines = markdown(frequencies.HEADS, [frequencies.cells(row) for row in rows]).splitlines()
+    assert len(lines) == len(rows) + 2
+    assert {line.count("|") for line in lines} == {len(frequencies.HEADS) + 1}

@@ -1,0 +1,20 @@
+"""What all tests share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
+    """Each run makes its own bases, once, and leaves the user's alone."""
+    before = os.environ.get("SHM_CACHE")
+    os.environ["SHM_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    yield
+    if before is None:
+        del os.environ["SHM_CACHE"]
+    else:
+        os.environ["SHM_CACHE"] = before

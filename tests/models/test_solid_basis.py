@@ -1,0 +1,94 @@
+"""Reduced bases are made once, kept, and made again where they cannot be read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import UsageError
+from shm.models import build
+from shm.models.base import silent
+from shm.models.solid import S1, Solid0, Solid2, basis, cache, reduction
+from shm.values import Turnbuckle
+from tests.helpers.hangers import HANGER_3
+
+SHORT = replace(HANGER_3, length_m=3.0, plate=None)
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SHM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(basis, "_made", {})
+    return tmp_path / "cache"
+
+
+def a_basis():
+    return basis.transverse_basis(S1(SHORT).description(), 6, silent)
+
+
+def test_a_basis_is_made_once_and_then_read_from_disk(monkeypatch) -> None:
+    first = a_basis()
+    monkeypatch.setattr(basis, "_made", {})
+    monkeypatch.setattr(reduction, "reduce", None)
+    again = a_basis()
+    np.testing.assert_array_equal(again.projected.matrices, first.projected.matrices)
+    assert again.estimated_error == first.estimated_error
+
+
+def test_a_broken_file_is_reported_and_made_anew(empty_cache, monkeypatch, caplog) -> None:
+    first = a_basis()
+    (kept,) = empty_cache.glob("basis-*.npz")
+    kept.write_bytes(kept.read_bytes()[:100])
+    monkeypatch.setattr(basis, "_made", {})
+    again = a_basis()
+    assert "cannot be read" in caplog.text
+    np.testing.assert_array_equal(again.projected.matrices, first.projected.matrices)
+    assert cache.load(S1(SHORT).description().key(6)) is not None
+
+
+def test_a_folder_that_cannot_be_written_is_reported_and_work_goes_on(
+    tmp_path, monkeypatch, caplog
+) -> None:
+    blocked = tmp_path / "a file"
+    blocked.write_text("")
+    monkeypatch.setenv("SHM_CACHE", str(blocked))
+    assert a_basis().projected.unknowns > 5
+    assert "Set SHM_CACHE" in caplog.text
+
+
+def test_the_key_changes_with_geometry_material_prior_and_modes() -> None:
+    description = Solid2(HANGER_3).description()
+    thicker = replace(HANGER_3.plate, thickness_m=0.05)
+    others = [
+        Solid2(replace(HANGER_3, plate=thicker)).description(),
+        Solid2(replace(HANGER_3, elastic_modulus_pa=205e9)).description(),
+        replace(description, upper=(9e6, *description.upper[1:])),
+    ]
+    keys = {description.key(6), description.key(12), *(other.key(6) for other in others)}
+    assert len(keys) == 5
+
+
+def test_progress_is_told_and_never_falls() -> None:
+    told: list[float] = []
+    basis.transverse_basis(Solid0(HANGER_3).description(), 6, told.append)
+    assert told == sorted(told)
+    assert 0 < told[0] < told[-1] <= 1
+
+
+@pytest.mark.parametrize(
+    ("hanger", "reason"),
+    [
+        (replace(HANGER_3, plate=None), r"\[hanger.plate\]"),
+        (replace(HANGER_3, diameter_m=float("nan")), "diameter_m"),
+        (replace(HANGER_3, area_m2=0.02), "not that of diameter_m"),
+        (replace(HANGER_3, bending_stiffness_factor=0.6), "strand"),
+        (replace(HANGER_3, turnbuckles=(Turnbuckle(3.0, 0.4, 50.0, 3e6),)), "turnbuckles"),
+    ],
+)
+def test_a_hanger_that_a_solid_class_cannot_describe_is_refused_with_the_reason(
+    hanger, reason: str
+) -> None:
+    with pytest.raises(UsageError, match=reason):
+        build("solid2", hanger)

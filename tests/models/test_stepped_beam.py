@@ -1,0 +1,164 @@
+"""The stepped beam against the uniform one, closed forms and finite elements of another make."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from shm.errors import UsageError
+from shm.models import build, tensioned_beam
+from shm.models.stepped import SteppedBeam
+from shm.simulate import HangerState, natural_frequencies
+from shm.simulate.elements import plane_modes
+from shm.values import PLANES, Hanger, Turnbuckle
+from tests.helpers.hangers import HANGER_3
+
+EI, MASS = HANGER_3.bending_stiffness_n_m2, HANGER_3.mass_per_length_kg_m
+LOW = Turnbuckle(x_m=1.5, length_m=0.6, mass_kg=150.0, bending_stiffness_n_m2=1e7)
+HIGH = Turnbuckle(x_m=9.0, length_m=0.4, mass_kg=60.0, bending_stiffness_n_m2=3e7)
+MIDDLE = Turnbuckle(x_m=6.0, length_m=0.5, mass_kg=400.0, bending_stiffness_n_m2=5e7)
+
+
+def with_turnbuckles(*turnbuckles: Turnbuckle, **changes: float) -> Hanger:
+    return replace(HANGER_3, plate=None, turnbuckles=turnbuckles, **changes)
+
+
+def beam(lengths, stiffness, mass, tension, deck, arch) -> SteppedBeam:
+    columns = [np.array(values, dtype=float)[:, None] for values in (lengths, stiffness, mass)]
+    return SteppedBeam(*columns, *(np.array([float(value)]) for value in (tension, deck, arch)))
+
+
+springs = st.one_of(st.just(0.0), st.just(np.inf), st.floats(1e-1, 1e14))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    xi=st.floats(0.5, 2000.0),
+    shares=st.lists(st.floats(0.05, 1.0), min_size=1, max_size=5),
+    deck=springs,
+    arch=springs,
+)
+def test_segments_of_one_section_are_the_uniform_beam(xi, shares, deck, arch) -> None:
+    length, tension = 12.0, 711e3
+    stiffness = tension * (length / xi) ** 2
+    parts = length * np.array(shares) / sum(shares)
+    cut = beam(parts, [stiffness] * len(parts), [MASS] * len(parts), tension, deck, arch)
+    whole = tensioned_beam.frequencies_hz(
+        *(np.array([value]) for value in (length, tension, stiffness, MASS, deck, arch)), modes=8
+    )
+    np.testing.assert_allclose(cut.frequencies_hz(8), whole, rtol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["beam1", "beam2"])
+def test_a_turnbuckle_that_is_like_the_bar_changes_nothing(name: str) -> None:
+    same = Turnbuckle(7.0, 0.5, 0.5 * MASS, EI)
+    plain, coupled = build(name, HANGER_3), build(name, with_turnbuckles(same))
+    prior = plain.prior
+    theta = np.random.default_rng(3).uniform(prior.lower, prior.upper, (300, len(prior.names)))
+    ratio = coupled.frequencies_hz(theta, 6) / plain.frequencies_hz(theta, 6)
+    np.testing.assert_allclose(ratio, 1, rtol=1e-8)
+    for order in (1, 2, 5):
+        x = np.linspace(0, theta[0, 1] * 12, 301)
+        shapes = [model.shape(theta[0], "longitudinal", order, x) for model in (plain, coupled)]
+        np.testing.assert_allclose(*shapes, atol=2e-3)
+
+
+def test_a_heavy_turnbuckle_in_a_string_is_a_point_mass() -> None:
+    """Half-length h, wave number k, mass M: cot(k h) = k M/(2 m) for odd, k h = n pi for even."""
+    m, tension, h, mass = 10.0, 1e5, 5.0, 40.0
+
+    def fault(k: float) -> float:
+        return float(np.cos(k * h) - k * mass / (2 * m) * np.sin(k * h))
+
+    odd = [brentq(fault, (n * np.pi + 1e-9) / h, (n + 1) * np.pi / h) for n in range(4)]
+    waves = np.sort([*odd, *(np.arange(1, 5) * np.pi / h)])
+    short = 1e-4
+    lengths, masses = [h - short / 2, short, h - short / 2], [m, mass / short, m]
+    found = beam(lengths, [1e-6] * 3, masses, tension, 0, 0).frequencies_hz(8)[0]
+    np.testing.assert_allclose(found, waves * np.sqrt(tension / m) / (2 * np.pi), rtol=2e-5)
+
+
+def test_a_stiff_and_heavy_middle_leaves_pairs_of_modes_that_are_all_found() -> None:
+    """Two bars clamped to a block that hardly moves: each of their frequencies comes twice."""
+    found = beam([5.0, 2.0, 5.0], [EI, 1e13, EI], [MASS, 1e6, MASS], 711e3, np.inf, np.inf)
+    frequencies = found.frequencies_hz(8)[0]
+    one = (np.array([value]) for value in (5.0, 711e3, EI, MASS, np.inf, np.inf))
+    alone = tensioned_beam.frequencies_hz(*one, modes=3)[0]
+    np.testing.assert_allclose(frequencies[2:], np.repeat(alone, 2), rtol=1e-3)
+    assert frequencies[1] < 0.1 * frequencies[2]
+
+
+@pytest.mark.parametrize(
+    "turnbuckles", [(LOW,), (MIDDLE,), (LOW, HIGH), (replace(LOW, x_m=0.3), HIGH)]
+)
+@pytest.mark.parametrize(
+    "theta", [(1, 1, 7, 6, 9, 8), (4, 0.7, 6, 7, 8, 12), (0.5, 1.4, 8, 5, 5, 8)]
+)
+def test_frequencies_and_shapes_are_those_of_hermite_elements(turnbuckles, theta) -> None:
+    hanger = with_turnbuckles(*turnbuckles)
+    model, parameters = build("beam2", hanger), np.array(theta, dtype=float)
+    stiffness = 10 ** parameters[2:]
+    state = HangerState(711e3 * theta[0], *stiffness, length_m=12 * theta[1])
+    exact, elements = (
+        model.frequencies_hz(parameters[None], 8)[0],
+        natural_frequencies(hanger, state, 8),
+    )
+    np.testing.assert_allclose(exact, elements, rtol=1e-6)
+    x = np.linspace(0, state.length_m, 401)
+    for plane in PLANES:
+        of_elements = plane_modes(hanger, state, plane, 6).at(x)
+        for order in range(1, 7):
+            shape, other = model.shape(parameters, plane, order, x), of_elements[:, order - 1]
+            np.testing.assert_allclose(shape, other * (shape @ other) / (other @ other), atol=1e-4)
+
+
+def test_the_effective_length_is_taken_up_by_the_bar_between_the_turnbuckles() -> None:
+    """9 m of a 12 m hanger with 1 m of turnbuckles: 8/11 of every piece of bar is left."""
+    hanger = with_turnbuckles(LOW, HIGH)
+    left = 8 / 11
+    low = replace(LOW, x_m=left * 1.2 + 0.3)
+    high = replace(HIGH, x_m=left * (1.2 + 7.0) + 0.6 + 0.2)
+    shorter = with_turnbuckles(low, high, length_m=9.0)
+    np.testing.assert_allclose(
+        build("beam1", hanger).frequencies_hz(np.array([[1.0, 0.75]]), 6),
+        build("beam1", shorter).frequencies_hz(np.array([[1.0, 1.0]]), 6),
+        rtol=1e-9,
+    )
+
+
+def test_turnbuckles_may_touch_each_other_and_an_end() -> None:
+    halves = [replace(LOW, x_m=x, length_m=0.3, mass_kg=75.0) for x in (0.15, 0.45)]
+    one = with_turnbuckles(replace(LOW, x_m=0.3))
+    theta = np.array([[1.0, 0.9, 7, 7, 8, 8]])
+    np.testing.assert_allclose(
+        build("beam2", with_turnbuckles(*halves)).frequencies_hz(theta, 6),
+        build("beam2", one).frequencies_hz(theta, 6),
+        rtol=1e-9,
+    )
+
+
+def test_the_ends_can_be_exchanged_only_where_the_turnbuckles_lie_alike_from_both() -> None:
+    theta = np.array([[1.0, 1.0, 6.5, 6, 8, 9]])
+    swapped = theta[:, [0, 1, 4, 5, 2, 3]]
+    middle, low = build("beam2", with_turnbuckles(MIDDLE)), build("beam2", with_turnbuckles(LOW))
+    np.testing.assert_allclose(
+        middle.frequencies_hz(swapped, 6), middle.frequencies_hz(theta, 6), rtol=1e-10
+    )
+    assert middle.swaps == build("beam2", HANGER_3).swaps != ()
+    assert np.abs(low.frequencies_hz(swapped, 6) / low.frequencies_hz(theta, 6) - 1).max() > 1e-3
+    assert low.swaps == ()
+
+
+def test_an_effective_length_without_room_for_the_turnbuckles_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"0\.6 m long together"):
+        build("beam1", with_turnbuckles(LOW)).frequencies_hz(np.array([[1.0, 0.04]]), 3)
+
+
+def test_a_hanger_that_is_half_turnbuckle_is_no_beam_of_variable_length() -> None:
+    with pytest.raises(UsageError, match="6 m long together"):
+        build("beam2", with_turnbuckles(replace(MIDDLE, length_m=6.0)))

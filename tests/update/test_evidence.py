@@ -1,0 +1,177 @@
+"""Evidences against exact ones: quadrature on hanger 3, a conjugate Gaussian, two unequal modes."""
+
+from __future__ import annotations
+
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+from scipy.stats import multivariate_normal
+
+from shm.errors import UsageError
+from shm.models import Model, build
+from shm.update import METHODS, BiasedEvidenceWarning, UpdateOptions, update
+from shm.update.likelihood import Likelihood
+from shm.update.problem import Problem
+from shm.update.updating import infer
+from shm.values import FloatArray, Posterior
+from tests.helpers.evidence_oracle import (
+    ORACLE,
+    TABLES,
+    Resolution,
+    beam1_log_evidence,
+    beam2_log_evidence,
+    modal_test,
+)
+from tests.helpers.hangers import HANGER_3
+
+COARSE = Resolution(theta_step=1.4, nodes=24, springs=160, sigma_step_in_sd=1.2)
+
+
+@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("repeat", [1, 10])
+def test_a_coarser_quadrature_agrees_with_the_stored_oracle(table: str, repeat: int) -> None:
+    assert beam1_log_evidence(table, repeat, 500) == pytest.approx(
+        ORACLE[table, "beam1", repeat], abs=2e-3
+    )
+    assert beam2_log_evidence(table, repeat, COARSE) == pytest.approx(
+        ORACLE[table, "beam2", repeat], abs=5e-3
+    )
+
+
+@pytest.mark.parametrize(("table", "model", "repeat"), ORACLE)
+def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int) -> None:
+    options = UpdateOptions(1000, seed=11, repeat=repeat)
+    posterior = update([modal_test(TABLES[table])], build(model, HANGER_3), options)
+    error = posterior.log_evidence - ORACLE[table, model, repeat]
+    assert abs(error) < 4 * posterior.log_evidence_sd
+    assert posterior.log_evidence_sd < 0.08
+    assert posterior.evaluations < 75_000
+
+
+class KnownNoise(Likelihood):
+    """Normal errors of known standard deviation and no model error."""
+
+    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+        variance = self.identification_error**2 + floor**2
+        terms = self.misfit(predicted) ** 2 / variance + np.log(2 * np.pi * variance)
+        return np.asarray(-0.5 * terms.sum(axis=1))
+
+
+def linear(dimension: int, slopes: FloatArray) -> Model:
+    """A model whose predictions are linear in parameters of standard normal prior.
+
+    `slopes` (2 modes, dimension). The uniform parameters are the priors' quantiles.
+    """
+
+    class Linear(Model):
+        name = "linear"
+        bounds = dict.fromkeys([f"a{i}" for i in range(dimension)], (0.0, 1.0))
+
+        def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+            predicted = 1 + ndtri(theta.clip(1e-15, 1 - 1e-15)) @ slopes.T
+            return predicted.reshape(len(theta), 2, modes)
+
+    return Linear(HANGER_3)
+
+
+@pytest.mark.parametrize("dimension", [2, 8, 20])
+def test_the_evidence_of_a_conjugate_gaussian_is_exact(dimension: int) -> None:
+    """y = 1 + A z + e, z ~ N(0, I), e ~ N(0, s^2): y ~ N(1, A A' + s^2 I). Measured: y = 1."""
+    count, noise = dimension + 4, 0.05
+    slopes = np.random.default_rng(dimension).standard_normal((count, dimension)) / 4
+    half = [1.0] * (count // 2)
+    likelihood = KnownNoise([modal_test({"transverse": half, "longitudinal": half}, noise)])
+    problem = Problem(linear(dimension, slopes), likelihood)
+    covariance = slopes @ slopes.T + noise**2 * np.eye(count)
+    exact = multivariate_normal(np.zeros(count), covariance).logpdf(np.zeros(count))
+    weighted = infer(problem, 1000, np.random.default_rng(1))
+    assert abs(weighted.log_evidence - exact) < 4 * weighted.log_evidence_sd
+    assert weighted.log_evidence_sd < 0.1
+    posterior = np.linalg.inv(np.eye(dimension) + slopes.T @ slopes / noise**2)
+    drawn = np.cov(weighted.resampled(4000, np.random.default_rng(2)).z.T)
+    assert np.diag(drawn) == pytest.approx(np.diag(posterior), rel=0.4)
+
+
+class TwoEnds(Model):
+    """Two springs whose ends are nearly, but not quite, alike: two modes of unequal mass.
+
+    One plane sees a + b and a b, the other a tilt that tells the ends apart a little.
+    """
+
+    name = "two ends"
+    bounds = {"a": (0.0, 1.0), "b": (0.0, 1.0)}  # noqa: RUF012
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        a, b = theta.T
+        tilt = 1 + 0.01 * (a - b)
+        alike = np.stack([1 + a + b, 1 + a * b], axis=1)
+        return np.stack([alike, np.stack([tilt, tilt], axis=1)], axis=1)
+
+
+def test_two_modes_of_unequal_mass_get_their_shares() -> None:
+    noise, modes = 0.006, 2
+    exact = TwoEnds(HANGER_3).frequencies_hz(np.array([[0.75, 0.3]]), modes)[0]
+    frequencies = {"transverse": list(exact[0]), "longitudinal": list(exact[1])}
+    likelihood = KnownNoise([modal_test(frequencies, noise)])
+    model = TwoEnds(HANGER_3)
+    axis = (np.arange(500) + 0.5) / 500
+    theta = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
+    values = likelihood.marginal(likelihood.predict(model, theta))
+    weights = np.exp(values - values.max())
+    share = weights[theta[:, 0] > theta[:, 1]].sum() / weights.sum()
+    assert 0.55 < share < 0.95
+    weighted = infer(Problem(model, likelihood), 2000, np.random.default_rng(3))
+    z = weighted.resampled(4000, np.random.default_rng(4)).z
+    error = np.sqrt(share * (1 - share) / weighted.effective_sample_size)
+    assert np.mean(z[:, 0] > z[:, 1]) == pytest.approx(share, abs=4 * error)
+    assert weighted.log_evidence == pytest.approx(
+        values.max() + np.log(weights.mean()), abs=4 * weighted.log_evidence_sd
+    )
+
+
+def run(seed: int) -> Posterior:
+    options = UpdateOptions(200, seed)
+    return update([modal_test(TABLES["1.1"])], build("beam2", HANGER_3), options)
+
+
+def test_the_same_seed_gives_the_same_posterior_whatever_the_executor() -> None:
+    with ProcessPoolExecutor(1) as pool:
+        elsewhere = pool.submit(run, 4).result()
+    here = run(4)
+    np.testing.assert_array_equal(elsewhere.samples, here.samples)
+    assert elsewhere.log_evidence == here.log_evidence
+
+
+def test_the_textbook_method_warns_and_follows_its_own_evidence() -> None:
+    """On beam1, where the likelihood is broad, it comes close; it is too low all the same."""
+    options = UpdateOptions(1000, 1, method="textbook")
+    with pytest.warns(BiasedEvidenceWarning, match="-1 to -4.5"):
+        posterior = update([modal_test(TABLES["1.1"])], build("beam1", HANGER_3), options)
+    assert posterior.samples.shape == (1000, 3)
+    assert posterior.method == "textbook"
+    assert posterior.log_evidence == pytest.approx(ORACLE["1.1", "beam1", 1], abs=6)
+    assert posterior.tension_n.mean() / 711e3 == pytest.approx(1.13, abs=0.1)
+    assert 1 <= posterior.effective_sample_size <= 1000
+
+
+def test_the_textbook_evidence_is_right_where_nothing_changes_phase() -> None:
+    """One frequency of unknown model error: a broad likelihood that any path follows."""
+    test = modal_test({"transverse": [5.8]})
+    model = build("beam1", HANGER_3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BiasedEvidenceWarning)
+        found = [
+            update([test], model, UpdateOptions(2000, seed, method="textbook")).log_evidence
+            for seed in range(3)
+        ]
+    exact = update([test], model, UpdateOptions(2000)).log_evidence
+    assert np.mean(found) == pytest.approx(exact, abs=0.3)
+
+
+def test_an_unknown_method_is_refused_by_name() -> None:
+    with pytest.raises(UsageError, match=r"unknown method 'powers'.*textbook"):
+        UpdateOptions(method="powers")
+    assert METHODS[0] == UpdateOptions().method
