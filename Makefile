@@ -9,7 +9,7 @@ INSTALL := $(UV) --no-deps --no-build-isolation --editable .
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint bench docs lock clean
+.PHONY: demo test lint bench bench-peers docs lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -24,7 +24,12 @@ lint: .venv/development
 	$(BIN)/lint-imports
 
 bench: .venv/development
-	for benchmark in tests/benchmarks/*.py; do echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
+	for benchmark in $(filter-out tests/benchmarks/peers.py,$(wildcard tests/benchmarks/*.py)); do \
+		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
+
+# Makes the peers' environments and runs them: hours.
+bench-peers: .venv/development
+	$(BIN)/python tests/benchmarks/peers.py --resume --write-docs
 
 docs: .venv/development
 	$(BIN)/python docs/build.py

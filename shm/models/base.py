@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ import numpy as np
 from shm.errors import BadInput, UsageError
 from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
 
-Swap = tuple[tuple[str, ...], tuple[str, ...]]
+Swap = tuple[str, str]
 
 
 def silent(fraction: float) -> None:
@@ -20,8 +21,8 @@ def silent(fraction: float) -> None:
 class Model:
     """A model class of one hanger. A member declares its parameters and overrides two verbs.
 
-    `bounds` are the uniform priors of the parameters; `swaps` lists groups of parameters that can
-    be exchanged without changing any frequency, so that sampling may keep to one of the copies.
+    `bounds` are the uniform priors of the parameters; `swaps` lists pairs of end springs (log10)
+    that can be exchanged without changing any frequency, so that sampling may keep to one copy.
     `expensive` says that an evaluation costs much more than a beam's.
     """
 
@@ -73,6 +74,16 @@ class Model:
         """
         clamped = np.full((len(theta), 2), np.inf)
         return clamped, clamped
+
+    def wave_stiffness_n_m_rad(self, order: float) -> float:
+        """What an end spring is stiff or soft against: bending stiffness times wave number.
+
+        That of mode `order` of a uniform hanger at its nominal tension.
+        """
+        hanger = self.hanger
+        stretched = hanger.nominal_tension_n / hanger.bending_stiffness_n_m2
+        wave_number = math.sqrt(stretched + (order * math.pi / hanger.length_m) ** 2)
+        return hanger.bending_stiffness_n_m2 * wave_number
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput where this class cannot describe the conditions of `test`."""

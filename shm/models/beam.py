@@ -110,7 +110,7 @@ class Beam2(Beam):
         "log10_k3": (5.0, 12.0),
         "log10_k4": (5.0, 12.0),
     }
-    swaps = ((("log10_k1",), ("log10_k3",)), (("log10_k2",), ("log10_k4",)))
+    swaps = (("log10_k1", "log10_k3"), ("log10_k2", "log10_k4"))
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         springs = 10 ** theta[:, 2:]

@@ -20,7 +20,6 @@ from dataclasses import replace
 import numpy as np
 from emcee import EnsembleSampler
 from emcee.moves import DEMove, KDEMove
-from scipy.special import ndtri
 
 from shm.errors import UsageError
 from shm.models import Model
@@ -53,7 +52,6 @@ _FEWEST = 0.25
 _HOPELESS = 0.05
 _WORST_TAIL = 0.7
 _LEAST_SPREAD = 0.7
-_EDGE = 1e-9
 
 
 def refresh(
@@ -71,11 +69,12 @@ def refresh(
     BadInput as `update` does.
     """
     options = options or UpdateOptions()
-    started = time.perf_counter()
     _refuse_stranger(model, known)
     for test in tests:
         model.refuse(test)
     problem = Problem(model, Likelihood(tests, options.repeat))
+    problem.prepare(progress)
+    started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)
     method, weighted = _found(problem, known, options.samples, rng, progress)
@@ -131,13 +130,13 @@ def _population(
     noise = _NOISE * float(anchors.sigma[0])
     known_z = _places(problem, known)
     chosen = known_z[rng.permutation(len(known_z))[:_KNOWN]]
-    fresh = problem.draw_prior(_FRESH, rng)
+    fresh = problem.coordinates.draw_prior(_FRESH, rng)
     near = [normal.draw_t(_FROM_EACH_ANCHOR, rng) for normal in anchors.normals(0.0)]
     population = np.vstack(
         [
             carried(problem, chosen, noise, rng, _KNOWN_STEPS),
             carried(problem, fresh, noise, rng, _FRESH_STEPS),
-            problem.fold(np.vstack(near)),
+            problem.coordinates.fold(np.vstack(near)),
         ]
     )
     density = problem.log_posterior(problem.evaluate(population))
@@ -148,9 +147,7 @@ def _population(
 
 def _places(problem: Problem, known: Posterior) -> FloatArray:
     """The known draws as points (n, d), folded."""
-    prior = problem.prior
-    share = (known.samples[:, :-1] - prior.lower) / (prior.upper - prior.lower)
-    return problem.fold(np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE))))
+    return problem.coordinates.places(known.samples[:, :-1])
 
 
 def trusted(weighted: Weighted, samples: int) -> bool:
@@ -198,7 +195,7 @@ def _ensemble(
     start = start[: len(start) // 2 * 2]
 
     def log_posterior(z: FloatArray) -> FloatArray:
-        found = problem.log_prior(z)
+        found = problem.coordinates.log_prior(z)
         inside = np.isfinite(found)
         points = problem.evaluate(z[inside])
         found[inside] += problem.likelihood.marginal(points.predicted)

@@ -38,7 +38,7 @@ class Hint:
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Starts (n, d), all inside the fold."""
-        z = self._problem.draw_prior(n, rng)
+        z = self._problem.coordinates.draw_prior(n, rng)
         hinted = rng.random(n) >= _FROM_PRIOR
         z[np.ix_(hinted, self._columns)] = self._near.draw(int(hinted.sum()), rng)
         return z
@@ -61,7 +61,7 @@ def hinted(problem: Problem, posterior: Posterior | None) -> Hint | None:
 
 def _shared(problem: Problem, posterior: Posterior) -> IntArray:
     """Columns of the problem's parameters that the posterior has too and no swap moves."""
-    moved = {name for swap in problem.model.swaps for side in swap for name in side}
+    moved = {name for swap in problem.model.swaps for name in swap}
     names = problem.prior.names
     both = [i for i, name in enumerate(names) if name in posterior.names and name not in moved]
     return np.array(both, dtype=int)

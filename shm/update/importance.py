@@ -34,6 +34,8 @@ _UNSEEN = 1.25
 _AIMED_ERROR = 0.025
 _TRIAL = 600
 _MOST_TRIALS = 10
+_ATTEMPTS = 3
+_POOR = 0.4
 _ENOUGH_TO_FIT = 1.0
 _FEWEST, _MOST = 3000, 12000
 _EXTENSION = 4000
@@ -110,19 +112,36 @@ def weigh(
 
     `population` (n, d) follows the posterior, each (n, d) of `wider` an earlier stage: these keep
     a share of all proposals, for the tails. The first mixture holds the anchors too, lest the
-    population have missed one that matters.
+    population have missed one that matters. Where too few of the final draws are effective, they
+    become trials, and others are drawn.
     """
     tails = _tails(wider, rng)
     core = TMixture.of(population, _CLUSTERS, rng).joined(anchors.normals(0.0), _FROM_ANCHORS)
     trial = _Pool(problem)
+    for _ in range(_ATTEMPTS):
+        core = _adapted(core, tails, trial, enough, rng)
+        final = _final(problem, _widened(core, tails), trial.share(), enough, rng)
+        if final.weighted().effective_sample_size >= _POOR * enough:
+            break
+        trial.absorb(final)
+    return final.weighted()
+
+
+def _adapted(
+    core: TMixture, tails: TMixture | None, trial: _Pool, enough: float, rng: np.random.Generator
+) -> TMixture:
+    """The mixture refitted to all trial draws, batch by batch."""
     for _ in range(_MOST_TRIALS):
-        trial.draw(core.mixed(tails, _FROM_TAILS) if tails else core, _TRIAL, rng)
+        trial.draw(_widened(core, tails), _TRIAL, rng)
         weighted = trial.weighted()
         core = core.refitted(weighted.points.z, _to_fit(weighted))
         if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
             break
-    proposal = core.mixed(tails, _FROM_TAILS) if tails else core
-    return _final(problem, proposal, trial.share(), enough, rng)
+    return core
+
+
+def _widened(core: TMixture, tails: TMixture | None) -> TMixture:
+    return core.mixed(tails, _FROM_TAILS) if tails else core
 
 
 def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture | None:
@@ -136,7 +155,7 @@ def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture |
 
 def _final(
     problem: Problem, mixture: TMixture, share: float, enough: float, rng: np.random.Generator
-) -> Weighted:
+) -> _Pool:
     """Draws from one mixture, of which a `share` is expected to be effective.
 
     Their number is set beforehand: to stop as soon as the weights look even would prefer samples
@@ -149,7 +168,7 @@ def _final(
         if _suffices(final.weighted(), enough):
             break
         final.draw(mixture, _EXTENSION, rng)
-    return final.weighted()
+    return final
 
 
 def _suffices(weighted: Weighted, enough: float) -> bool:
@@ -182,18 +201,34 @@ class _Pool:
     def draw(self, mixture: TMixture, draws: int, rng: np.random.Generator) -> None:
         """One more batch; draws outside of the prior are counted, not evaluated."""
         n = rng.binomial(draws, _FROM_PRIOR)
-        z = np.vstack([self._problem.draw_prior(n, rng), mixture.draw(draws - n, rng)])
-        log_prior = self._problem.log_prior(z)
+        z = np.vstack([self._problem.coordinates.draw_prior(n, rng), mixture.draw(draws - n, rng)])
+        log_prior = self._problem.coordinates.log_prior(z)
         inside = np.isfinite(log_prior)
         z, log_prior = z[inside], log_prior[inside]
-        old = np.log(draws) + _log_proposal(mixture, self._z, self._log_prior)
-        self._proposals.append((mixture, draws))
-        new = [np.log(k) + _log_proposal(other, z, log_prior) for other, k in self._proposals]
         points = self._problem.evaluate(z)
         log_posterior = log_prior + self._problem.likelihood.marginal(points.predicted)
-        self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), logsumexp(new, axis=0))
+        self._append([(mixture, draws)], z, [points.predicted], log_prior, log_posterior)
+
+    def absorb(self, other: _Pool) -> None:
+        """Takes over the draws of another pool of the same problem."""
+        self._append(
+            other._proposals, other._z, other._predicted, other._log_prior, other._log_posterior
+        )
+
+    def _append(
+        self,
+        proposals: list[tuple[TMixture, int]],
+        z: FloatArray,
+        predicted: list[FloatArray],
+        log_prior: FloatArray,
+        log_posterior: FloatArray,
+    ) -> None:
+        old = _log_drawn(proposals, self._z, self._log_prior)
+        self._proposals += proposals
+        new = _log_drawn(self._proposals, z, log_prior)
+        self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), new)
         self._z = np.vstack([self._z, z])
-        self._predicted.append(points.predicted)
+        self._predicted += predicted
         self._log_prior = np.append(self._log_prior, log_prior)
         self._log_posterior = np.append(self._log_posterior, log_posterior)
 
@@ -208,6 +243,14 @@ class _Pool:
         """Effective draws as a share of all."""
         weighted = self.weighted()
         return weighted.effective_sample_size / weighted.draws
+
+
+def _log_drawn(
+    proposals: list[tuple[TMixture, int]], z: FloatArray, log_prior: FloatArray
+) -> FloatArray:
+    """Log of how many draws per volume (n,) the proposals, each of so many draws, put at `z`."""
+    parts = [np.log(k) + _log_proposal(mixture, z, log_prior) for mixture, k in proposals]
+    return np.asarray(logsumexp(parts, axis=0))
 
 
 def _log_proposal(mixture: TMixture, z: FloatArray, log_prior: FloatArray) -> FloatArray:

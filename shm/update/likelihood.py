@@ -23,6 +23,7 @@ from shm.models import Model
 from shm.values import PLANES, FloatArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2
+_STEP_IN_SD_TO_DRAW = 0.2
 _SMALLEST_SIGMA = 1e-4
 
 
@@ -47,11 +48,16 @@ class Likelihood:
         self._plane = np.array([PLANES.index(mode.plane) for mode in modes])
         self._order = np.array([mode.order - 1 for mode in modes])
         self._constant = -np.log(self.frequency_hz).sum() - len(modes) / 2 * np.log(2 * np.pi)
-        self._log_sigma, self._log_share = self._grid()
+        self._log_sigma, self._log_share = self._grid(_STEP_IN_SD)
+
+    @property
+    def highest_order(self) -> int:
+        """The highest order of a measured mode, which a model has to reach in each plane."""
+        return int(self._order.max()) + 1
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
         """The model's frequency for each measurement, shape (n, measurements)."""
-        frequencies = model.frequencies_hz(theta, int(self._order.max()) + 1)
+        frequencies = model.frequencies_hz(theta, self.highest_order)
         return frequencies[:, self._plane, self._order]
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
@@ -72,12 +78,12 @@ class Likelihood:
 
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
         """sigma (n,) from its posterior given each prediction (n, measurements)."""
-        joint = self._joint(predicted, np.exp(self._log_sigma), 0.0) + self._log_share
+        log_sigma, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
+        joint = self._joint(predicted, np.exp(log_sigma), 0.0) + log_share
         shares = np.exp(joint - logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
-        node = (shares < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(self._log_sigma) - 1)
-        step = self._log_sigma[1] - self._log_sigma[0]
-        jitter = step * (rng.random(len(node)) - 0.5)
-        return np.asarray(np.exp((self._log_sigma[node] + jitter).clip(None, 0.0)))
+        node = (shares < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(log_sigma) - 1)
+        jitter = (log_sigma[1] - log_sigma[0]) * (rng.random(len(node)) - 0.5)
+        return np.asarray(np.exp((log_sigma[node] + jitter).clip(None, 0.0)))
 
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         """The node of the grid with the largest joint likelihood, shape (n,)."""
@@ -96,10 +102,10 @@ class Likelihood:
         constant = self._constant - 0.5 * np.log(variance).sum(axis=0)
         return np.asarray(self.repeat * (constant - 0.5 * quadratic))
 
-    def _grid(self) -> tuple[FloatArray, FloatArray]:
+    def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Nodes of log sigma, and the log of each one's share of the uniform prior."""
         lowest = np.log(_SMALLEST_SIGMA)
-        step = _STEP_IN_SD / np.sqrt(2 * len(self.modes) * self.repeat)
+        step = step_in_sd / np.sqrt(2 * len(self.modes) * self.repeat)
         nodes, spacing = np.linspace(lowest, 0.0, int(-lowest / step) + 2, retstep=True)
         share = np.log(spacing) + nodes
         share[[0, -1]] -= np.log(2)

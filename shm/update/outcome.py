@@ -100,7 +100,7 @@ def _draws(
     points = Mover(problem, 0.0, Normal.of(points.z), step=0.5).walk(points, _FINAL_STEPS, rng)
     points = points.take(rng.permutation(n))
     sigma = problem.likelihood.draw_sigma(points.predicted, rng)
-    theta = problem.theta(problem.unfold(points.z, rng))
+    theta = problem.coordinates.unfold(problem.coordinates.theta(points.z), rng)
     return np.column_stack([theta, sigma]), points.predicted
 
 

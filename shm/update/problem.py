@@ -1,19 +1,15 @@
-"""One updating problem in the space where its prior is standard normal.
-
-Parameters map to z by the normal quantile of their uniform priors, so that no proposal leaves the
-box. Where the model can swap groups of parameters without changing any frequency, z is folded to
-one of the equal copies; the prior there is that many times denser, and samples are unfolded again.
-"""
+"""One updating problem: what a point predicts, and how probable it is."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
 from shm.models import Model
+from shm.update.coordinates import Coordinates
 from shm.update.likelihood import Likelihood
+from shm.update.options import Progress
 from shm.values import BoolArray, FloatArray, IntArray
 
 
@@ -49,20 +45,18 @@ class Problem:
         self.prior = model.prior
         self.dimension = len(self.prior.names)
         self.evaluations = 0
-        names = self.prior.names
-        self._swaps = [
-            ([names.index(n) for n in one], [names.index(n) for n in other])
-            for one, other in model.swaps
-        ]
+        middle = (1 + likelihood.highest_order) / 2
+        own = model.wave_stiffness_n_m_rad(middle)
+        self.coordinates = Coordinates(model.prior, model.swaps, own)
 
-    def theta(self, z: FloatArray) -> FloatArray:
-        """Parameters (n, d) of points (n, d)."""
-        width = self.prior.upper - self.prior.lower
-        return np.asarray(self.prior.lower + width * ndtr(z))
+    def prepare(self, progress: Progress) -> None:
+        """Does what the model has to do once for the orders that were measured."""
+        label = f"{self.model.name}: reduced basis"
+        self.model.prepare(self.likelihood.highest_order, lambda done: progress(label, done))
 
     def predict(self, z: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) at `z` (n, d)."""
-        return self.run(self.theta(z))
+        return self.run(self.coordinates.theta(z))
 
     def run(self, theta: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
@@ -75,39 +69,6 @@ class Problem:
 
     def log_posterior(self, points: Points, floor: float = 0.0) -> FloatArray:
         """Log of prior times likelihood (n,) with the fictitious error `floor`."""
-        return self.log_prior(points.z) + self.likelihood.marginal(points.predicted, floor)
-
-    def log_prior(self, z: FloatArray) -> FloatArray:
-        """Log density (n,) of the folded prior; -inf outside the fold."""
-        copies = 2 ** len(self._swaps)
-        normal = -0.5 * (z**2).sum(axis=1) - 0.5 * self.dimension * np.log(2 * np.pi)
-        return np.where(self._in_fold(z), normal + np.log(copies), -np.inf)
-
-    def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Points (n, d) from the folded prior."""
-        return self.fold(rng.standard_normal((n, self.dimension)))
-
-    def fold(self, z: FloatArray) -> FloatArray:
-        """`z` (n, d) with each point replaced by its copy inside the fold."""
-        z = z.copy()
-        for one, other in self._swaps:
-            _exchange(z, z[:, one[0]] < z[:, other[0]], one, other)
-        return z
-
-    def unfold(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """`z` with each swap made or not by chance: all equal copies are equally likely."""
-        z = z.copy()
-        for one, other in self._swaps:
-            _exchange(z, rng.random(len(z)) < 0.5, one, other)
-        return z
-
-    def _in_fold(self, z: FloatArray) -> BoolArray:
-        inside = np.ones(len(z), dtype=bool)
-        for one, other in self._swaps:
-            inside &= z[:, one[0]] >= z[:, other[0]]
-        return inside
-
-
-def _exchange(z: FloatArray, where: BoolArray, one: list[int], other: list[int]) -> None:
-    rows = np.flatnonzero(where)[:, None]
-    z[rows, one + other] = z[rows, other + one]
+        return self.coordinates.log_prior(points.z) + self.likelihood.marginal(
+            points.predicted, floor
+        )

@@ -51,13 +51,13 @@ class Anchors:
 
 def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None) -> Anchors:
     """The best distinct optima of `problem`; with a hint half of the starts do."""
-    z = hint.draw(_STARTS // 2, rng) if hint else problem.draw_prior(_STARTS, rng)
+    z = hint.draw(_STARTS // 2, rng) if hint else problem.coordinates.draw_prior(_STARTS, rng)
     sigma = np.full(len(z), _FIRST_SIGMA)
     for _ in range(_PHASES):
         z, sigma = _descend(problem, z, sigma, _STEPS)
-    promising = _distinct(problem, problem.fold(z))
+    promising = _distinct(problem, problem.coordinates.fold(z))
     ends, _ = _descend(problem, z[promising], sigma[promising], _LAST_STEPS)
-    z = problem.fold(np.vstack([z, ends]))
+    z = problem.coordinates.fold(np.vstack([z, ends]))
     z = z[_distinct(problem, z)]
     return Anchors(z, _model_error(problem, z), _slopes(problem, z), problem)
 
@@ -74,7 +74,7 @@ def carried(
     sigmas = np.full(len(z), sigma)
     noise = _noise(problem, sigmas)
     errors = noise * rng.standard_normal(noise.shape)
-    return problem.fold(_descend(problem, z, sigmas, steps, centre=z, errors=errors)[0])
+    return problem.coordinates.fold(_descend(problem, z, sigmas, steps, centre=z, errors=errors)[0])
 
 
 def _model_error(problem: Problem, z: FloatArray) -> FloatArray:

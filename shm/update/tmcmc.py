@@ -44,7 +44,7 @@ def sample(
     draws, weighed towards the prior.
     """
     points = problem.evaluate(
-        hint.draw(particles, rng) if hint else problem.draw_prior(particles, rng)
+        hint.draw(particles, rng) if hint else problem.coordinates.draw_prior(particles, rng)
     )
     current = hint.log_ratio(points.z) if hint else np.zeros(particles)
     floor, step = np.inf, 0.6

@@ -43,10 +43,11 @@ def update(
     that the model class cannot describe. Warns (BiasedEvidenceWarning) about the textbook method.
     """
     options = options or UpdateOptions()
-    started = time.perf_counter()
     for test in tests:
         model.refuse(test)
     problem = Problem(model, Likelihood(tests, options.repeat))
+    problem.prepare(progress)
+    started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)
     if options.method == TEXTBOOK:

@@ -147,9 +147,7 @@ def simulated(model: Model, theta: FloatArray, sigma: float, error: float, rng) 
 
 def quantities(model: Model) -> tuple[str, ...]:
     """What is ranked."""
-    folded = [
-        f"{side}({one[0]}, {other[0]})" for one, other in model.swaps for side in ("min", "max")
-    ]
+    folded = [f"{side}({one}, {other})" for one, other in model.swaps for side in ("min", "max")]
     return (*model.parameter_names, "sigma", *folded, "log likelihood")
 
 
@@ -157,7 +155,7 @@ def values(model: Model, samples: FloatArray, log_likelihood: FloatArray) -> Flo
     """All quantities (n, quantities) of draws with sigma (n, d + 1)."""
     names = model.parameter_names
     folded = [
-        pick(samples[:, names.index(one[0])], samples[:, names.index(other[0])])
+        pick(samples[:, names.index(one)], samples[:, names.index(other)])
         for one, other in model.swaps
         for pick in (np.minimum, np.maximum)
     ]

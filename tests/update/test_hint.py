@@ -71,7 +71,7 @@ def test_the_density_of_the_starts_is_that_of_their_draws(cheap: Posterior) -> N
     hint = hinted(problem, cheap)
     assert hint is not None
     z = hint.draw(20_000, np.random.default_rng(1))
-    assert np.isfinite(problem.log_prior(z)).all()
+    assert np.isfinite(problem.coordinates.log_prior(z)).all()
     assert np.exp(-hint.log_ratio(z)).mean() == pytest.approx(1, abs=0.03)
 
 

@@ -129,6 +129,7 @@ def reduce(
     candidates = np.vstack([box.spread(_CANDIDATES, rng), corners])
     reservoir, solutions = _filled(system, box, candidates, modes, progress)
     basis, projected, error = _smallest(reservoir, candidates, modes)
+    progress(1.0)
     return Reduction(
         projected,
         system.axis_m,
