@@ -7,11 +7,21 @@ from datetime import UTC, datetime
 
 from shm.report.content import Interval
 
-_ENDS = {
+_ROTATIONAL_SPRINGS = {
     "k1": "transverse, deck end",
     "k2": "longitudinal, deck end",
     "k3": "transverse, arch end",
     "k4": "longitudinal, arch end",
+}
+_FACE_SPRINGS = {
+    "k1": "large edges, deck end",
+    "k2": "small edges, deck end",
+    "k3": "small edges, arch end",
+    "k4": "large edges, arch end",
+    "krx": "across the bridge, deck end",
+    "kry": "along the bridge, deck end",
+    "klx": "across the bridge, arch end",
+    "kly": "along the bridge, arch end",
 }
 _MEANINGS = {
     "theta_F": "tension over nominal tension",
@@ -85,20 +95,15 @@ def hanger_name(hanger_id: int, name: str) -> str:
 
 
 def quantity(name: str) -> str:
-    """`log10_k1` as `end stiffness k1 (transverse, deck end)`, other names without underscores."""
-    if not name.startswith("log10_k"):
-        return name.replace("_", " ")
-    spring = name.removeprefix("log10_")
-    return f"end stiffness {spring}" + (f" ({_ENDS[spring]})" if spring in _ENDS else "")
+    """`transverse_end_stiffness` as `transverse end stiffness`."""
+    return name.replace("_", " ")
 
 
 def meaning(name: str, model: str) -> str:
-    """What a parameter is, with its unit."""
-    if name.startswith("log10_k"):
-        return f"log10 of {quantity(name)} in {stiffness_unit(model)}"
-    return _MEANINGS.get(name, name)
-
-
-def stiffness_unit(model: str) -> str:
-    """Rotational springs of beams, springs at each node of solids."""
-    return "N m/rad" if model.startswith("beam") else "N/m per node"
+    """What a parameter is, with its unit: beams have rotational springs, solids springs a node."""
+    if not name.startswith("log10_k"):
+        return _MEANINGS.get(name, name)
+    spring = name.removeprefix("log10_")
+    if model.startswith("beam"):
+        return f"log10 of end stiffness {spring} ({_ROTATIONAL_SPRINGS[spring]}) in N m/rad"
+    return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"

@@ -46,7 +46,7 @@ class _Particles:
 def textbook(problem: Problem, particles: int, rng: np.random.Generator) -> Outcome:
     """The posterior's draws and evidence by the textbook; warns with BiasedEvidenceWarning."""
     warnings.warn(
-        "textbook TMCMC: a bias of -1 to -4.5 in log evidence was measured on hangers; use the "
+        "textbook TMCMC: a bias of -1 to -7 in log evidence was measured on hangers; use the "
         "default method for evidences and model selection.",
         BiasedEvidenceWarning,
         stacklevel=3,

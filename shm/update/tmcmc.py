@@ -5,7 +5,7 @@ coefficient of variation of the weights of 2 allows; the population is resampled
 
 The likelihood is not raised to a power, as the textbook (`shm.update.textbook`) has it: on this
 problem that path meets a phase transition (the model error sigma collapses at some power) and its
-evidence is biased by -1 to -4.5. Instead a fictitious error `floor` is added to the variance of the
+evidence is biased by -1 to -7. Instead a fictitious error `floor` is added to the variance of the
 likelihood and lowered from infinity (the prior) to 0 (the posterior). A stage makes several moves:
 t-preconditioned Crank-Nicolson steps (Grumitt, Karamanis and Seljak 2023), which suit the heavy
 tails better than a random walk, and independent proposals that jump between the population and the

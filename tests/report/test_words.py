@@ -53,10 +53,10 @@ def test_times_are_given_in_utc() -> None:
 
 
 def test_parameters_and_springs_have_plain_names_and_units() -> None:
-    assert words.quantity("log10_k3") == "end stiffness k3 (transverse, arch end)"
     assert words.quantity("transverse_end_stiffness") == "transverse end stiffness"
-    assert words.meaning("log10_k1", "beam2").endswith("in N m/rad")
-    assert words.meaning("log10_k1", "solid2").endswith("in N/m per node")
+    beam, solid = words.meaning("log10_k3", "beam2"), words.meaning("log10_krx", "solid1")
+    assert beam == "log10 of end stiffness k3 (transverse, arch end) in N m/rad"
+    assert solid == "log10 of spring krx (across the bridge, deck end) in N/m per node"
     assert words.meaning("theta_F", "beam2") == "tension over nominal tension"
 
 
