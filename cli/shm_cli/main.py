@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -113,6 +114,7 @@ def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | No
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with the code of the contract."""
     one_thread_a_process()
+    warnings.showwarning = _warn
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     sys.exit(run(arguments))
 
@@ -137,6 +139,11 @@ def run(arguments: Sequence[str]) -> int:
         _say("This is a fault of shm. `shm --debug ...` shows where; please report it.")
         return UNEXPECTED
     return result if isinstance(result, int) else 0
+
+
+def _warn(message: Warning | str, *where: object, **_: object) -> None:
+    """A warning without the place in the code that Python adds."""
+    _say(f"[bold yellow]Warning:[/] {escape(str(message))}")
 
 
 def _say(text: str) -> None:

@@ -88,6 +88,7 @@ def show_selection(selection: Selection) -> None:
     made = table(
         f"model classes of hanger {selection.selected.hanger}, most probable first",
         "class", "probability", "log evidence", "tension (kN)", "90 % interval (kN)", "to nominal",
+        "most probable values",
     )  # fmt: skip
     for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
         low, high = np.quantile(posterior.tension_n, [0.05, 0.95]) / 1e3
@@ -99,5 +100,9 @@ def show_selection(selection: Selection) -> None:
             f"{mean / 1e3:.1f}",
             f"{low:.1f} to {high:.1f}",
             f"{mean / posterior.nominal_tension_n - 1:+.1%}",
+            ", ".join(
+                f"{name} {value:.3g}"
+                for name, value in zip(posterior.names, posterior.most_probable, strict=True)
+            ),
         )
     show_table(made)

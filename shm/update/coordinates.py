@@ -20,6 +20,9 @@ from scipy.special import ndtr, ndtri
 from shm.values import FloatArray, Prior
 
 _EDGE = 1e-9
+import os
+_SHARE = float(os.environ.get('SHARE','0.2'))
+_STEPS = 6
 
 
 class Coordinates:
@@ -41,7 +44,7 @@ class Coordinates:
         share = ndtr(z)
         theta = np.asarray(self.prior.lower + self._width * share)
         for one, other in self._pairs:
-            weaker = self._weaker(theta[:, one], theta[:, other], other)
+            weaker = self._weaker(theta[:, one], theta[:, other])
             theta[:, other] = weaker.clip(self.prior.lower[other], self.prior.upper[other])
         return theta
 
@@ -51,8 +54,8 @@ class Coordinates:
         for one, other in self._pairs:
             pair = np.sort(theta[:, [one, other]], axis=1)
             share[:, one] = (pair[:, 1] - self.prior.lower[one]) / self._width[one]
-            alike = np.log10(2 / self._give(pair).sum(axis=1) - self._own)
-            share[:, other] = (alike - self.prior.lower[other]) / self._width[other]
+            mixed = self._mixed(pair[:, 1], pair[:, 0])
+            share[:, other] = (mixed - self.prior.lower[other]) / self._width[other]
         return np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE)))
 
     def fold(self, z: FloatArray) -> FloatArray:
@@ -75,10 +78,10 @@ class Coordinates:
         density: FloatArray = -0.5 * (z**2).sum(axis=1) - 0.5 * z.shape[1] * np.log(2 * np.pi)
         for one, other in self._pairs:
             stronger = self.prior.lower[one] + self._width[one] * ndtr(z[:, one])
-            alike = self.prior.lower[other] + self._width[other] * ndtr(z[:, other])
-            weaker = self._weaker(stronger, alike, other)
+            mixed = self.prior.lower[other] + self._width[other] * ndtr(z[:, other])
+            weaker = self._weaker(stronger, mixed)
             inside = (weaker <= stronger) & (weaker >= self.prior.lower[other])
-            stretch = self._log_stretch(weaker, alike)
+            stretch = -np.log(self._slope(stronger, weaker))
             density = np.where(inside, density + np.log(2) + stretch, -np.inf)
         return density
 
@@ -86,17 +89,25 @@ class Coordinates:
         """Places (n, d) from the folded prior."""
         return self.places(rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width))))
 
-    def _weaker(self, stronger: FloatArray, alike: FloatArray, other: int) -> FloatArray:
-        """log10 of the weaker spring beside the stronger one that makes the pair as `alike`."""
-        give = 2 * self._give(alike) - self._give(stronger)
-        stiffness = 1 / np.maximum(give, self._give(alike) / 2) - self._own
-        least = 0.999 * 10 ** self.prior.lower[other]
-        return np.asarray(np.log10(np.maximum(stiffness, least)))
+    def _mixed(self, stronger: FloatArray, weaker: FloatArray) -> FloatArray:
+        """The coordinate of the weaker spring, from log10 of both."""
+        give = self._give(stronger) + self._give(weaker)
+        return np.asarray((1 - _SHARE) * np.log10(2 / give - self._own) + _SHARE * weaker)
 
-    def _log_stretch(self, weaker: FloatArray, alike: FloatArray) -> FloatArray:
-        """Log of the weaker spring's change by that of `alike`, at the same stronger one."""
-        slopes = [np.log(10**k) + 2 * np.log(self._give(k)) for k in (alike, weaker)]
-        return np.asarray(np.log(2) + slopes[0] - slopes[1])
+    def _slope(self, stronger: FloatArray, weaker: FloatArray) -> FloatArray:
+        """Its change by log10 of the weaker spring."""
+        give = self._give(weaker)
+        both = give + self._give(stronger)
+        alike = 2 / both - self._own
+        return np.asarray((1 - _SHARE) * 2 * 10**weaker * (give / both) ** 2 / alike + _SHARE)
+
+    def _weaker(self, stronger: FloatArray, mixed: FloatArray) -> FloatArray:
+        """log10 of the weaker spring, by Newton's steps."""
+        weaker = mixed.copy()
+        for _ in range(_STEPS):
+            fault = self._mixed(stronger, weaker) - mixed
+            weaker = weaker - fault / self._slope(stronger, weaker)
+        return weaker
 
     def _give(self, log10_k: FloatArray) -> FloatArray:
         """How much an end gives way."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -114,3 +116,12 @@ def test_a_wrong_file_is_bad_input(
     assert ended.code == 3
     assert said in ended.err
     assert "wrong.modes.json" in ended.err
+
+
+def test_the_textbook_method_warns_in_plain_words(modes_file: Path, hanger_file: Path) -> None:
+    arguments = [str(a) for a in call(modes_file, hanger_file, "--method", "textbook")]
+    program = [sys.executable, "-c", "from shm_cli.main import main; main()"]
+    ended = subprocess.run([*program, *arguments], capture_output=True, text=True, check=True)
+    assert ended.stderr.startswith("Warning: textbook TMCMC: a bias of -1 to -7")
+    assert ".py" not in ended.stderr
+    assert json.loads(ended.stdout)["model"] == "beam1"
