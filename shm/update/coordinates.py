@@ -5,9 +5,10 @@ box. Two end springs that can be exchanged without changing any frequency are an
 gives way like 1/(k + EI p), with p the wave number of a mode, and frequencies tell, nearly, how
 much both ends give together: the posterior of the two is a hook along a curve where that sum is
 constant. Such a pair is folded to k_one >= k_other, where the prior is twice as dense, and has as
-coordinates log k_one and the log of the stiffness that two springs alike would have to give as
-much. The hook is then straight, and a normal or t distribution can follow it. Samples are unfolded
-again.
+coordinates log k_one and a mean of two logs: mostly of the stiffness that two springs alike would
+have to give as much, a little of k_other. The first straightens the hook, so that a normal or t
+distribution can follow it; the second keeps apart what is soft and hardly felt. Samples are
+unfolded again.
 """
 
 from __future__ import annotations
@@ -20,8 +21,7 @@ from scipy.special import ndtr, ndtri
 from shm.values import FloatArray, Prior
 
 _EDGE = 1e-9
-import os
-_SHARE = float(os.environ.get('SHARE','0.2'))
+_SHARE = 0.1
 _STEPS = 6
 
 
@@ -90,7 +90,7 @@ class Coordinates:
         return self.places(rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width))))
 
     def _mixed(self, stronger: FloatArray, weaker: FloatArray) -> FloatArray:
-        """The coordinate of the weaker spring, from log10 of both."""
+        """The weaker spring's coordinate before it becomes a quantile, from log10 of both."""
         give = self._give(stronger) + self._give(weaker)
         return np.asarray((1 - _SHARE) * np.log10(2 / give - self._own) + _SHARE * weaker)
 

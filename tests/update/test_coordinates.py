@@ -72,14 +72,15 @@ def test_points_anywhere_fold_into_the_prior_and_stay_there(coordinates) -> None
     np.testing.assert_allclose(coordinates.theta(again), coordinates.theta(folded), rtol=1e-6)
 
 
-def test_pairs_that_give_as_much_lie_on_a_straight_line() -> None:
+def test_pairs_that_give_as_much_lie_on_a_nearly_straight_line() -> None:
     model = build("beam2", HANGER_3)
     coordinates = Coordinates(model.prior, model.swaps, OWN)
     stronger = np.linspace(7.0, 11.9, 50)
     weaker = np.log10(1 / (2 / (1e7 + OWN) - 1 / (10**stronger + OWN)) - OWN)
     theta = np.tile([1.0, 1.0, 0.0, 8.0, 0.0, 7.5], (50, 1))
     theta[:, 2], theta[:, 4] = stronger, weaker
-    assert np.ptp(coordinates.places(theta)[:, 4]) < 1e-9
+    hooked = np.ptp(norm.ppf((weaker - 5) / 7))
+    assert np.ptp(coordinates.places(theta)[:, 4]) < 0.12 * hooked
 
 
 def test_frequencies_hardly_change_along_that_line() -> None:
@@ -94,4 +95,4 @@ def test_frequencies_hardly_change_along_that_line() -> None:
     moved, softened = (
         np.ptp(model.frequencies_hz(coordinates.theta(z), 6)[:, 0], axis=0) for z in (along, across)
     )
-    assert np.all(moved < 0.1 * softened)
+    assert np.all(moved < 0.2 * softened)
