@@ -22,7 +22,8 @@ from shm.values import FloatArray, Prior
 
 _EDGE = 1e-9
 _SHARE = 0.1
-_STEPS = 6
+_STEPS = 5
+_LOG_10 = np.log(10)
 
 
 class Coordinates:
@@ -54,7 +55,7 @@ class Coordinates:
         for one, other in self._pairs:
             pair = np.sort(theta[:, [one, other]], axis=1)
             share[:, one] = (pair[:, 1] - self.prior.lower[one]) / self._width[one]
-            mixed = self._mixed(pair[:, 1], pair[:, 0])
+            mixed, _ = self._mixed(pair[:, 1], pair[:, 0])
             share[:, other] = (mixed - self.prior.lower[other]) / self._width[other]
         return np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE)))
 
@@ -81,7 +82,7 @@ class Coordinates:
             mixed = self.prior.lower[other] + self._width[other] * ndtr(z[:, other])
             weaker = self._weaker(stronger, mixed)
             inside = (weaker <= stronger) & (weaker >= self.prior.lower[other])
-            stretch = -np.log(self._slope(stronger, weaker))
+            stretch = -np.log(self._mixed(stronger, weaker)[1])
             density = np.where(inside, density + np.log(2) + stretch, -np.inf)
         return density
 
@@ -89,26 +90,24 @@ class Coordinates:
         """Places (n, d) from the folded prior."""
         return self.places(rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width))))
 
-    def _mixed(self, stronger: FloatArray, weaker: FloatArray) -> FloatArray:
-        """The weaker spring's coordinate before it becomes a quantile, from log10 of both."""
-        give = self._give(stronger) + self._give(weaker)
-        return np.asarray((1 - _SHARE) * np.log10(2 / give - self._own) + _SHARE * weaker)
-
-    def _slope(self, stronger: FloatArray, weaker: FloatArray) -> FloatArray:
-        """Its change by log10 of the weaker spring."""
-        give = self._give(weaker)
-        both = give + self._give(stronger)
-        alike = 2 / both - self._own
-        return np.asarray((1 - _SHARE) * 2 * 10**weaker * (give / both) ** 2 / alike + _SHARE)
-
     def _weaker(self, stronger: FloatArray, mixed: FloatArray) -> FloatArray:
         """log10 of the weaker spring, by Newton's steps."""
         weaker = mixed.copy()
         for _ in range(_STEPS):
-            fault = self._mixed(stronger, weaker) - mixed
-            weaker = weaker - fault / self._slope(stronger, weaker)
+            found, slope = self._mixed(stronger, weaker)
+            weaker = weaker - (found - mixed) / slope
         return weaker
 
-    def _give(self, log10_k: FloatArray) -> FloatArray:
-        """How much an end gives way."""
-        return np.asarray(1 / (10**log10_k + self._own))
+    def _mixed(self, stronger: FloatArray, weaker: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The weaker spring's coordinate before it becomes a quantile, and its slope.
+
+        From log10 of both springs; the slope is by that of the weaker one.
+        """
+        # The exponential is much quicker than a power of ten.
+        stiffness = np.exp(_LOG_10 * weaker)
+        give = 1 / (stiffness + self._own)
+        both = give + 1 / (np.exp(_LOG_10 * stronger) + self._own)
+        alike = 2 / both - self._own
+        mixed = (1 - _SHARE) / _LOG_10 * np.log(alike) + _SHARE * weaker
+        slope = (1 - _SHARE) * 2 * stiffness * (give / both) ** 2 / alike + _SHARE
+        return mixed, slope
