@@ -26,6 +26,16 @@ _STEPS = 5
 _LOG_10 = np.log(10)
 
 
+def quantile(share: FloatArray) -> FloatArray:
+    """Standard normal z of shares of a prior's range, kept off its ends."""
+    return np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE)))
+
+
+def log_normal(z: FloatArray) -> FloatArray:
+    """Log of the standard normal density (n,) at `z` (n, d)."""
+    return np.asarray(-0.5 * (z**2).sum(axis=1) - 0.5 * z.shape[1] * np.log(2 * np.pi))
+
+
 class Coordinates:
     """Places z (n, d) of parameters theta (n, d), with pairs of springs (log10) straightened.
 
@@ -57,7 +67,7 @@ class Coordinates:
             share[:, one] = (pair[:, 1] - self.prior.lower[one]) / self._width[one]
             mixed, _ = self._mixed(pair[:, 1], pair[:, 0])
             share[:, other] = (mixed - self.prior.lower[other]) / self._width[other]
-        return np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE)))
+        return quantile(share)
 
     def fold(self, z: FloatArray) -> FloatArray:
         """`z` (n, d) with each point replaced by its copy inside the fold."""
@@ -76,7 +86,7 @@ class Coordinates:
 
     def log_prior(self, z: FloatArray) -> FloatArray:
         """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
-        density: FloatArray = -0.5 * (z**2).sum(axis=1) - 0.5 * z.shape[1] * np.log(2 * np.pi)
+        density = log_normal(z)
         for one, other in self._pairs:
             stronger = self.prior.lower[one] + self._width[one] * ndtr(z[:, one])
             mixed = self.prior.lower[other] + self._width[other] * ndtr(z[:, other])

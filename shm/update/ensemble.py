@@ -24,7 +24,6 @@ from emcee.moves import DEMove, KDEMove
 from shm.errors import UsageError
 from shm.models import Model
 from shm.update.importance import Weighted, weigh
-from shm.update.likelihood import Likelihood
 from shm.update.options import Progress, UpdateOptions, silent
 from shm.update.outcome import posterior_of
 from shm.update.problem import Problem
@@ -70,10 +69,7 @@ def refresh(
     """
     options = options or UpdateOptions()
     _refuse_stranger(model, known)
-    for test in tests:
-        model.refuse(test)
-    problem = Problem(model, Likelihood(tests, options.repeat))
-    problem.prepare(progress)
+    problem = Problem.of(tests, model, options.repeat, progress)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

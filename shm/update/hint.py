@@ -9,15 +9,14 @@ those without it, and a wrong hint costs half of the starts and no more.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
 
+from shm.update.coordinates import log_normal, quantile
 from shm.update.mixture import Normal, TMixture
 from shm.update.problem import Problem
 from shm.values import FloatArray, IntArray, Posterior
 
 _WIDER = 3.0
 _FROM_PRIOR = 0.5
-_EDGE = 1e-9
 
 
 class Hint:
@@ -32,8 +31,7 @@ class Hint:
         names = [problem.prior.names[i] for i in self._columns]
         lower, upper = problem.prior.lower[self._columns], problem.prior.upper[self._columns]
         samples = np.column_stack([posterior.parameter(name) for name in names])
-        z = ndtri(((samples - lower) / (upper - lower)).clip(_EDGE, 1 - _EDGE))
-        found = Normal.of(z)
+        found = Normal.of(quantile((samples - lower) / (upper - lower)))
         self._near = TMixture([Normal(found.mean, _WIDER**2 * found.covariance)], np.ones(1))
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
@@ -46,9 +44,7 @@ class Hint:
     def log_ratio(self, z: FloatArray) -> FloatArray:
         """Log of the density of starts over that of the prior (n,) at `z` (n, d)."""
         shared = z[:, self._columns]
-        count = shared.shape[1]
-        prior = -0.5 * (shared**2).sum(axis=1) - 0.5 * count * np.log(2 * np.pi)
-        near = self._near.log_density(shared) - prior
+        near = self._near.log_density(shared) - log_normal(shared)
         return np.asarray(np.logaddexp(np.log(_FROM_PRIOR), np.log1p(-_FROM_PRIOR) + near))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from shm.models import Model
 from shm.update.coordinates import Coordinates
 from shm.update.likelihood import Likelihood
 from shm.update.options import Progress
-from shm.values import BoolArray, FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray, ModalTest
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +50,20 @@ class Problem:
         own = model.wave_stiffness_n_m_rad(middle)
         self.coordinates = Coordinates(model.prior, model.swaps, own)
 
-    def prepare(self, progress: Progress) -> None:
-        """Does what the model has to do once for the orders that were measured."""
-        label = f"{self.model.name}: reduced basis"
-        self.model.prepare(self.likelihood.highest_order, lambda done: progress(label, done))
+    @classmethod
+    def of(
+        cls, tests: Sequence[ModalTest], model: Model, repeat: int, progress: Progress
+    ) -> Problem:
+        """The problem of `tests`, each of which the model can describe, the model made ready.
+
+        Raises BadInput where a test has no modes or conditions that the class cannot describe.
+        """
+        for test in tests:
+            model.refuse(test)
+        problem = cls(model, Likelihood(tests, repeat))
+        label = f"{model.name}: reduced basis"
+        model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
+        return problem
 
     def predict(self, z: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) at `z` (n, d)."""

@@ -11,7 +11,6 @@ from shm.errors import UsageError
 from shm.models import Model
 from shm.update.hint import hinted
 from shm.update.importance import Weighted, weigh
-from shm.update.likelihood import Likelihood
 from shm.update.options import TEXTBOOK, Progress, UpdateOptions, silent
 from shm.update.outcome import assembled, posterior_of
 from shm.update.problem import Problem
@@ -43,10 +42,7 @@ def update(
     that the model class cannot describe. Warns (BiasedEvidenceWarning) about the textbook method.
     """
     options = options or UpdateOptions()
-    for test in tests:
-        model.refuse(test)
-    problem = Problem(model, Likelihood(tests, options.repeat))
-    problem.prepare(progress)
+    problem = Problem.of(tests, model, options.repeat, progress)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

@@ -29,8 +29,6 @@ _VERSION = 1
 _BATCH_OF_MODES = 6
 _CELLS_A_MODE = 6
 
-_made: dict[str, Reduction] = {}
-
 
 @dataclass(frozen=True)
 class Description:
@@ -68,6 +66,9 @@ class Description:
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+_made: dict[tuple[Description, int], Reduction] = {}
+
+
 def rounded_up(modes: int) -> int:
     """The number of modes that a basis for `modes` is made for."""
     return -(-modes // _BATCH_OF_MODES) * _BATCH_OF_MODES
@@ -78,13 +79,18 @@ def transverse_basis(
 ) -> Reduction:
     """The basis for the first `modes` transverse modes."""
     modes = rounded_up(modes)
-    key = description.key(modes)
-    found = _made.get(key) or cache.load(key)
-    if found is None:
-        from shm.models.solid.reduction import Box, reduce
+    if (description, modes) not in _made:
+        key = description.key(modes)
+        _made[description, modes] = cache.load(key) or _make(description, key, modes, progress)
+    return _made[description, modes]
 
-        box = Box(np.array(description.lower), np.array(description.upper))
-        found = reduce(description.system("transverse", modes), box, modes, progress)
-        cache.save(key, found)
-    _made[key] = found
-    return found
+
+def _make(
+    description: Description, key: str, modes: int, progress: Callable[[float], None]
+) -> Reduction:
+    from shm.models.solid.reduction import Box, reduce
+
+    box = Box(np.array(description.lower), np.array(description.upper))
+    reduction = reduce(description.system("transverse", modes), box, modes, progress)
+    cache.save(key, reduction)
+    return reduction

@@ -56,10 +56,7 @@ def face_springs_n_m_rad(
     First against rotation in the direction of the plate's thickness, then of its width.
     """
     thickness, width = plate.thickness_m, plate.end_width_m
-    large, small = (
-        2 * large_n_m / plate.edge_node_spacing_m,
-        2 * small_n_m / plate.edge_node_spacing_m,
-    )
+    large, small = (2 * k / plate.edge_node_spacing_m for k in (large_n_m, small_n_m))
     across = large * width * thickness**2 / 4 + small * thickness**3 / 12
     along = large * width**3 / 12 + small * thickness * width**2 / 4
     return across, along
