@@ -21,6 +21,7 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 ComplexArray: TypeAlias = NDArray[np.complex128]
 Plane: TypeAlias = Literal["transverse", "longitudinal"]
 Quantity: TypeAlias = Literal["force", "acceleration"]
+Verdict: TypeAlias = Literal["good", "warning", "refused", "unknown"]
 
 PLANES: tuple[Plane, Plane] = ("transverse", "longitudinal")
 NAN = math.nan
@@ -94,18 +95,26 @@ class Hanger:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One sensor of a recording; `values` has shape (samples,), in N or m/s^2, NaN where bad."""
+    """One sensor of a recording; `values` has shape (samples,), in N or m/s^2, NaN where bad.
+
+    `full_scale` is the largest value that sensor and logger can record, NaN where nobody says.
+    """
 
     name: str
     quantity: Quantity
     values: FloatArray
     plane: Plane | None = None
     x_m: float = NAN
+    full_scale: float = NAN
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Force and accelerations over time, as received; one file, one or many hits."""
+    """Accelerations over time, as received, with the hammer's force unless nobody hit.
+
+    One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
+    direction the hammer hit.
+    """
 
     source: str
     channels: tuple[Channel, ...]
@@ -170,7 +179,11 @@ class ShapePoint:
 
 @dataclass(frozen=True)
 class Mode:
-    """One identified mode. `order` counts from 1 in each plane; standard deviations may be NaN."""
+    """One identified mode. `order` counts from 1 in each plane; standard deviations may be NaN.
+
+    `acceleration_m_s2` is the amplitude with which it rings right after a hit, at the sensor that
+    moves most (median over the hits).
+    """
 
     plane: Plane
     order: int
@@ -179,6 +192,39 @@ class Mode:
     damping_ratio: float = NAN
     damping_sd: float = NAN
     shape: tuple[ShapePoint, ...] = ()
+    acceleration_m_s2: float = NAN
+
+
+@dataclass(frozen=True)
+class ForeignMode:
+    """A resonance or tone in a test that is not a bending mode of the hanger, and why not.
+
+    `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine) or
+    `deck` (the bridge or another neighbour moves the hanger).
+    """
+
+    kind: Literal["harmonic", "tone", "deck"]
+    frequency_hz: float
+    damping_ratio: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class QualityCheck:
+    """One figure of a test's quality beside its limit, and what to do where it is not met.
+
+    `value` and `limit` are in `unit` (empty: none); `found` says what was seen and where; `remedy`
+    is what the crew should do, empty where the verdict is good. A figure that these records do not
+    give is NaN and `unknown`; a test with a `refused` check is not identified.
+    """
+
+    name: str
+    verdict: Verdict
+    value: float
+    limit: float
+    unit: str
+    found: str
+    remedy: str = ""
 
 
 @dataclass(frozen=True)

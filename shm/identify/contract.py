@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.identify.options import IdentifyOptions
-from shm.values import FloatArray, FrequencyResponse, ResponsePoint
+from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,14 @@ class Hit:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class Tone:
+    """A steady vibration that is there whether the hammer hits or not; `name`: where it is from."""
+
+    frequency_hz: float
+    name: str
+
+
 @dataclass(frozen=True, eq=False)
 class Poles:
     """The poles in the band over all model orders, for a stabilisation diagram; arrays (poles,)."""
@@ -50,19 +58,25 @@ class Poles:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One test as an identifier sees it.
+    """One set-up of a test, sensors and hammer at their places, as an identifier sees it.
 
     `decays` holds the ring-down after each used hit, each (points, samples), low-passed to the
-    band and sampled at `sampling_rate_hz`; a hit's forced part is not in it. Exponential windows of
-    `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on `frequency_response` and
-    on `decays`.
+    band and sampled at `sampling_rate_hz`; a hit's forced part is not in it. `driven` holds the
+    same hits from just before the hammer strikes, each (1 + points, samples), the force first; it
+    is empty where only frequency responses are known, or nobody hit. `spectra` holds those of each
+    used hit, windowed, on the lines of `frequency_response`: (hits, 1 + points, lines), the force
+    first. Ambient records have none of these: their `decays` are parts of the record. Exponential
+    windows of `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on spectra and
+    frequency responses, and on `decays`.
     """
 
     source: str
     points: tuple[ResponsePoint, ...]
     decays: tuple[FloatArray, ...]
     sampling_rate_hz: float
-    frequency_response: FrequencyResponse
+    frequency_response: FrequencyResponse | None
+    driven: tuple[FloatArray, ...] = ()
+    spectra: ComplexArray | None = None
     window_time_constant_s: float = math.inf
     decay_time_constant_s: float = math.inf
     hits: tuple[Hit, ...] = ()
@@ -74,7 +88,8 @@ class FoundMode:
     """A mode before it has a plane and an order.
 
     `shape` and `shape_sd` (points,): real, largest absolute value 1. Standard deviations are NaN
-    where there are too few hits to know them.
+    where there are too few hits to know them. `acceleration_m_s2`: see `Mode`; an identifier
+    leaves it out.
     """
 
     frequency_hz: float
@@ -83,6 +98,7 @@ class FoundMode:
     damping_sd: float
     shape: FloatArray
     shape_sd: FloatArray
+    acceleration_m_s2: float = NAN
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,22 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len
 
-from shm.identify.hits import PULSE_SECONDS, RINGING_SAMPLES, Pulse
+from shm.identify.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
 
 BAND_MARGIN = 1.25
 MOST_LINES = 8192
 END_LEVEL = 0.01
 """A ring-down that is above this share at the end of its window gets an exponential one."""
-
-
-@dataclass(frozen=True, eq=False)
-class HitRecord:
-    """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples)."""
-
-    force: FloatArray
-    accelerations: FloatArray
-    pulse: Pulse
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,15 @@ class Pulse:
     second_peak: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class HitRecord:
+    """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples)."""
+
+    force: FloatArray
+    accelerations: FloatArray
+    pulse: Pulse
+
+
 def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
     """The hits in `force` (samples,), NaN where bad; empty where none stands out of the noise.
 

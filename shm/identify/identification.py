@@ -10,32 +10,46 @@ import numpy as np
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Finding, Hit, Measurement, Poles
+from shm.identify.finishing import coherent_only, without_window
 from shm.identify.jackknife import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.options import IdentifyOptions
 from shm.identify.placing import placed
-from shm.identify.quality import coherent_only, without_window
 from shm.identify.recordings import measurement_of_recordings
 from shm.identify.registry import identifier
 from shm.identify.responses import measurement_of_responses
-from shm.values import NAN, FrequencyResponse, Hanger, ModalTest, Recording
+from shm.values import (
+    NAN,
+    ComplexArray,
+    ForeignMode,
+    FrequencyResponse,
+    Hanger,
+    ModalTest,
+    QualityCheck,
+    Recording,
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
     """What a test says, and how it came to say so.
 
-    `dropped` counts all that was left out with the reason; `notes` are decisions a reader should
-    know of. `frequency_response` has the exponential window of `window_time_constant_s` (inf: none)
-    on it, the modes have not.
+    `quality` holds a figure for everything that can be wrong with a test; `set_aside` what rings
+    in it without being a mode of the hanger; `dropped` counts all that was left out with the
+    reason; `notes` are decisions a reader should know of. `frequency_response`, None where nobody
+    hit, has the exponential window of `window_time_constant_s` (inf: none) on it, the modes have
+    not; `fit` (points, lines) is what the identified modes make of it, window included.
     """
 
     test: ModalTest
-    frequency_response: FrequencyResponse
+    frequency_response: FrequencyResponse | None
     hits: tuple[Hit, ...]
     dropped: tuple[Dropped, ...]
     poles: Poles
     notes: tuple[str, ...] = ()
     window_time_constant_s: float = math.inf
+    quality: tuple[QualityCheck, ...] = ()
+    set_aside: tuple[ForeignMode, ...] = ()
+    fit: ComplexArray | None = None
 
 
 _DEFAULTS = IdentifyOptions()
@@ -58,12 +72,12 @@ def identify(
     found = coherent_only(without_window(found, measurement), measurement, options)
     if not found.modes:
         raise _nothing_found(measurement, found)
-    modes, notes = placed(found.modes, measurement.points, hanger)
+    placement = placed(found.modes, measurement.points, hanger)
     first = records[0]
     return Identification(
         test=ModalTest(
             id=test_id,
-            modes=modes,
+            modes=placement.modes,
             hanger=first.hanger,
             time=first.time,
             temperature_c=first.temperature_c,
@@ -73,8 +87,9 @@ def identify(
         hits=measurement.hits,
         dropped=tuple(d for d in measurement.dropped + found.dropped if d.count),
         poles=found.poles,
-        notes=notes + _few_hits(measurement),
+        notes=placement.notes + _few_hits(measurement),
         window_time_constant_s=measurement.window_time_constant_s,
+        set_aside=placement.set_aside,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from shm.errors import UsageError
 from shm.values import NAN
@@ -26,6 +27,14 @@ class IdentifyOptions:
     `min_coherence`: smallest coherence at a resonance of a measured frequency response.
     `reference_force_n`: peak force of the reference level; NaN leaves the amplitude unknown.
     `window_time_constant_s`: of the exponential window already in a given frequency response.
+    `estimator`: of the frequency response: `h1` (noise in the responses), `h2` (noise in the
+    force), `hv` (noise in both).
+    `cross_check`: name of a second identifier whose frequencies are compared; empty: none.
+    `frequency_allowance`: standard deviation, as a fraction, of what differs from one test to the
+    next without being seen within one (mounting of sensors, rest of the temperature): added to
+    that of each frequency.
+    `mains_hz`: of the power grid. `disturbance_bands`: name, lowest and highest frequency in Hz of
+    machines that are known to run near the bridge.
     """
 
     band_low_hz: float = 2.0
@@ -43,6 +52,11 @@ class IdentifyOptions:
     min_coherence: float = 0.5
     reference_force_n: float = NAN
     window_time_constant_s: float = math.inf
+    estimator: Literal["h1", "h2", "hv"] = "h1"
+    cross_check: str = ""
+    frequency_allowance: float = 0.0
+    mains_hz: float = 50.0
+    disturbance_bands: tuple[tuple[str, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.band_low_hz < self.band_high_hz:

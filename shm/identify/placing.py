@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,13 +11,22 @@ from shm.identify.contract import FoundMode
 from shm.identify.order import Expected, PlaneModes, assign_orders
 from shm.identify.pairs import with_both_planes
 from shm.identify.planes import CLOSE, planes_of, shape_points
-from shm.values import NAN, PLANES, Hanger, Mode, Plane, ResponsePoint, ShapePoint
+from shm.values import NAN, PLANES, ForeignMode, Hanger, Mode, Plane, ResponsePoint, ShapePoint
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The hanger's modes plane by plane, what is not one of them, and what was decided."""
+
+    modes: tuple[Mode, ...]
+    set_aside: tuple[ForeignMode, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def placed(
     found: Sequence[FoundMode], points: Sequence[ResponsePoint], hanger: Hanger | None
-) -> tuple[tuple[Mode, ...], tuple[str, ...]]:
-    """The modes with plane, order and shape by position, plane by plane, and what was decided."""
+) -> Placement:
+    """The modes with plane, order and shape by position."""
     found, planes, pair_notes = with_both_planes(found, planes_of(found, points), points)
     groups = [
         [mode for mode, own in zip(found, planes, strict=True) if own == plane] for plane in PLANES
@@ -35,7 +45,8 @@ def placed(
         for plane, *columns in zip(PLANES, orders, groups, shapes, strict=True)
         for order, mode, shape in zip(*columns, strict=True)
     )
-    return modes, (*_plane_notes(points), *pair_notes, *_pair_notes(groups), *_order_notes(orders))
+    notes = (*_plane_notes(points), *pair_notes, *_pair_notes(groups), *_order_notes(orders))
+    return Placement(modes, notes=notes)
 
 
 def _plane_modes(
@@ -58,6 +69,7 @@ def _mode(plane: Plane, order: int, found: FoundMode, shape: tuple[ShapePoint, .
         damping_ratio=found.damping_ratio,
         damping_sd=found.damping_sd,
         shape=shape,
+        acceleration_m_s2=found.acceleration_m_s2,
     )
 
 

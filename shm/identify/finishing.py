@@ -9,6 +9,7 @@ import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement
 from shm.identify.options import IdentifyOptions
+from shm.values import FloatArray
 
 _LINES_AROUND = 4
 
@@ -29,9 +30,13 @@ def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOpt
     Only for decays made from frequency responses: after hits, coherence also falls where a hit came
     before the last had rung down, which free decays do not mind.
     """
-    if measurement.hits or measurement.frequency_response.coherence is None:
+    response = measurement.frequency_response
+    if measurement.hits or response is None or response.coherence is None:
         return found
-    good = [_coherence(mode, measurement) >= options.min_coherence for mode in found.modes]
+    frequency_hz, coherence = response.frequency_hz, response.coherence
+    good = [
+        _coherence(mode, frequency_hz, coherence) >= options.min_coherence for mode in found.modes
+    ]
     reason = f"coherence below {options.min_coherence:g}"
     dropped = tuple(
         Dropped(f"mode at {mode.frequency_hz:.4g} Hz", 1, reason)
@@ -42,11 +47,8 @@ def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOpt
     return replace(found, modes=modes, dropped=found.dropped + dropped)
 
 
-def _coherence(mode: FoundMode, measurement: Measurement) -> float:
+def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:
     """Median coherence over the points and the lines around a mode."""
-    response = measurement.frequency_response
-    if response.coherence is None:
-        return 1.0
-    line = int(np.argmin(np.abs(response.frequency_hz - mode.frequency_hz)))
-    near = response.coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
+    line = int(np.argmin(np.abs(frequency_hz - mode.frequency_hz)))
+    near = coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
     return float(np.median(near))
