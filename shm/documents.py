@@ -173,6 +173,7 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
         damping_ratio=_number(mode, "damping_ratio", label, file),
         damping_sd=_number(mode, "damping_sd", label, file),
         shape=_shape(mode.get("shape"), label, file),
+        acceleration_m_s2=_number(mode, "acceleration_m_s2", label, file),
     )
 
 

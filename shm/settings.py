@@ -76,6 +76,14 @@ class Settings:
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
+    identifier: str = _row("ssi", "", "how modes are found", None, None)
+    cross_check: str = _row("", "", "a second identifier to compare with", None, None)
+    estimator: str = _row("h1", "", "of frequency responses: h1, h2 or hv", None, None)
+    reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
+    frequency_allowance: float = _row(
+        1e-4, "", "part of a frequency that differs from test to test unseen", 0, 0.01
+    )
+    mains_hz: float = _row(50.0, "Hz", "frequency of the power grid", 1, 1000)
     models: str = _row(
         "beam1,beam2,solid0,solid1,solid2", "", "model classes that compete", None, None
     )

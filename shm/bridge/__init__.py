@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shm.bridge.description import Bridge, Hook, load_bridge, load_hanger
+from shm.bridge.description import Bridge, Disturbance, Hook, load_bridge, load_hanger
 
-__all__ = ["Bridge", "Hook", "load_bridge", "load_hanger"]
+__all__ = ["Bridge", "Disturbance", "Hook", "load_bridge", "load_hanger"]

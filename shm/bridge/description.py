@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shm.bridge.hanger import hanger_of
+from shm.bridge.table import Table
 from shm.errors import BadInput
 from shm.values import Hanger
 
@@ -22,6 +23,15 @@ class Hook:
 
 
 @dataclass(frozen=True)
+class Disturbance:
+    """A machine near the bridge, and the band in which it runs."""
+
+    name: str
+    low_hz: float
+    high_hz: float
+
+
+@dataclass(frozen=True)
 class Bridge:
     """What `bridge.toml` says."""
 
@@ -30,6 +40,7 @@ class Bridge:
     hooks: tuple[Hook, ...]
     settings_table: Mapping[str, object]
     source: str
+    disturbances: tuple[Disturbance, ...] = ()
 
     def hanger(self, hanger_id: int) -> Hanger:
         """The hanger of that number; raises BadInput when the bridge has none such."""
@@ -56,6 +67,9 @@ def load_bridge(path: Path) -> Bridge:
         hooks=hooks,
         settings_table=document.get("settings", {}),
         source=str(path),
+        disturbances=tuple(
+            _disturbance(table, path) for table in _tables(document, "disturbance", path)
+        ),
     )
 
 
@@ -111,3 +125,15 @@ def _hook(table: dict[str, Any], path: Path) -> Hook:
             remedy='Write name = "mail" and command = ["/path/to/program", "argument"].',
         )
     return Hook(name=str(name), command=tuple(command or ()))
+
+
+def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:
+    table = Table(values, f"disturbance {values.get('name', '')}".strip(), path)
+    table.refuse_unknown(("name", "low_hz", "high_hz"))
+    low_hz, high_hz = table.positive("low_hz"), table.positive("high_hz")
+    if low_hz >= high_hz or not isinstance(values.get("name"), str):
+        raise table.refusal(
+            "it needs a name and a high_hz above low_hz",
+            'Write name = "pump", low_hz = 24.2, high_hz = 24.9.',
+        )
+    return Disturbance(values["name"], low_hz, high_hz)

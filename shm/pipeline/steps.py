@@ -13,7 +13,7 @@ from shm.documents import format_time, load_modes
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
 from shm.models import build
-from shm.pipeline.terms import competing
+from shm.pipeline.terms import competing, identify_settings
 from shm.read import read
 from shm.settings import Settings
 from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
@@ -72,10 +72,22 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -
     record = read(path)
     hanger = _hanger(record.hanger, bridge)
     _refuse_future(record.time, latest, "the recording")
-    options = IdentifyOptions(band_low_hz=settings.band_low_hz, band_high_hz=settings.band_high_hz)
+    options = identify_options(settings, bridge)
     result = identify([record], options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
-    return IdentifiedTest(result.test, 0, result.frequency_response, (*result.notes, *dropped))
+    return IdentifiedTest(
+        result.test,
+        frequency_response=result.frequency_response,
+        notes=(*result.notes, *dropped),
+        quality=result.quality,
+        set_aside=result.set_aside,
+    )
+
+
+def identify_options(settings: Settings, bridge: Bridge) -> IdentifyOptions:
+    """How recordings of a bridge are identified."""
+    bands = tuple((each.name, each.low_hz, each.high_hz) for each in bridge.disturbances)
+    return IdentifyOptions(**identify_settings(settings), disturbance_bands=bands)
 
 
 def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:

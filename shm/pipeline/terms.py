@@ -17,6 +17,17 @@ from shm.settings import Settings
 from shm.store import StoredRecording
 from shm.values import Hanger
 
+_IDENTIFY_SETTINGS = (
+    "band_low_hz",
+    "band_high_hz",
+    "identifier",
+    "cross_check",
+    "estimator",
+    "reference_force_n",
+    "frequency_allowance",
+    "mains_hz",
+)
+
 
 def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
     """The selected class of a hanger, or all that compete where none is selected yet.
@@ -26,6 +37,11 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
     if hanger.id in selected:
         return (build(selected[hanger.id], hanger),)
     return tuple(build(name, hanger) for name in competing_names(hanger, settings.model_names))
+
+
+def identify_settings(settings: Settings) -> dict[str, Any]:
+    """The settings that decide what an identification gives, by name."""
+    return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

@@ -14,10 +14,12 @@ from shm.values import (
     NAN,
     Alert,
     Drift,
+    ForeignMode,
     FrequencyResponse,
     ModalTest,
     Posterior,
     PredictedFrequency,
+    QualityCheck,
     ResponsePoint,
 )
 
@@ -86,6 +88,18 @@ def unpack_response(blob: bytes, source: str, test: ModalTest) -> FrequencyRespo
 def test_from_document(document: Mapping[str, Any], hanger: int) -> ModalTest:
     """A test back from its entry of a modal-tests document."""
     return parse_modes({"schema": MODES_SCHEMA, "hanger": hanger, "tests": [document]})[0]
+
+
+def quality_from(entry: Mapping[str, Any]) -> QualityCheck:
+    """A quality figure back from its document."""
+    numbers = {name: _number(entry[name]) for name in ("value", "limit")}
+    return QualityCheck(**{**entry, **numbers})
+
+
+def foreign_from(entry: Mapping[str, Any]) -> ForeignMode:
+    """What was set aside, back from its document."""
+    numbers = {name: _number(entry[name]) for name in ("frequency_hz", "damping_ratio")}
+    return ForeignMode(**{**entry, **numbers})
 
 
 # ---------------------------------------------------------------- posteriors

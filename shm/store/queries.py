@@ -9,7 +9,13 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere
-from shm.store.blobs import posterior_from, test_from_document, unpack_response
+from shm.store.blobs import (
+    foreign_from,
+    posterior_from,
+    quality_from,
+    test_from_document,
+    unpack_response,
+)
 from shm.store.database import Database
 from shm.store.rows import (
     Baseline,
@@ -194,6 +200,8 @@ def _test(row: Row[Any]) -> StoredTest:
         test=test_from_document(row.document, row.hanger),
         notes=tuple(row.notes),
         lineage=_lineage(row),
+        quality=tuple(quality_from(entry) for entry in row.quality or ()),
+        set_aside=tuple(foreign_from(entry) for entry in row.set_aside or ()),
     )
 
 

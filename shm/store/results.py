@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import datetime
 from typing import Any
 
@@ -133,6 +133,8 @@ def _test_values(
         "document": test_document(replace(item.test, id=name)),
         "frequency_response": None if response is None else pack_response(response),
         "notes": list(item.notes),
+        "quality": [asdict(check) for check in item.quality],
+        "set_aside": [asdict(mode) for mode in item.set_aside],
     }
 
 

@@ -11,7 +11,15 @@ from typing import Any
 
 import shm
 from shm.documents import dump
-from shm.values import Alert, FrequencyResponse, ModalTest, Posterior, Selection
+from shm.values import (
+    Alert,
+    ForeignMode,
+    FrequencyResponse,
+    ModalTest,
+    Posterior,
+    QualityCheck,
+    Selection,
+)
 
 
 class Stage(StrEnum):
@@ -95,12 +103,17 @@ class Receipt:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedTest:
-    """A test to be stored: its place in its file, its frequency response, what was dropped."""
+    """A test to be stored: its place in its file, its frequency response, what was dropped.
+
+    `quality` and `set_aside` are empty where a file gave the modes.
+    """
 
     test: ModalTest
     position: int = 0
     frequency_response: FrequencyResponse | None = None
     notes: tuple[str, ...] = ()
+    quality: tuple[QualityCheck, ...] = ()
+    set_aside: tuple[ForeignMode, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +133,8 @@ class StoredTest:
     test: ModalTest
     notes: tuple[str, ...]
     lineage: Lineage
+    quality: tuple[QualityCheck, ...] = ()
+    set_aside: tuple[ForeignMode, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0001"
+SCHEMA = "0002"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -66,6 +66,8 @@ tests = sa.Table(
     sa.Column("document", Document, nullable=False),
     sa.Column("frequency_response", sa.LargeBinary),
     sa.Column("notes", Document, nullable=False),
+    sa.Column("quality", Document),
+    sa.Column("set_aside", Document),
     *_lineage(),
     sa.Column("identified_at", UtcTime, nullable=False),
     sa.UniqueConstraint("hanger", "name"),

@@ -10,11 +10,13 @@ from shm.store import ReceivedFile
 from shm.values import (
     Alert,
     Drift,
+    ForeignMode,
     FrequencyResponse,
     ModalTest,
     Mode,
     Posterior,
     PredictedFrequency,
+    QualityCheck,
     ResponsePoint,
     ShapePoint,
 )
@@ -47,6 +49,24 @@ def a_test(name: str = "t1", days: float = 0.0, **changes: object) -> ModalTest:
         **changes,
     }
     return ModalTest(**values)  # type: ignore[arg-type]
+
+
+def a_check(**changes: object) -> QualityCheck:
+    values: dict[str, object] = {
+        "name": "double hits",
+        "verdict": "warning",
+        "value": 2.0,
+        "limit": 0.0,
+        "unit": "",
+        "found": "hits 2 and 5 struck twice",
+        "remedy": "Let the hammer bounce off freely.",
+        **changes,
+    }
+    return QualityCheck(**values)  # type: ignore[arg-type]
+
+
+def a_foreign_mode() -> ForeignMode:
+    return ForeignMode("tone", 50.0, 0.0001, "mains: it is there before the hits")
 
 
 def a_posterior(model: str = "beam1", tests: tuple[str, ...] = ("t1",), seed: int = 7) -> Posterior:

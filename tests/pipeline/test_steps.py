@@ -18,7 +18,7 @@ from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
 from shm.values import Hanger, ModalTest, Recording
-from tests.helpers.nouns import NOW, a_posterior, a_response, a_test
+from tests.helpers.nouns import NOW, a_check, a_foreign_mode, a_posterior, a_response, a_test
 from tests.helpers.workspaces import put
 
 Identify = Callable[..., tuple[IdentifiedTest, ...]]
@@ -55,7 +55,12 @@ class Logger:
         test: ModalTest = a_test(test_id, hanger=records[0].hanger, time=records[0].time)
         dropped = (SimpleNamespace(count=2, what="poles", reason="too damped"),)
         return SimpleNamespace(
-            test=test, frequency_response=a_response(), dropped=dropped, notes=("renumbered",)
+            test=test,
+            frequency_response=a_response(),
+            dropped=dropped,
+            notes=("renumbered",),
+            quality=(a_check(),),
+            set_aside=(a_foreign_mode(),),
         )
 
 
@@ -77,6 +82,18 @@ def test_a_recording_is_identified_in_its_band_and_with_its_hanger(
     assert found.test.id == "h3"
     assert found.frequency_response is not None
     assert found.notes == ("renumbered", "2 poles: too damped")
+    assert (found.quality, found.set_aside) == ((a_check(),), (a_foreign_mode(),))
+
+
+def test_settings_and_known_machines_reach_the_identifier(
+    identify: Identify, logger: Logger, workspace: Workspace
+) -> None:
+    with Path(workspace.bridge.source).open("a", encoding="utf-8") as stream:
+        stream.write('[[disturbance]]\nname = "pump"\nlow_hz = 24\nhigh_hz = 25\n')
+    bridge = Workspace.open(workspace.folder).bridge
+    options = steps.identify_options(replace(workspace.settings, mains_hz=60.0), bridge)
+    assert options.disturbance_bands == (("pump", 24.0, 25.0),)
+    assert (options.mains_hz, options.reference_force_n) == (60.0, 1000.0)
 
 
 def test_a_recording_without_hanger_is_refused_before_it_is_identified(

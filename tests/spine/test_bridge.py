@@ -208,3 +208,17 @@ def test_one_hanger_is_asked_for_where_a_file_has_several(tmp_path: Path) -> Non
 def test_a_missing_file_tells_how_to_make_one(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="shm init"):
         load_bridge(tmp_path / "bridge.toml")
+
+
+@pytest.mark.parametrize(
+    ("machine", "fault"),
+    [
+        ("name = 'pump'\nlow_hz = 25\nhigh_hz = 24", "pump: it needs a name and a high_hz above"),
+        ("low_hz = 24\nhigh_hz = 25", "disturbance: it needs a name"),
+        ("name = 'pump'\nhigh_hz = 25", "low_hz is missing"),
+        ("name = 'pump'\nlow_hz = 24\nhigh_hz = 25\nrpm = 1450", "unknown key rpm"),
+    ],
+)
+def test_a_disturbance_needs_a_name_and_a_band(tmp_path: Path, machine: str, fault: str) -> None:
+    with pytest.raises(BadInput, match=fault):
+        load_bridge(written(tmp_path, f"[[disturbance]]\n{machine}\n"))

@@ -16,8 +16,10 @@ from shm.store.tables import SCHEMA
 from shm.values import Selection
 from tests.helpers.nouns import (
     NOW,
+    a_check,
     a_drift,
     a_file,
+    a_foreign_mode,
     a_posterior,
     a_response,
     a_test,
@@ -33,7 +35,13 @@ def fill(store: Store) -> None:
         store.receive(a_file(number), NOW)
     store.receive(a_file(1, arrival="again"), NOW)
     for number in (1, 2):
-        found = IdentifiedTest(a_test(f"t{number}", number), 0, a_response(), ("2 poles: damped",))
+        found = IdentifiedTest(
+            a_test(f"t{number}", number),
+            frequency_response=a_response(),
+            notes=("2 poles: damped",),
+            quality=(a_check(),),
+            set_aside=(a_foreign_mode(),),
+        )
         store.identified(number, [found], LINEAGE, NOW)
     store.refuse(3, {"message": "no sampling rate.", "sha256": "3"}, NOW)
     first, second = store.tests(3)

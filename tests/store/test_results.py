@@ -21,7 +21,15 @@ from shm.store import (
 )
 from shm.store.blobs import unpack
 from shm.values import AddedMass, Posterior, Selection
-from tests.helpers.nouns import NOW, a_file, a_posterior, a_response, a_test
+from tests.helpers.nouns import (
+    NOW,
+    a_check,
+    a_file,
+    a_foreign_mode,
+    a_posterior,
+    a_response,
+    a_test,
+)
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
@@ -59,6 +67,14 @@ def test_a_test_comes_back_as_it_was(store: Store) -> None:
     assert stored.lineage == LINEAGE
     assert stored.key == f"{a_file(1).sha256}/0"
     assert store.recording(stored.recording_id).hanger == 3
+
+
+def test_the_quality_of_a_test_comes_back_with_what_was_set_aside(store: Store) -> None:
+    unknown = a_check(name="coherence", verdict="unknown", value=math.nan)
+    item = IdentifiedTest(a_test("t1"), quality=(a_check(), unknown), set_aside=(a_foreign_mode(),))
+    (stored,) = identified(store, 1, item)
+    assert repr(stored.quality) == repr((a_check(), unknown))
+    assert stored.set_aside == (a_foreign_mode(),)
 
 
 def test_a_test_without_time_stands_at_its_receipt_and_stays_without(store: Store) -> None:
