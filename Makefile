@@ -24,11 +24,12 @@ lint: .venv/development
 	$(BIN)/lint-imports
 
 bench: .venv/development
-	for benchmark in $(filter-out tests/benchmarks/peers.py,$(wildcard tests/benchmarks/*.py)); do \
+	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \
 		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
 
 # Makes the peers' environments and runs them: hours.
 bench-peers: .venv/development
+	$(BIN)/python tests/benchmarks/identify_peers.py --tests 10 --write-docs
 	$(BIN)/python tests/benchmarks/peers.py --resume --write-docs
 
 docs: .venv/development

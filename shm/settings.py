@@ -77,7 +77,9 @@ class Settings:
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
     identifier: str = _row("ssi", "", "how modes are found", None, None)
-    cross_check: str = _row("", "", "a second identifier to compare with", None, None)
+    cross_check: str = _row(
+        "frf", "", "a second identifier to compare with; empty: none", None, None
+    )
     estimator: str = _row("h1", "", "of frequency responses: h1, h2 or hv", None, None)
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
     frequency_allowance: float = _row(

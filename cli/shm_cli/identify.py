@@ -1,31 +1,32 @@
-"""`shm identify`: modal parameters of recordings."""
+"""`shm identify`: modal parameters of recordings, with all that a person needs to check them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import rich_click as click
 
 from shm.documents import dump, modes_document
 from shm.errors import BadInput, UsageError
-from shm.identify import Identification, IdentifyOptions, identify
-from shm.read import read
+from shm.identify import IDENTIFIERS, IdentifyOptions, identify
+from shm.read import read_test
+from shm.report import TestSheet, test_figures, test_page, test_text
 from shm.settings import Settings
 from shm.values import Hanger
 from shm_cli.common import (
+    counting_bar,
     hanger_file_option,
     hanger_option,
     json_option,
     one_hanger,
     show,
-    show_table,
-    table,
 )
 
-_BAND = Settings()
+_DEFAULT = Settings()
 
 
 @click.command()
@@ -36,15 +37,58 @@ _BAND = Settings()
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE...",
 )
-@click.option("--together", is_flag=True, help="The files are hits of one test.")
+@click.option("--together", is_flag=True, help="The files are one test: hits, or set-ups.")
 @click.option(
     "--band",
     nargs=2,
     type=float,
-    default=(_BAND.band_low_hz, _BAND.band_high_hz),
+    default=(_DEFAULT.band_low_hz, _DEFAULT.band_high_hz),
     show_default=True,
     metavar="LOW HIGH",
     help="Where to look for modes, in Hz.",
+)
+@click.option(
+    "--identifier",
+    type=click.Choice(list(IDENTIFIERS)),
+    default=_DEFAULT.identifier,
+    show_default=True,
+    help="How modes are found.",
+)
+@click.option(
+    "--cross-check",
+    type=click.Choice(list(IDENTIFIERS)),
+    help="A second identifier whose frequencies are compared.",
+)
+@click.option(
+    "--estimator",
+    type=click.Choice(["h1", "h2", "hv"]),
+    default=_DEFAULT.estimator,
+    show_default=True,
+    help="Of the frequency response: noise in the responses, the force, or both.",
+)
+@click.option(
+    "--reference-force",
+    type=float,
+    default=_DEFAULT.reference_force_n,
+    show_default=True,
+    metavar="N",
+    help="A hit this hard, in N, has amplitude 1.",
+)
+@click.option(
+    "--mains",
+    type=float,
+    default=_DEFAULT.mains_hz,
+    show_default=True,
+    metavar="HZ",
+    help="Frequency of the power grid.",
+)
+@click.option(
+    "--window",
+    type=float,
+    default=math.inf,
+    show_default="none",
+    metavar="SECONDS",
+    help="Time constant of the exponential window already in given frequency responses.",
 )
 @click.option(
     "--out",
@@ -52,64 +96,105 @@ _BAND = Settings()
     metavar="T.modes.json",
     help="Write the modal-tests document here.",
 )
+@click.option(
+    "--html",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="SHEET.html",
+    help="Write a page with all figures here; one test only.",
+)
+@click.option(
+    "--figures",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Write each figure as a PNG here.",
+)
 @hanger_option()
 @hanger_file_option
 @json_option
 @click.pass_context
 def command(
     ctx: click.Context,
+    /,
     files: tuple[Path, ...],
     together: bool,
-    band: tuple[float, float],
     out: Path | None,
+    html: Path | None,
+    figures: Path | None,
     hanger_id: int | None,
     hanger_file: Path | None,
     as_json: bool,
+    **chosen: Any,
 ) -> None:
     """Modal parameters of recordings.
 
-    Each file is a test of its own unless --together is given. The hanger's length, where known,
-    helps to number the modes.
+    Each file is a test of its own unless --together is given; a .zip holds the files of one test.
+    The hanger's description, where known, helps to number the modes. The page (--html) shows time
+    histories, frequency responses with the fitted modes, stabilisation, shapes and quality.
 
     \b
-    Example: shm identify hanger3.csv --hanger-file H.toml --out hanger3.modes.json
+    Example: shm identify hanger3.csv --hanger-file H.toml --html hanger3.html
     """
     known = hanger_file is not None or hanger_id is not None
     hanger = one_hanger(ctx, hanger_file, hanger_id) if known else None
-    options = IdentifyOptions(band_low_hz=band[0], band_high_hz=band[1])
     groups = [files] if together else [(path,) for path in files]
-    found = [_identify(group, hanger, options) for group in groups]
-    _refuse_several_hangers(found)
-    document = modes_document([each.test for each in found])
-    if out is not None:
-        out.write_text(dump(document) + "\n", encoding="utf-8")
+    if html is not None and len(groups) > 1:
+        raise UsageError("--html shows one test.", remedy="Give one file, or --together.")
+    options = _options(**chosen)
+    with counting_bar() as bar:
+        sheets = [
+            _identified(group, hanger, options)
+            for group in bar.track(groups, description="identifying")
+        ]
+    _refuse_several_hangers(sheets)
+    _write(sheets, out, html, figures)
     if as_json:
-        show(document)
+        show(_document(sheets))
     else:
-        for each in found:
-            _show(each)
+        for sheet in sheets:
+            click.echo(test_text(sheet).rstrip())
 
 
-def _identify(
+def _options(
+    band: tuple[float, float],
+    identifier: str,
+    cross_check: str | None,
+    estimator: Any,
+    reference_force: float,
+    mains: float,
+    window: float,
+) -> IdentifyOptions:
+    return IdentifyOptions(
+        band_low_hz=band[0],
+        band_high_hz=band[1],
+        identifier=identifier,
+        cross_check=cross_check or "",
+        estimator=estimator,
+        reference_force_n=reference_force,
+        mains_hz=mains,
+        window_time_constant_s=window,
+    )
+
+
+def _identified(
     group: Sequence[Path], hanger: Hanger | None, options: IdentifyOptions
-) -> Identification:
+) -> TestSheet:
     """One test; it is of the described hanger where its records do not say."""
-    records = [read(path) for path in group]
+    records = [record for path in group for record in read_test(path)]
     found = identify(records, options, test_id=group[0].stem, hanger=hanger)
     named = found.test.hanger
-    if hanger is None or named == hanger.id:
-        return found
-    if named is not None:
+    if hanger is not None and named is None:
+        found = replace(found, test=replace(found.test, hanger=hanger.id))
+    elif hanger is not None and named != hanger.id:
         raise BadInput(
             f"the file says hanger {named}, the description is of hanger {hanger.id}.",
             file=group[0],
             remedy="Give the description of its hanger, or correct the file.",
         )
-    return replace(found, test=replace(found.test, hanger=hanger.id))
+    return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 
-def _refuse_several_hangers(found: Sequence[Identification]) -> None:
-    named = {each.test.hanger for each in found}
+def _refuse_several_hangers(sheets: Sequence[TestSheet]) -> None:
+    named = {sheet.identification.test.hanger for sheet in sheets}
     if len(named) > 1:
         listed = ", ".join(sorted("none" if n is None else str(n) for n in named))
         raise UsageError(
@@ -118,26 +203,26 @@ def _refuse_several_hangers(found: Sequence[Identification]) -> None:
         )
 
 
-def _show(found: Identification) -> None:
-    made = table(
-        f"{found.test.id}: {len(found.test.modes)} modes from "
-        f"{sum(hit.used for hit in found.hits)} hits",
-        "mode", "frequency (Hz)", "sd (Hz)", "damping (%)", "sd (%)",
-    )  # fmt: skip
-    for mode in found.test.modes:
-        made.add_row(
-            f"{mode.plane} {mode.order}",
-            f"{mode.frequency_hz:.4f}",
-            _known(mode.frequency_sd_hz, 1, ".5f"),
-            _known(mode.damping_ratio, 100, ".3f"),
-            _known(mode.damping_sd, 100, ".3f"),
-        )
-    show_table(made)
-    for note in found.notes:
-        click.echo(note, err=True)
-    for dropped in found.dropped:
-        click.echo(f"left out: {dropped.count} {dropped.what}: {dropped.reason}", err=True)
+def _document(sheets: Sequence[TestSheet]) -> dict[str, Any]:
+    """The modal-tests document, each test with its quality and what was set aside."""
+    found = [sheet.identification for sheet in sheets]
+    document = modes_document([each.test for each in found])
+    for entry, each in zip(document["tests"], found, strict=True):
+        entry["quality"] = [asdict(check) for check in each.quality]
+        entry["set_aside"] = [asdict(mode) for mode in each.set_aside]
+    return document
 
 
-def _known(value: float, factor: float, spec: str) -> str:
-    return format(value * factor, spec) if math.isfinite(value) else "unknown"
+def _write(
+    sheets: Sequence[TestSheet], out: Path | None, html: Path | None, figures: Path | None
+) -> None:
+    if out is not None:
+        out.write_text(dump(_document(sheets)) + "\n", encoding="utf-8")
+    if html is not None:
+        html.write_text(test_page(sheets[0]), encoding="utf-8")
+    for sheet in sheets if figures is not None else ():
+        for illustration in test_figures(sheet):
+            assert figures is not None
+            figures.mkdir(parents=True, exist_ok=True)
+            name = f"{sheet.identification.test.id}-{illustration.name}.png"
+            (figures / name).write_bytes(illustration.png())

@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import rich_click as click
@@ -13,6 +14,7 @@ import rich_click as click
 from shm.documents import alert_document
 from shm.errors import BadInput, ShmError, StoreError
 from shm.pipeline import Flow
+from shm.read import bundle
 from shm.store import Outcome, Receipt, Stage, Store, StoredRecording, Workspace
 from shm.values import Alert
 from shm_cli.common import counting_bar, json_option, open_workspace, show, show_table, table
@@ -29,10 +31,15 @@ from shm_daemon.hooks import CommandNotifier
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE...",
 )
+@click.option(
+    "--together", is_flag=True, help="The files are one test: hits, or set-ups; kept as one .zip."
+)
 @click.option("--peek", "look", is_flag=True, help="Only show what is in the files.")
 @json_option
 @click.pass_context
-def command(ctx: click.Context, files: tuple[Path, ...], look: bool, as_json: bool) -> int:
+def command(
+    ctx: click.Context, files: tuple[Path, ...], together: bool, look: bool, as_json: bool
+) -> int:
     """Take recordings in, or look into them with --peek.
 
     Each file is archived, identified, updated and watched as the daemon would; it may also be a
@@ -45,6 +52,9 @@ def command(ctx: click.Context, files: tuple[Path, ...], look: bool, as_json: bo
         return show_peeks(files, as_json)
     logging.getLogger("shm").addHandler(logging.NullHandler())  # all is said in the table
     workspace = open_workspace(ctx)
+    if together:
+        folder = Path(ctx.with_resource(TemporaryDirectory()))
+        files = (bundle(files, folder / f"{files[0].stem}.zip"),)
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}
         receipts, unreadable = _ingest(workspace, files)

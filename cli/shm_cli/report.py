@@ -10,9 +10,14 @@ import rich_click as click
 from shm import report
 from shm.documents import dump
 from shm.pipeline import utc_now
-from shm.pipeline.reporting import hanger_report
+from shm.pipeline.reporting import hanger_report, test_sheet
 from shm_cli.common import hanger_option, opened_store
 
+_SHEET_WRITERS: dict[str, Callable[[report.TestSheet], str]] = {
+    "text": report.test_text,
+    "html": report.test_page,
+    "json": lambda sheet: dump(report.test_json(sheet)),
+}
 _FORMS = {".html": "html", ".htm": "html", ".json": "json"}
 _WRITERS: dict[str, Callable[[report.HangerReport], str]] = {
     "text": report.text,
@@ -29,6 +34,7 @@ _WRITERS: dict[str, Callable[[report.HangerReport], str]] = {
     type=click.Choice(["text", "html", "json"]),
     show_default="by the suffix of --out, else text",
 )
+@click.option("--test", "test_id", metavar="ID", help="Of one of its tests: how it was identified.")
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option(
     "--out",
@@ -38,20 +44,28 @@ _WRITERS: dict[str, Callable[[report.HangerReport], str]] = {
 )
 @click.pass_context
 def command(
-    ctx: click.Context, hanger_id: int, form: str | None, as_json: bool, out: Path | None
+    ctx: click.Context,
+    hanger_id: int,
+    form: str | None,
+    test_id: str | None,
+    as_json: bool,
+    out: Path | None,
 ) -> None:
     """What an engineer files about a hanger.
 
     Tension with its interval, against nominal and baseline; what changed; predicted and measured
-    frequencies; the trend; the frequency response with its modes. HTML holds the figures.
+    frequencies; the trend; the frequency response with its modes. HTML holds the figures. With
+    --test, how one test was identified: hits, quality, stabilisation, shapes.
 
     \b
     Example: shm report --hanger 3 --format html --out hanger3.html
     """
     form = "json" if as_json else form or _FORMS.get(out.suffix if out else "", "text")
     with opened_store(ctx) as (workspace, store):
-        content = hanger_report(workspace, store, hanger_id, utc_now())
-    written = _WRITERS[form](content)
+        if test_id is None:
+            written = _WRITERS[form](hanger_report(workspace, store, hanger_id, utc_now()))
+        else:
+            written = _SHEET_WRITERS[form](test_sheet(workspace, store, hanger_id, test_id))
     if out is None:
         click.echo(written.rstrip())
     else:

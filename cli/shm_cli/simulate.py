@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
 import rich_click as click
 
-from shm.read import write
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.errors import UsageError
+from shm.read import FORMATS, write
+from shm.simulate import (
+    DISTURBANCES,
+    AmbientPlan,
+    HammerPlan,
+    HangerState,
+    ambient_test,
+    hammer_test,
+    spread_places_m,
+)
+from shm.values import Hanger, Recording
 from shm_cli.common import (
     counting_bar,
     hanger_file_option,
@@ -21,6 +33,29 @@ from shm_cli.common import (
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)
 _SPRING = "End spring in N m/rad; clamped if left out."
+_SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS)
+_WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
+_HAMMER_SECONDS, _HAMMER_NOISE = 20.0, 0.02
+
+
+class Chosen(TypedDict):
+    """What is planted, how it is measured, and what each recording is told beside its data."""
+
+    tension_n: float | None
+    k1: float
+    k2: float
+    k3: float
+    k4: float
+    damping: float
+    noise: float | None
+    sensors: int
+    hits: int
+    hammer_x: float
+    seconds: float | None
+    rate: float
+    ambient: bool
+    disturbances: tuple[str, ...]
+    temperature_c: float
 
 
 @click.command()
@@ -32,15 +67,36 @@ _SPRING = "End spring in N m/rad; clamped if left out."
 @click.option("--k3", type=float, default=math.inf, help=f"Transverse, arch end. {_SPRING}")
 @click.option("--k4", type=float, default=math.inf, help=f"Longitudinal, arch end. {_SPRING}")
 @click.option("--damping", type=float, default=0.001, show_default=True, help="Damping ratio.")
-@click.option("--noise", type=float, default=0.02, show_default=True, help="In m/s^2.")
+@click.option("--noise", type=float, help="In m/s^2; 0.02, or 0.002 where nobody hits.")
+@click.option(
+    "--sensors",
+    type=click.IntRange(1, 8),
+    default=2,
+    show_default=True,
+    help="Places with a biaxial accelerometer each.",
+)
 @click.option("--hits", type=click.IntRange(1, 50), default=5, show_default=True)
-@click.option("--seconds", type=float, default=20.0, show_default=True, help="Seconds a hit.")
+@click.option(
+    "--hammer-x",
+    type=float,
+    default=math.nan,
+    help="Where the hammer hits, in m from the deck end; 0.16 of the length if left out.",
+)
+@click.option("--seconds", type=float, help="Seconds a hit; 20, or 600 in all where nobody hits.")
+@click.option("--rate", type=float, default=512.0, show_default=True, help="Samples a second.")
+@click.option("--ambient", is_flag=True, help="Wind and traffic drive the hanger, nobody hits.")
+@click.option(
+    "--disturbance",
+    "disturbances",
+    multiple=True,
+    type=click.Choice(list(DISTURBANCES)),
+    metavar="NAME",
+    help=f"What goes wrong, may be repeated. {_WRONG}.",
+)
 @click.option("--tests", type=click.IntRange(1, 10_000), default=1, show_default=True)
 @click.option("--temperature-c", type=float, default=math.nan, help="Unknown if left out.")
 @click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
-@click.option(
-    "--format", "form", type=click.Choice(["csv", "uff"]), default="csv", show_default=True
-)
+@click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv", show_default=True)
 @click.option(
     "--out", required=True, type=click.Path(file_okay=False, path_type=Path), metavar="DIR"
 )
@@ -50,42 +106,76 @@ def command(
     ctx: click.Context,
     hanger_id: int | None,
     hanger_file: Path | None,
-    tension_n: float | None,
-    k1: float,
-    k2: float,
-    k3: float,
-    k4: float,
-    damping: float,
-    noise: float,
-    hits: int,
-    seconds: float,
     tests: int,
-    temperature_c: float,
     first: datetime | None,
     form: str,
     out: Path,
     seed: int,
+    **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
 
-    Beam finite elements are hit in the time domain; two biaxial accelerometers record.
+    Beam finite elements are hit in the time domain; biaxial accelerometers record.
 
     \b
     Example: shm simulate --hanger-file H.toml --tension-n 650e3 --k1 1e7 --k3 1e7 --out tests
     """
     hanger = one_hanger(ctx, hanger_file, hanger_id)
-    tension = hanger.nominal_tension_n if tension_n is None else tension_n
-    state = HangerState(tension, k1, k2, k3, k4, damping_ratio=damping)
-    plan = HammerPlan(hits=hits, seconds_per_hit=seconds, acceleration_noise_m_s2=noise)
     start = first.replace(tzinfo=UTC) if first else _FIRST
     out.mkdir(parents=True, exist_ok=True)
     with counting_bar() as bar:
         for week in bar.track(range(tests), description="simulating"):
-            rng = np.random.default_rng([seed, week])
             time = start + timedelta(weeks=week)
+            rng = np.random.default_rng([seed, week])
             name = f"hanger{hanger.id}_{time:%Y%m%dT%H%M%S}.{form}"
-            recording = hammer_test(
-                hanger, state, plan, rng, time=time, temperature_c=temperature_c, source=name
-            )
+            recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
             click.echo(out / name)
+
+
+def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Recording:
+    make = _listened if chosen["ambient"] else _hit
+    recording = make(hanger, _state(hanger, chosen), chosen, rng)
+    return replace(recording, temperature_c=chosen["temperature_c"])
+
+
+def _state(hanger: Hanger, chosen: Chosen) -> HangerState:
+    tension_n = chosen["tension_n"]
+    return HangerState(
+        hanger.nominal_tension_n if tension_n is None else tension_n,
+        chosen["k1"],
+        chosen["k2"],
+        chosen["k3"],
+        chosen["k4"],
+        damping_ratio=chosen["damping"],
+    )
+
+
+def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Generator) -> Recording:
+    seconds, noise = chosen["seconds"], chosen["noise"]
+    plan = HammerPlan(
+        hits=chosen["hits"],
+        seconds_per_hit=_HAMMER_SECONDS if seconds is None else seconds,
+        sampling_rate_hz=chosen["rate"],
+        sensors_x_m=spread_places_m(hanger, chosen["sensors"]),
+        hammer_x_m=chosen["hammer_x"],
+        acceleration_noise_m_s2=_HAMMER_NOISE if noise is None else noise,
+    )
+    return hammer_test(hanger, state, plan, rng, disturbances=chosen["disturbances"])
+
+
+def _listened(
+    hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Generator
+) -> Recording:
+    if chosen["disturbances"]:
+        raise UsageError(
+            "disturbances are those of a hammer test.", remedy="Leave out --disturbance."
+        )
+    usual, seconds, noise = AmbientPlan(), chosen["seconds"], chosen["noise"]
+    plan = AmbientPlan(
+        seconds=usual.seconds if seconds is None else seconds,
+        sampling_rate_hz=chosen["rate"],
+        sensors_x_m=spread_places_m(hanger, chosen["sensors"]),
+        acceleration_noise_m_s2=usual.acceleration_noise_m_s2 if noise is None else noise,
+    )
+    return ambient_test(hanger, state, plan, rng)

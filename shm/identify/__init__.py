@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from shm.identify.contract import Dropped, Hit, Poles
+from shm.identify.finding.registry import IDENTIFIERS
 from shm.identify.identification import Identification, identify
 from shm.identify.options import IdentifyOptions
-from shm.identify.registry import IDENTIFIERS
 
 __all__ = [
     "IDENTIFIERS",

@@ -65,9 +65,9 @@ class Measurement:
     same hits from just before the hammer strikes, each (1 + points, samples), the force first; it
     is empty where only frequency responses are known, or nobody hit. `spectra` holds those of each
     used hit, windowed, on the lines of `frequency_response`: (hits, 1 + points, lines), the force
-    first. Ambient records have none of these: their `decays` are parts of the record. Exponential
-    windows of `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on spectra and
-    frequency responses, and on `decays`.
+    first. `hammer` is where and in which direction it hit. Ambient records have none of these:
+    their `decays` are parts of the record. Exponential windows of `window_time_constant_s` and
+    `decay_time_constant_s` (inf: none) lie on spectra and frequency responses, and on `decays`.
     """
 
     source: str
@@ -77,6 +77,7 @@ class Measurement:
     frequency_response: FrequencyResponse | None
     driven: tuple[FloatArray, ...] = ()
     spectra: ComplexArray | None = None
+    hammer: ResponsePoint | None = None
     window_time_constant_s: float = math.inf
     decay_time_constant_s: float = math.inf
     hits: tuple[Hit, ...] = ()

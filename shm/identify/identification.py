@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.errors import BadInput, NotIdentifiable
+from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, Hit, Measurement, Poles
+from shm.identify.finding.jackknife import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.finding.registry import identifier
 from shm.identify.finishing import coherent_only, without_window
-from shm.identify.jackknife import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.joining.fit import fitted
+from shm.identify.joining.joined import Joined, joined
+from shm.identify.joining.products import joined_response
+from shm.identify.measuring.setups import measured
 from shm.identify.options import IdentifyOptions
-from shm.identify.placing import placed
-from shm.identify.recordings import measurement_of_recordings
-from shm.identify.registry import identifier
-from shm.identify.responses import measurement_of_responses
+from shm.identify.placing.placement import Placement, placed
+from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.values import (
     NAN,
     ComplexArray,
@@ -24,6 +27,7 @@ from shm.values import (
     FrequencyResponse,
     Hanger,
     ModalTest,
+    Mode,
     QualityCheck,
     Recording,
 )
@@ -52,6 +56,8 @@ class Identification:
     fit: ComplexArray | None = None
 
 
+WITHOUT_FORCE = frozenset({"ssi"})
+"""Identifiers that can do with accelerations alone."""
 _DEFAULTS = IdentifyOptions()
 
 
@@ -67,59 +73,101 @@ def identify(
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
     where the records cannot be used together, NotIdentifiable where no mode can be trusted.
     """
-    measurement = _measurement(records, options)
-    found = identifier(options.identifier)(measurement, options)
-    found = coherent_only(without_window(found, measurement), measurement, options)
-    if not found.modes:
-        raise _nothing_found(measurement, found)
-    placement = placed(found.modes, measurement.points, hanger)
-    first = records[0]
+    recordings = [record for record in records if isinstance(record, Recording)]
+    measurements = measured(records, options)
+    found = _found(measurements, options.identifier, options)
+    second = _cross_check(measurements, options)
+    quality = assess(Inspection(recordings, measurements, options, found.finding, second))
+    if refused := refusal(quality, records[0].source):
+        raise refused
+    steady = tones(measurements, recordings, options)
+    placement = placed(found.finding.modes, found.points, hanger, steady)
+    if not placement.modes:
+        raise _nothing_found(records[0].source, found.finding, placement)
+    hits = sorted(
+        (hit for measurement in measurements for hit in measurement.hits),
+        key=lambda hit: (hit.record, hit.start),
+    )
     return Identification(
-        test=ModalTest(
-            id=test_id,
-            modes=placement.modes,
-            hanger=first.hanger,
-            time=first.time,
-            temperature_c=first.temperature_c,
-            amplitude=_amplitude(measurement.hits, options),
-        ),
-        frequency_response=measurement.frequency_response,
-        hits=measurement.hits,
-        dropped=tuple(d for d in measurement.dropped + found.dropped if d.count),
-        poles=found.poles,
-        notes=placement.notes + _few_hits(measurement),
-        window_time_constant_s=measurement.window_time_constant_s,
+        test=_test(test_id, records, placement.modes, _amplitude(hits, options)),
+        frequency_response=joined_response(measurements),
+        hits=tuple(hits),
+        dropped=_all_dropped(measurements, found.finding),
+        poles=found.finding.poles,
+        notes=(*placement.notes, *found.notes, *_few_hits(measurements)),
+        window_time_constant_s=measurements[0].window_time_constant_s,
+        quality=quality,
         set_aside=placement.set_aside,
+        fit=fitted(measurements, found.apart, options),
     )
 
 
-def _measurement(
-    records: Sequence[Recording | FrequencyResponse], options: IdentifyOptions
-) -> Measurement:
-    recordings = [record for record in records if isinstance(record, Recording)]
-    responses = [record for record in records if isinstance(record, FrequencyResponse)]
-    if not records or (recordings and responses):
-        raise BadInput(
-            "time records and frequency responses together." if records else "no record is given.",
-            file=records[0].source if records else "",
-            remedy="Give the records of one test, all of one kind.",
+def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:
+    """What the second identifier finds; None where none is asked or these records have no force."""
+    name = options.cross_check
+    if not name or not _can_do(name, measurements):
+        return None
+    return _found(measurements, name, options).finding
+
+
+def _can_do(name: str, measurements: Sequence[Measurement]) -> bool:
+    forces = any(m.frequency_response is not None for m in measurements)
+    return forces or name in WITHOUT_FORCE
+
+
+def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOptions) -> Joined:
+    """What the identifier of that name finds in each set-up, as one finding."""
+    function = identifier(name)
+    if not _can_do(name, measurements):
+        raise UsageError(
+            f"identifier {name!r} needs the hammer's force; these records have none.",
+            remedy=f"Choose {' or '.join(sorted(WITHOUT_FORCE))}.",
         )
-    if recordings:
-        return measurement_of_recordings(recordings, options)
-    return measurement_of_responses(responses, options)
+    # What tests differ by is allowed for once, not set-up by set-up.
+    alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
+    findings = [_finished(function(m, alone), m, options) for m in measurements]
+    return joined(measurements, findings, options)
 
 
-def _nothing_found(measurement: Measurement, found: Finding) -> NotIdentifiable:
+def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
+    return coherent_only(without_window(found, measurement), measurement, options)
+
+
+def _test(
+    test_id: str,
+    records: Sequence[Recording | FrequencyResponse],
+    modes: tuple[Mode, ...],
+    amplitude: float,
+) -> ModalTest:
+    """The test with the earliest time and the mean temperature of its records."""
+    temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
+    return ModalTest(
+        id=test_id,
+        modes=modes,
+        hanger=next((r.hanger for r in records if r.hanger is not None), None),
+        time=min((r.time for r in records if r.time is not None), default=None),
+        temperature_c=float(np.mean(temperatures)) if temperatures else NAN,
+        amplitude=amplitude,
+    )
+
+
+def _nothing_found(source: str, found: Finding, placement: Placement) -> NotIdentifiable:
     reasons = [f"{d.count} {d.what}: {d.reason}" for d in found.dropped if d.count]
+    reasons += [f"{mode.frequency_hz:.4g} Hz: {mode.reason}" for mode in placement.set_aside]
     return NotIdentifiable(
         f"no mode can be trusted ({'; '.join(reasons)}).",
-        file=measurement.source,
+        file=source,
         remedy="Check that the hits ring down undisturbed and that the band holds modes.",
     )
 
 
-def _few_hits(measurement: Measurement) -> tuple[str, ...]:
-    if len(measurement.decays) >= LEAST_HITS:
+def _all_dropped(measurements: Sequence[Measurement], found: Finding) -> tuple[Dropped, ...]:
+    early = [entry for measurement in measurements for entry in measurement.dropped]
+    return tuple(entry for entry in (*early, *found.dropped) if entry.count)
+
+
+def _few_hits(measurements: Sequence[Measurement]) -> tuple[str, ...]:
+    if len(measurements) >= LEAST_HITS or any(len(m.decays) >= LEAST_HITS for m in measurements):
         return ()
     return (
         "fewer than three hits: a frequency's standard deviation is the stated "

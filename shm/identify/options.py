@@ -20,7 +20,8 @@ class IdentifyOptions:
     None lets the number of channels and the length of the ring-downs decide.
     `max_damping_ratio`: poles above are not modes of a hanger.
     `min_presence`: share of the model orders at which a mode must show.
-    `max_frequency_sd`, `max_damping_sd`: largest standard deviations over hits, as fractions.
+    `max_frequency_sd`, `max_damping_sd`: largest standard deviations, as fractions; where nobody
+    hit, frequencies may have twice that.
     `max_frequency_spread`, `max_damping_spread`: how far they may move over the model orders, as
     fractions; a fifth of it below three hits.
     `min_collinearity`: smallest modal phase collinearity (1 is a real shape).
@@ -44,7 +45,7 @@ class IdentifyOptions:
     max_order: int | None = None
     max_damping_ratio: float = 0.05
     min_presence: float = 0.4
-    max_frequency_sd: float = 0.002
+    max_frequency_sd: float = 0.001
     max_damping_sd: float = 0.5
     max_frequency_spread: float = 0.001
     max_damping_spread: float = 0.5

@@ -13,7 +13,7 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
-from shm.pipeline.terms import identify_settings, seed_of
+from shm.pipeline.terms import identify_lineage, seed_of
 from shm.store import (
     Delivery,
     IdentifiedTest,
@@ -127,12 +127,7 @@ class Jobs:
         return Step(run, partial(self._keep_tests, recording))
 
     def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> None:
-        settings, hanger_id = self.workspace.settings, found[0].test.hanger
-        hangers = [asdict(h) for h in self.workspace.bridge.hangers if h.id == hanger_id]
-        bands = [asdict(each) for each in self.workspace.bridge.disturbances]
-        inputs = [recording.file.sha256, recording.file.sidecar_as]
-        terms = {**identify_settings(settings), "hanger": hangers, "disturbances": bands}
-        lineage = Lineage.of(inputs, terms)
+        lineage = identify_lineage(recording, found[0].test.hanger, self.workspace)
         self.store.identified(recording.id, found, lineage, self.clock())
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:

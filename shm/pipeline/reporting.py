@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 
 import shm
 from shm.errors import NothingThere
-from shm.report import HangerReport, trend_row
-from shm.store import Store, Workspace
+from shm.identify import identify
+from shm.pipeline.steps import identify_options
+from shm.pipeline.terms import identify_lineage
+from shm.read import read_test
+from shm.report import HangerReport, TestSheet, trend_row
+from shm.store import Store, StoredTest, Workspace
 
 
 def hanger_report(
@@ -39,9 +44,43 @@ def hanger_report(
         drifts=store.drifts(hanger_id, latest.test.id),
         alerts=tuple(stored.alert for stored in store.alerts(hanger_id)),
         frequency_response=store.frequency_response(latest),
+        quality=latest.quality,
         lineage={
             "input_sha256": latest.lineage.input_sha256,
             "settings_sha256": latest.lineage.settings_sha256,
             "version": latest.lineage.version,
         },
     )
+
+
+def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) -> TestSheet:
+    """How a stored test came to its modes: its raw file is identified once more.
+
+    Raises NothingThere for an unknown test and for one whose modes a file gave.
+    """
+    hanger = workspace.bridge.hanger(hanger_id)
+    stored = _stored_test(store, hanger_id, name)
+    recording = store.recording(stored.recording_id)
+    if store.frequency_response(stored) is None and not stored.quality:
+        raise NothingThere(
+            f"{recording.file.file_name} gave the modes of {name}, not what they come from.",
+            remedy="Ask for a test that was identified here.",
+        )
+    with workspace.archive.opened(recording.file) as path:
+        records = read_test(path)
+    options = identify_options(workspace.settings, workspace.bridge)
+    found = identify(records, options, test_id=name, hanger=hanger)
+    if identify_lineage(recording, hanger_id, workspace) != stored.lineage:
+        note = "identified anew: settings, description or version differ from those of the store"
+        found = replace(found, notes=(*found.notes, note))
+    return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
+
+
+def _stored_test(store: Store, hanger_id: int, name: str) -> StoredTest:
+    tests = {stored.test.id: stored for stored in store.tests(hanger_id)}
+    if name not in tests:
+        latest = ", ".join(list(tests)[-3:]) or "none"
+        raise NothingThere(
+            f"no test {name} of hanger {hanger_id} is stored.", remedy=f"The latest: {latest}."
+        )
+    return tests[name]

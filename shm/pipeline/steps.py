@@ -14,7 +14,7 @@ from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
 from shm.models import build
 from shm.pipeline.terms import competing, identify_settings
-from shm.read import read
+from shm.read import read_test
 from shm.settings import Settings
 from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
@@ -69,11 +69,12 @@ def _tests_in(path: Path) -> tuple[IdentifiedTest, ...]:
 
 
 def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -> IdentifiedTest:
-    record = read(path)
-    hanger = _hanger(record.hanger, bridge)
-    _refuse_future(record.time, latest, "the recording")
+    records = read_test(path)
+    hanger = _hanger(records[0].hanger, bridge)
+    for record in records:
+        _refuse_future(record.time, latest, "the recording")
     options = identify_options(settings, bridge)
-    result = identify([record], options, test_id=path.stem, hanger=hanger)
+    result = identify(records, options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
     return IdentifiedTest(
         result.test,

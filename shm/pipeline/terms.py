@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
 from shm.settings import Settings
-from shm.store import StoredRecording
+from shm.store import Lineage, StoredRecording, Workspace
 from shm.values import Hanger
 
 _IDENTIFY_SETTINGS = (
@@ -42,6 +43,20 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
 def identify_settings(settings: Settings) -> dict[str, Any]:
     """The settings that decide what an identification gives, by name."""
     return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
+
+
+def identify_lineage(
+    recording: StoredRecording, hanger_id: int | None, workspace: Workspace
+) -> Lineage:
+    """What the tests of a recording depend on: file, sidecar, settings, description, version."""
+    bridge = workspace.bridge
+    inputs = [recording.file.sha256, recording.file.sidecar_as]
+    terms = {
+        **identify_settings(workspace.settings),
+        "hanger": [asdict(hanger) for hanger in bridge.hangers if hanger.id == hanger_id],
+        "disturbances": [asdict(each) for each in bridge.disturbances],
+    }
+    return Lineage.of(inputs, terms)
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

@@ -12,11 +12,17 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import Header
+from shm.read.limits import MOST_ACCELERATIONS
 from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
 
 LEAST_SAMPLES = 16
 _LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
 _SAME_RATE = 1e-4
+_NAME_THEM = (
+    "Name accelerometers acc_1, acc_2, ..., or give in NAME.toml a table [channel.NAME] with"
+    ' unit = "m/s2" for each.'
+)
+_LEAVE_OUT = "Leave the others out: [channel.NAME] with leave_out = true in NAME.toml."
 
 T = TypeVar("T")
 
@@ -29,7 +35,9 @@ def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: floa
     rate = checked_rate(header, file_rate_hz, path)
     _refuse_short(values.shape[1], path)
     channels = tuple(
-        _channel(header, name, row, path) for name, row in zip(header.channels, values, strict=True)
+        _channel(header, name, row, path)
+        for name, row in zip(header.channels, values, strict=True)
+        if not header.leaves_out(name)
     )
     refuse_quantities([channel.quantity for channel in channels], path)
     return Recording(str(path), channels, rate, header.hanger, header.time, header.temperature_c)
@@ -62,40 +70,46 @@ def peeked(
     file_rate_hz: Callable[[], float],
     path: Path,
     problems: Sequence[str] = (),
+    left_out: Sequence[str] = (),
 ) -> Peek:
-    """What a header says; faults, also those of `file_rate_hz`, become `problems`."""
+    """What a header says of a time record; faults, also of `file_rate_hz`, become `problems`."""
     found = list(problems)
-    channels = tuple(_peek_channel(header, name, found) for name in header.channels)
-    rate = _attempt(lambda: checked_rate(header, file_rate_hz(), path), NAN, found)
+    out = [name for name in header.channels if _is_left_out(header, name, found)]
+    used = [name for name in header.channels if name not in out]
+    channels = tuple(_peek_channel(header, name, found) for name in used)
+    rate = attempt(lambda: checked_rate(header, file_rate_hz(), path), NAN, found)
     measured = [channel.quantity for channel in channels if channel.quantity]
-    _attempt(lambda: refuse_quantities(measured, path), None, found)
-    _attempt(lambda: _refuse_short(samples, path), None, found)
+    attempt(lambda: refuse_quantities(measured, path), None, found)
+    if channels:
+        attempt(lambda: _refuse_short(samples, path), None, found)
     return Peek(
         source=str(path),
         format=file_format,
         channels=channels,
         samples=samples,
         sampling_rate_hz=rate,
-        hanger=_attempt(lambda: header.hanger, None, found),
-        time=_attempt(lambda: header.time, None, found),
-        temperature_c=_attempt(lambda: header.temperature_c, NAN, found),
+        hanger=attempt(lambda: header.hanger, None, found),
+        time=attempt(lambda: header.time, None, found),
+        temperature_c=attempt(lambda: header.temperature_c, NAN, found),
         problems=tuple(found),
+        left_out=(*left_out, *out),
     )
 
 
 def refuse_quantities(quantities: Sequence[Quantity], path: Path) -> None:
-    """Raises BadInput where force or acceleration is missing."""
-    if "force" not in quantities:
+    """Raises BadInput for anything but 1 to 16 accelerations and at most one force."""
+    forces, accelerations = quantities.count("force"), quantities.count("acceleration")
+    if accelerations == 0:
+        raise BadInput("no channel holds an acceleration.", file=path, remedy=_NAME_THEM)
+    if accelerations > MOST_ACCELERATIONS:
         raise BadInput(
-            "no channel holds the hammer's force.",
+            f"{accelerations} accelerations; at most {MOST_ACCELERATIONS} are read.",
             file=path,
-            remedy="Record the hammer too, and name its channel force (unit N).",
+            remedy=_LEAVE_OUT,
         )
-    if "acceleration" not in quantities:
+    if forces > 1:
         raise BadInput(
-            "no channel holds an acceleration.",
-            file=path,
-            remedy="Name accelerometers acc_1, acc_2, ... (unit m/s2 or g).",
+            f"{forces} channels hold a force, where one hammer hits.", file=path, remedy=_LEAVE_OUT
         )
 
 
@@ -120,23 +134,32 @@ def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
 
 def _channel(header: Header, name: str, raw: FloatArray, path: Path) -> Channel:
     quantity, unit = header.quantity_and_unit(name)
-    values = raw * unit.si
+    calibration = header.calibration(name)
+    with np.errstate(invalid="ignore"):
+        values = raw * (unit.si if math.isnan(calibration) else unit.si * calibration)
     refuse_implausible(values, name, path)
-    return Channel(name, quantity, values, header.plane(name), header.x_m(name))
+    full_scale = header.full_scale(name) * unit.si
+    return Channel(name, quantity, values, header.plane(name), header.x_m(name), full_scale)
 
 
 def _peek_channel(header: Header, name: str, problems: list[str]) -> PeekChannel:
     no_plane: Plane | None = None
     return PeekChannel(
         name=name,
-        quantity=_attempt(lambda: header.quantity_and_unit(name)[0], None, problems),
+        quantity=attempt(lambda: header.quantity_and_unit(name)[0], None, problems),
         unit=header.unit_text(name),
-        plane=_attempt(lambda: header.plane(name), no_plane, problems),
-        x_m=_attempt(lambda: header.x_m(name), NAN, problems),
+        plane=attempt(lambda: header.plane(name), no_plane, problems),
+        x_m=attempt(lambda: header.x_m(name), NAN, problems),
+        calibration=attempt(lambda: header.calibration(name), NAN, problems),
+        full_scale=attempt(lambda: header.full_scale(name), NAN, problems),
     )
 
 
-def _attempt(verb: Callable[[], T], otherwise: T, problems: list[str]) -> T:
+def _is_left_out(header: Header, name: str, problems: list[str]) -> bool:
+    return attempt(lambda: header.leaves_out(name), False, problems)
+
+
+def attempt(verb: Callable[[], T], otherwise: T, problems: list[str]) -> T:
     """What `verb` gives; where it refuses, `otherwise`, with the refusal noted."""
     try:
         return verb()

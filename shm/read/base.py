@@ -12,18 +12,27 @@ from shm.values import NAN, FrequencyResponse, Plane, Quantity, Recording
 
 @dataclass(frozen=True)
 class PeekChannel:
-    """One channel as its headers describe it; `quantity` is None where they do not say."""
+    """One channel as its headers describe it; `quantity` is None where they do not say.
+
+    `calibration` is in `unit` per recorded unit (volts, counts), `full_scale` in `unit`.
+    """
 
     name: str
     quantity: Quantity | None
     unit: str = ""
     plane: Plane | None = None
     x_m: float = NAN
+    calibration: float = NAN
+    full_scale: float = NAN
 
 
 @dataclass(frozen=True)
 class Peek:
-    """The headers of a file; `problems` are what a reader would refuse or leave out."""
+    """The headers of a file; `problems` are what a reader would refuse.
+
+    A time record has `samples` and a rate, a frequency response `lines` and their step.
+    `left_out` names what the file holds besides.
+    """
 
     source: str
     format: str
@@ -34,6 +43,9 @@ class Peek:
     time: datetime | None = None
     temperature_c: float = NAN
     problems: tuple[str, ...] = ()
+    lines: int = 0
+    frequency_step_hz: float = NAN
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,7 +54,7 @@ class Format:
 
     `recognises` judges the first bytes of a file. `holds_gaps` says whether NaN survives,
     `holds_frequency_responses` whether a FrequencyResponse can be written, `needs_sidecar`
-    whether `write` adds NAME.toml.
+    whether `write` adds NAME.toml, `may_be_gzipped` whether NAME.csv.gz is read too.
     """
 
     name: str
@@ -54,3 +66,11 @@ class Format:
     holds_gaps: bool
     holds_frequency_responses: bool
     needs_sidecar: bool
+    may_be_gzipped: bool = False
+
+
+def names_in(described: Recording | FrequencyResponse) -> list[str]:
+    """The names of the channels, or of the points of frequency responses."""
+    if isinstance(described, FrequencyResponse):
+        return [point.name for point in described.points]
+    return [channel.name for channel in described.channels]

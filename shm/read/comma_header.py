@@ -12,7 +12,7 @@ from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, spread
 
 _TIME = re.compile(r"t|time([ _]?[\[(]?s[\])]?)?", re.IGNORECASE)
 _SAMPLE = "a line of names such as force,acc_1,acc_2"
-_LINE_BREAK = re.compile(r"\r\n|\r|\n")
+LINE_BREAK = re.compile(r"\r\n|\r|\n")
 
 
 @dataclass(frozen=True)
@@ -36,22 +36,34 @@ class Heading:
 
 def parse_heading(text: str, path: Path) -> Heading:
     """The heading of a CSV file; raises BadInput naming line and column."""
-    lines = _LINE_BREAK.split(text)
+    lines = LINE_BREAK.split(text)
     at = next((i for i, line in enumerate(lines) if line.strip() and not _is_remark(line)), None)
     if at is None:
         raise BadInput(
             "there are no columns in it.", file=path, remedy=f"Begin with {_SAMPLE}, then numbers."
         )
-    delimiter = _delimiter(lines[at])
-    columns = tuple(name.strip().strip('"').strip() for name in lines[at].split(delimiter))
+    delimiter = mark_between(lines[at])
+    columns = tuple(cells_of(lines[at], delimiter))
     _refuse_columns(columns, at + 1, path)
+    header, unknown = header_of(lines[:at], columns, delimiter, path)
+    return Heading(header, columns, delimiter, lines[at + 1 :], at + 2, unknown)
+
+
+def header_of(
+    lines: Sequence[str], columns: Sequence[str], delimiter: str, path: Path
+) -> tuple[Header, tuple[str, ...]]:
+    """What the remarks before the names of the columns say, and remarks on keys not known."""
     remarks = [
         (Entry(line, path, number), *_key_and_value(line))
-        for number, line in enumerate(lines[:at], start=1)
-        if ":" in line
+        for number, line in enumerate(lines, start=1)
+        if ":" in line and _is_remark(line)
     ]
-    header, unknown = _header(remarks, columns, delimiter, path)
-    return Heading(header, columns, delimiter, lines[at + 1 :], at + 2, unknown)
+    return _header(remarks, columns, delimiter, path)
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """The cells of a line without blanks and quotes around them."""
+    return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
 
 
 def _is_remark(line: str) -> bool:
@@ -63,7 +75,8 @@ def _key_and_value(line: str) -> tuple[str, str]:
     return key.strip().lower(), value.strip()
 
 
-def _delimiter(line: str) -> str:
+def mark_between(line: str) -> str:
+    """The mark that separates the columns of a line."""
     return next((mark for mark in "\t;" if mark in line), ",")
 
 
@@ -93,7 +106,7 @@ def _is_number(text: str) -> bool:
 
 def _header(
     remarks: Sequence[tuple[Entry, str, str]],
-    columns: tuple[str, ...],
+    columns: Sequence[str],
     delimiter: str,
     path: Path,
 ) -> tuple[Header, tuple[str, ...]]:

@@ -12,88 +12,79 @@
 
 What belongs to a column may also stand alone: `# acc_1.unit: g`. Columns may be separated by
 commas, semicolons (then with decimal commas, if need be) or tabs. A first column `time`, in
-seconds, is checked against the sampling rate, or gives it.
+seconds, is checked against the sampling rate, or gives it. A first column `frequency` makes it
+frequency responses: see `frequency_text`.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 
-import numpy as np
-
-from shm.documents import format_time
-from shm.errors import UsageError
-from shm.read import assemble
+from shm.errors import BadInput, UsageError
+from shm.read import assemble, frequency_text
 from shm.read.atomic import replace_text
-from shm.read.base import Format, Peek
-from shm.read.comma_header import parse_heading
+from shm.read.base import Format, Peek, names_in
+from shm.read.comma_header import Heading, parse_heading
+from shm.read.comma_text import recording_text, response_text
 from shm.read.content import is_text, text_of
 from shm.read.sidecar import with_sidecar
 from shm.read.table import parse_table, rows_in
-from shm.read.timebase import rate_of, without_time
-from shm.read.units import SI
-from shm.values import FrequencyResponse, Recording
+from shm.read.timebase import REMEDY, evened, rate_of
+from shm.values import NAN, FrequencyResponse, Recording
 
 _PLAIN = re.compile(r"[^,;\t\r\n#\"]+")
 
 
-def _read(path: Path) -> Recording:
-    heading = parse_heading(text_of(path), path)
-    table = parse_table(heading, path)
-    values, file_rate_hz = without_time(heading, table, path)
-    return assemble.recording(with_sidecar(heading.header, path), values, path, file_rate_hz)
+def _read(path: Path) -> Recording | FrequencyResponse:
+    text = text_of(path)
+    responses = frequency_text.parse(text, path)
+    if responses is not None:
+        return frequency_text.read(responses, path)
+    heading = parse_heading(text, path)
+    table, rate = parse_table(heading, path), NAN
+    if heading.has_time:
+        table, rate = evened(table[0], table[1:], lambda *fault: _uneven(heading, path, *fault))
+    return assemble.recording(with_sidecar(heading.header, path), table, path, rate)
 
 
 def _peek(path: Path) -> Peek:
-    heading = parse_heading(text_of(path), path)
+    text = text_of(path)
+    responses = frequency_text.parse(text, path)
+    if responses is not None:
+        return frequency_text.peek(responses, FORMAT.name, path)
+    heading = parse_heading(text, path)
     rows = rows_in(heading.body)
     header = with_sidecar(heading.header, path)
     return assemble.peeked(
-        header, FORMAT.name, rows, lambda: rate_of(heading, path), path, heading.remarks
+        header, FORMAT.name, rows, lambda: _rate(heading, path), path, heading.remarks
     )
 
 
-def _write(recording: Recording | FrequencyResponse, path: Path) -> None:
-    if isinstance(recording, FrequencyResponse):
-        raise UsageError(
-            "CSV files hold recordings, not frequency responses.", remedy="Write a .uff file."
-        )
-    for channel in recording.channels:
-        if not _PLAIN.fullmatch(channel.name):
+def _rate(heading: Heading, path: Path) -> float:
+    """The rate that a column of times tells, NaN without one; raises BadInput where faulty."""
+    if not heading.has_time:
+        return NAN
+    times = parse_table(heading, path)[0]
+    return rate_of(times, lambda *fault: _uneven(heading, path, *fault))
+
+
+def _uneven(heading: Heading, path: Path, row: int, what: str) -> BadInput:
+    line, column = heading.body_line + row, heading.columns[0]
+    return BadInput(f"{what}.", file=path, channel=column, line=line, remedy=REMEDY)
+
+
+def _write(described: Recording | FrequencyResponse, path: Path) -> None:
+    for name in names_in(described):
+        if not _PLAIN.fullmatch(name):
             raise UsageError(
-                f"the channel name {channel.name!r} cannot head a column.",
+                f"the channel name {name!r} cannot head a column.",
                 remedy="Leave out commas, semicolons, quotes, # and line breaks.",
             )
-    text = _heading_text(recording) + _body_text(recording)
-    replace_text(path, text)
-
-
-def _heading_text(recording: Recording) -> str:
-    channels = recording.channels
-    known = {
-        "hanger": recording.hanger,
-        "time": format_time(recording.time),
-        "temperature_c": _number(recording.temperature_c),
-        "sampling_rate_hz": _number(recording.sampling_rate_hz),
-        "plane": ", ".join(channel.plane or "" for channel in channels),
-        "unit": ", ".join(SI[channel.quantity] for channel in channels),
-        "x_m": ", ".join(_number(channel.x_m) for channel in channels),
-    }
-    lines = [f"# {key}: {value}" for key, value in known.items() if value not in (None, "")]
-    return "\n".join([*lines, ",".join(channel.name for channel in channels)]) + "\n"
-
-
-def _number(value: float) -> str:
-    return "" if math.isnan(value) else repr(float(value))
-
-
-def _body_text(recording: Recording) -> str:
-    """Rows of nine digits, one more than a 24-bit converter gives."""
-    rows = np.column_stack([channel.values for channel in recording.channels])
-    row = ",".join(["%.9g"] * rows.shape[1]) + "\n"
-    return (row * len(rows)) % tuple(rows.ravel().tolist())
+    if isinstance(described, FrequencyResponse):
+        replace_text(path, response_text(described))
+    else:
+        replace_text(path, recording_text(described))
 
 
 FORMAT = Format(
@@ -104,6 +95,7 @@ FORMAT = Format(
     read=_read,
     write=_write,
     holds_gaps=True,
-    holds_frequency_responses=False,
+    holds_frequency_responses=True,
     needs_sidecar=False,
+    may_be_gzipped=True,
 )

@@ -1,12 +1,18 @@
-"""The bytes of a file: there at all, of the kind its name says, and as text."""
+"""The bytes of a file: there at all, of the kind its name says, unpacked, and as text."""
 
 from __future__ import annotations
 
 import codecs
+import gzip
+import tempfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from shm.errors import BadInput
 from shm.read.base import Format
+from shm.read.limits import LARGEST_BYTES, too_large
 
 _HEAD_BYTES = 4096
 _MAGIC: tuple[tuple[bytes, str], ...] = (
@@ -19,9 +25,6 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"%PDF", "a PDF document"),
     (b"PK\x03\x04", "a ZIP archive or office document"),
     (b"\x1f\x8b", "a gzip archive"),
-    (b"\x89HDF", "HDF5 data"),
-    (b"MATLAB 5.0", "MATLAB data"),
-    (b"TDSm", "TDMS data"),
     (b"SQLite format 3", "a SQLite database"),
     (b"\x7fELF", "a program"),
 )
@@ -31,11 +34,7 @@ _TEXT_CONTROLS = {*b"\t\n\r\f\x1a"}  # 0x1a ends a text file of DOS
 
 def head_of(path: Path) -> bytes:
     """The first bytes of a file; raises BadInput where it cannot be read or is empty."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(_HEAD_BYTES)
-    except OSError as error:
-        raise unreadable(path, error) from error
+    head = _bytes(path, _HEAD_BYTES)
     if not head.strip():
         raise BadInput("the file is empty.", file=path, remedy="Export or send it again.")
     return head
@@ -63,6 +62,8 @@ def refuse_unless_readable(
 ) -> None:
     """Raises BadInput where the first bytes are not of the format that the suffix claims."""
     known = next((what for magic, what in _MAGIC if head.startswith(magic)), None)
+    if recognised is not None and recognised.recognises is not is_text:
+        known = None
     if known is None and recognised is claimed:
         return
     if known is None and recognised is not None:
@@ -94,8 +95,38 @@ def text_of(path: Path) -> str:
 
 
 def bytes_of(path: Path) -> bytes:
-    """A whole file; raises BadInput where it cannot be read."""
+    """A whole file, unpacked where it is gzipped; raises BadInput where it cannot be read."""
+    content = _bytes(path, LARGEST_BYTES + 1)
+    if len(content) > LARGEST_BYTES:
+        raise too_large(path)
+    return content
+
+
+def is_gzipped(path: Path) -> bool:
+    """Whether a name claims a gzipped file, as NAME.csv.gz does."""
+    return path.suffix.lower() == ".gz"
+
+
+@contextmanager
+def plain_file(path: Path, content: bytes) -> Iterator[Path]:
+    """The file itself or, where it is gzipped, a file of its unpacked content for a while."""
+    if not is_gzipped(path):
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder, path.stem)
+        plain.write_bytes(content)
+        yield plain
+
+
+def _bytes(path: Path, most: int) -> bytes:
+    """At most so many bytes of a file, unpacked where its name ends in .gz."""
     try:
-        return path.read_bytes()
+        with gzip.open(path) if is_gzipped(path) else path.open("rb") as stream:
+            return bytes(stream.read(most))
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise BadInput(
+            f"cannot be unpacked: {error}.", file=path, remedy="Pack or send it again."
+        ) from error
     except OSError as error:
         raise unreadable(path, error) from error

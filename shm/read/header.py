@@ -10,11 +10,14 @@ from pathlib import Path
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.read.units import KNOWN, SI, Unit, unit_of
+from shm.read.units import ACCELERANCE, KNOWN, SI, Unit, accelerance_si, unit_of
 from shm.values import NAN, PLANES, Plane, Quantity
 
 KEYS = ("hanger", "time", "temperature_c", "sampling_rate_hz")
-CHANNEL_KEYS = ("unit", "x_m", "plane")
+CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
+_OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
+_FACTOR_REMEDY = "Give a number other than 0: units of `unit` per recorded volt or count."
+_SCALE_REMEDY = "Give the largest value that can be recorded, in the channel's unit."
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,46 @@ class Header:
             return entry.text
         return SI[named] if named else ""
 
+    def accelerance_si(self, name: str) -> float:
+        """Factor of a frequency response to m/s^2/N, by its unit; 1 where none is given."""
+        text = self.unit_text(name) if self._says(name, "unit") else ACCELERANCE
+        factor = accelerance_si(text, "")
+        if factor is None or unit_of(text) is not None:
+            raise self.channels[name]["unit"].refusal(
+                f"the unit {text!r} is not one of acceleration over force.",
+                "Export accelerances, in m/s2/N or g/N.",
+                name,
+            )
+        return factor
+
+    def calibration(self, name: str) -> float:
+        """Units of `unit` per recorded unit, NaN where the values are recorded in `unit`."""
+        if not self._says(name, "calibration"):
+            return NAN
+        entry = self.channels[name]["calibration"]
+        factor = _number(entry, "calibration", _FACTOR_REMEDY, name)
+        if factor == 0 or math.isnan(factor):
+            raise entry.refusal(f"calibration = {entry.text} is no factor.", _FACTOR_REMEDY, name)
+        return factor
+
+    def full_scale(self, name: str) -> float:
+        """The largest value that can be recorded, in `unit`; NaN where nobody says."""
+        if not self._says(name, "full_scale"):
+            return NAN
+        entry = self.channels[name]["full_scale"]
+        largest = _number(entry, "full_scale", _SCALE_REMEDY, name)
+        if largest <= 0:
+            raise entry.refusal(f"full_scale = {entry.text} is not positive.", _SCALE_REMEDY, name)
+        return largest
+
+    def leaves_out(self, name: str) -> bool:
+        """Whether a channel is not to be used."""
+        return self._says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
+
+    def _says(self, name: str, key: str) -> bool:
+        entry = self.channels[name].get(key)
+        return entry is not None and bool(entry.text)
+
     def x_m(self, name: str) -> float:
         entry = self.channels[name].get("x_m")
         if entry is None or not entry.text:
@@ -148,20 +191,29 @@ def quantity_named(name: str) -> Quantity | None:
     return "acceleration" if lowered.startswith("acc") else None
 
 
+def says_yes(entry: Entry) -> bool:
+    """The truth of `leave_out`; raises BadInput for anything but true and false."""
+    if entry.text.lower() not in ("true", "false"):
+        raise entry.refusal(
+            f"leave_out = {entry.text!r} is neither true nor false.", "Give leave_out = true."
+        )
+    return entry.text.lower() == "true"
+
+
 def spread(
     key: str, values: Sequence[Entry], names: Sequence[str], where: Entry
 ) -> dict[str, Entry]:
     """The values of a list, one a channel, by channel name.
 
     One value alone, and a list as long as the accelerations, goes to the accelerations, except
-    that units must be given for all channels.
+    that units, calibrations and full scales must be given for all channels.
     """
     if len(values) == len(names):
         return dict(zip(names, values, strict=True))
     accelerations = [name for name in names if quantity_named(name) != "force"]
     if key == "plane" and len(values) == 1:
         return dict.fromkeys(accelerations, values[0])
-    if key != "unit" and len(values) == len(accelerations):
+    if key not in _OF_ALL_CHANNELS and len(values) == len(accelerations):
         return dict(zip(accelerations, values, strict=True))
     raise where.refusal(
         f"{key} has {len(values)} values for {len(names)} channels.",

@@ -1,4 +1,4 @@
-"""NAME.toml beside NAME.csv or NAME.uff: what the file cannot hold.
+"""NAME.toml beside NAME.csv, NAME.uff, NAME.h5 or NAME.csv.gz: what the file does not say.
 
 hanger = 3
 time = 2026-05-01T10:00:00Z
@@ -9,6 +9,11 @@ sampling_rate_hz = 512.0
 unit = "m/s2"
 x_m = 2.52
 plane = "transverse"
+calibration = 10.0
+full_scale = 50.0
+
+[channel.acc_9]
+leave_out = true
 """
 
 from __future__ import annotations
@@ -34,15 +39,19 @@ _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each ch
 
 def sidecar_path(path: Path) -> Path:
     """Where the sidecar of a file stands, whether it exists or not."""
-    return path.with_suffix(".toml")
+    plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
+    return plain.with_suffix(".toml")
 
 
-def with_sidecar(header: Header, path: Path) -> Header:
-    """A file's header overridden by its sidecar, if there is one; raises BadInput naming it."""
+def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Header:
+    """A file's header overridden by its sidecar, if there is one; raises BadInput naming it.
+
+    The sidecar may also describe `others`, which the file holds but which are no channels.
+    """
     sidecar = sidecar_path(path)
-    if sidecar == path or not sidecar.is_file():
+    document = document_beside(path)
+    if not document:
         return header
-    document = _document(sidecar)
     names = list(header.channels)
     entries = {key: Entry(document[key], sidecar) for key in KEYS if key in document}
     channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
@@ -50,11 +59,28 @@ def with_sidecar(header: Header, path: Path) -> Header:
         if key in document:
             for name, entry in _listed(key, document[key], names, sidecar).items():
                 channels[name][key] = entry
-    for name, table in _tables(document, names, sidecar).items():
-        channels[name].update(
-            {key: Entry(table[key], sidecar) for key in CHANNEL_KEYS if key in table}
-        )
+    tables = _tables(document, sidecar)
+    _refuse_unknown(tables, [*names, *others], sidecar)
+    for name in [name for name in names if name in tables]:
+        channels[name].update(_entries(tables[name], sidecar))
     return header.overridden_by(Header(sidecar, channels, entries))
+
+
+def channels_described(path: Path) -> dict[str, dict[str, Entry]]:
+    """What the sidecar of a file says in tables of single channels; empty without a sidecar."""
+    sidecar = sidecar_path(path)
+    tables = _tables(document_beside(path), sidecar)
+    return {name: _entries(table, sidecar) for name, table in tables.items()}
+
+
+def _entries(table: dict[str, Any], sidecar: Path) -> dict[str, Entry]:
+    return {key: Entry(table[key], sidecar) for key in CHANNEL_KEYS if key in table}
+
+
+def document_beside(path: Path) -> dict[str, Any]:
+    """All that the sidecar of a file says; empty without a sidecar."""
+    sidecar = sidecar_path(path)
+    return _document(sidecar) if sidecar != path and sidecar.is_file() else {}
 
 
 def _document(sidecar: Path) -> dict[str, Any]:
@@ -74,19 +100,30 @@ def _listed(key: str, value: Any, names: Sequence[str], sidecar: Path) -> dict[s
     return spread(key, [Entry(one, sidecar) for one in values], names, whole)
 
 
-def _tables(document: dict[str, Any], names: Sequence[str], sidecar: Path) -> dict[str, Any]:
+def _tables(document: dict[str, Any], sidecar: Path) -> dict[str, dict[str, Any]]:
     tables = document.get("channel", {})
     if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
         raise BadInput("`channel` must hold tables.", file=sidecar, remedy=_SHAPE)
+    for name, table in tables.items():
+        for key in table.keys() - set(CHANNEL_KEYS):
+            raise BadInput(
+                f"{key!r} is not a key of a channel.",
+                file=sidecar,
+                channel=name,
+                remedy=f"The keys are {', '.join(CHANNEL_KEYS)}.",
+            )
+    return tables
+
+
+def _refuse_unknown(tables: Iterable[str], known: Sequence[str], sidecar: Path) -> None:
     for name in tables:
-        if name not in names:
+        if name not in known:
             raise BadInput(
                 "describes a channel that the file does not have.",
                 file=sidecar,
                 channel=name,
-                remedy=f"The file has {', '.join(names)}.",
+                remedy=f"The file has {', '.join(known)}.",
             )
-    return tables
 
 
 def write_sidecar(
@@ -105,7 +142,7 @@ def write_sidecar(
     for channel in channels:
         lines += ["", f"[channel.{json.dumps(channel.name)}]"]
         lines += [*_line("unit", channel.unit), *_line("plane", channel.plane)]
-        lines += _line("x_m", channel.x_m)
+        lines += [*_line("x_m", channel.x_m), *_line("full_scale", channel.full_scale)]
     text = "\n".join(lines) + "\n"
     replace_text(sidecar_path(path), text)
 

@@ -20,29 +20,40 @@ _STANDARD_GRAVITY = 9.80665
 _METRE_PER_S2 = Unit("acceleration", 1.0)
 _UNITS: dict[str, Unit] = {
     "n": Unit("force", 1.0),
+    "newton": Unit("force", 1.0),
+    "newtons": Unit("force", 1.0),
+    "dan": Unit("force", 10.0),
     "kn": Unit("force", 1e3),
+    "kgf": Unit("force", 9.80665),
     "lbf": Unit("force", 4.4482216152605),
     "m/s2": _METRE_PER_S2,
     "m/s/s": _METRE_PER_S2,
     "m/sec2": _METRE_PER_S2,
+    "ms-2": _METRE_PER_S2,
+    "cm/s2": Unit("acceleration", 1e-2),
     "mm/s2": Unit("acceleration", 1e-3),
+    "um/s2": Unit("acceleration", 1e-6),
     "g": Unit("acceleration", _STANDARD_GRAVITY),
     "mg": Unit("acceleration", 1e-3 * _STANDARD_GRAVITY),
+    "ug": Unit("acceleration", 1e-6 * _STANDARD_GRAVITY),
 }
-KNOWN = "N, kN, lbf for forces; m/s2, mm/s2, g for accelerations"
+KNOWN = "N, daN, kN, lbf for forces; m/s2, mm/s2, um/s2, g, mg for accelerations"
+ACCELERANCE = "m/s2/N"
 SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
 
 
 def unit_of(text: str) -> Unit | None:
     """The unit that a text means, None where it is not known."""
-    return _UNITS.get(re.sub(r"[\s\[\]()^*]", "", text.lower().replace("²", "2")))
+    plain = text.lower().replace("²", "2").replace("µ", "u").replace("μ", "u")
+    return _UNITS.get(re.sub(r"[\s\[\]()^*]", "", plain))
 
 
 def accelerance_si(numerator: str, denominator: str) -> float | None:
     """Factor to m/s^2/N of response over force; "" means SI; None where a unit is not known.
 
-    The numerator may also hold the whole fraction, as in "(m/s2)/N".
+    The numerator may also hold the whole fraction, as in "(m/s2)/N" or an analyser's "(m/s2)(N)".
     """
+    numerator = numerator.replace(")(", ")/(")
     if not denominator and unit_of(numerator) is None and "/" in numerator:
         numerator, _, denominator = numerator.rpartition("/")
     above = unit_of(numerator or SI["acceleration"])

@@ -44,7 +44,7 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
     if isinstance(described, Recording):
         sets = universal_time.sets_of(described)
         channels = [
-            PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m)
+            PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m, NAN, c.full_scale)
             for c in described.channels
         ]
         rate = described.sampling_rate_hz
@@ -72,4 +72,5 @@ FORMAT = Format(
     holds_gaps=False,
     holds_frequency_responses=True,
     needs_sidecar=True,
+    may_be_gzipped=True,
 )

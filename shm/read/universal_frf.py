@@ -16,7 +16,7 @@ from shm.read.header import Header
 from shm.read.sidecar import with_sidecar
 from shm.read.units import accelerance_si
 from shm.read.universal_sets import COHERENCE, FREQUENCY_RESPONSE, Content, FunctionSet
-from shm.values import ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
 
 _ACCELERATION, _EXCITATION, _FREQUENCY, _EVEN = 12, 13, 18, 1
 _UNIT = "m/s2/N"
@@ -34,15 +34,15 @@ def frequency_response(content: Content, path: Path) -> FrequencyResponse:
     sets = response_sets(content)
     header = _header(sets, content, path)
     skipped, frequency = _frequencies(sets, path)
-    accelerance = np.array(
-        [_accelerance(found, name, path) for name, found in zip(header.channels, sets, strict=True)]
-    )
+    named = zip(header.channels, sets, strict=True)
+    used = {name: found for name, found in named if not header.leaves_out(name)}
+    accelerance = np.array([_accelerance(found, name, path) for name, found in used.items()])
     return FrequencyResponse(
         str(path),
-        tuple(ResponsePoint(n, header.plane(n), header.x_m(n)) for n in header.channels),
+        tuple(ResponsePoint(name, header.plane(name), header.x_m(name)) for name in used),
         frequency,
         np.pad(accelerance, ((0, 0), (skipped, 0)), constant_values=np.nan),
-        _coherence(sets, content, skipped),
+        _coherence(list(used.values()), content, skipped),
         header.hanger,
         header.time,
         header.temperature_c,
@@ -60,10 +60,12 @@ def peek(content: Content, file_format: str, path: Path) -> Peek:
         source=str(path),
         format=file_format,
         channels=channels,
-        samples=sets[0].points,
+        samples=0,
         hanger=header.hanger,
         time=header.time,
         temperature_c=header.temperature_c,
+        lines=sets[0].points,
+        frequency_step_hz=_step(sets[0]) or NAN,
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pyuff
 
 from shm.errors import BadInput
-from shm.read.content import bytes_of
+from shm.read.content import bytes_of, plain_file
 from shm.values import ComplexArray, FloatArray
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
@@ -83,9 +83,10 @@ def load(path: Path, *, headers_only: bool) -> Content:
             line=raw.count(b"\n") + 1,
             remedy=_EXPORT_AGAIN,
         )
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
+    quiet = warnings.catch_warnings()
+    with quiet, np.errstate(all="ignore"), plain_file(path, raw) as plain:
         warnings.simplefilter("ignore")
-        return _content(path, raw, headers_only)
+        return _content(_opened(plain, path), path, raw, headers_only)
 
 
 def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
@@ -94,8 +95,7 @@ def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
     file.write_sets(list(sets), mode="add")
 
 
-def _content(path: Path, raw: bytes, headers_only: bool) -> Content:
-    file = _opened(path)
+def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
     functions: list[FunctionSet] = []
     nodes: dict[int, tuple[float, float, float]] = {}
     for index, kind in enumerate(int(kind) for kind in file.get_set_types()):
@@ -107,9 +107,9 @@ def _content(path: Path, raw: bytes, headers_only: bool) -> Content:
     return Content(tuple(functions), nodes)
 
 
-def _opened(path: Path) -> Any:
+def _opened(plain: Path, path: Path) -> Any:
     try:
-        return pyuff.UFF(str(path))
+        return pyuff.UFF(str(plain))
     except Exception as error:
         raise BadInput(
             "its data sets cannot be told apart.", file=path, remedy=_EXPORT_AGAIN

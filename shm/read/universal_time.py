@@ -37,7 +37,8 @@ def quantity(found: FunctionSet) -> Quantity | None:
 
 def recording(content: Content, path: Path) -> Recording:
     sets = time_sets(content)
-    assemble.refuse_quantities([q for q in map(quantity, sets) if q], path)
+    if not sets:
+        assemble.refuse_quantities([], path)
     _refuse_different(sets, path)
     values = np.array([universal_marks.sign(found.response[2]) * _real(found) for found in sets])
     header = _header(sets, content, path)
@@ -47,15 +48,10 @@ def recording(content: Content, path: Path) -> Recording:
 def peek(content: Content, file_format: str, path: Path) -> Peek:
     sets = time_sets(content)
     left_out = [found for found in content.functions if found not in sets]
-    remarks = [
-        f"{found.title} ({found.label or 'of another kind'}) is neither force nor acceleration"
-        " over time; left out."
-        for found in left_out
-    ]
+    named = [f"{found.title} ({found.label or 'of another kind'})" for found in left_out]
     samples = sets[0].points if sets else 0
-    return assemble.peeked(
-        _header(sets, content, path), file_format, samples, lambda: _rate(sets), path, remarks
-    )
+    header = _header(sets, content, path)
+    return assemble.peeked(header, file_format, samples, lambda: _rate(sets), path, left_out=named)
 
 
 def sets_of(recording: Recording) -> list[dict[str, Any]]:

@@ -19,6 +19,7 @@ from shm.values import (
     ModalTest,
     Posterior,
     PredictedFrequency,
+    QualityCheck,
     Selection,
 )
 from shm.watch import end_stiffness
@@ -92,7 +93,8 @@ class HangerReport:
 
     `posterior` and `frequency_response` are those of the latest test, the last of `tests`, which
     stand oldest first like `trend`. `drifts` are those of the latest test, `alerts` all of the
-    hanger. `lineage` names where the numbers come from: checksums, settings, files.
+    hanger. `lineage` names where the numbers come from: checksums, settings, files. `quality` is
+    that of the latest test, empty where it was not checked.
     """
 
     bridge: str
@@ -108,6 +110,7 @@ class HangerReport:
     alerts: tuple[Alert, ...] = ()
     frequency_response: FrequencyResponse | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
+    quality: tuple[QualityCheck, ...] = ()
 
     @property
     def latest(self) -> ModalTest:

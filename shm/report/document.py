@@ -30,6 +30,7 @@ def json(data: HangerReport) -> dict[str, Any]:
         "drifts": [documents.drift_document(drift) for drift in data.drifts],
         "alerts": [documents.alert_document(alert) for alert in data.alerts],
         "frequency_response": _response(data.frequency_response),
+        "quality": [asdict(check) for check in data.quality],
         "lineage": dict(data.lineage),
         "version": data.version,
         "generated_at": data.generated_at,

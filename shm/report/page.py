@@ -11,7 +11,7 @@ from shm.report.figures import illustrations
 from shm.report.summary import status, summary
 from shm.report.tables import tables
 
-_ENVIRONMENT = Environment(
+ENVIRONMENT = Environment(
     loader=PackageLoader("shm.report", "templates"),
     autoescape=True,
     undefined=StrictUndefined,
@@ -23,7 +23,7 @@ _ENVIRONMENT = Environment(
 def html(data: HangerReport) -> str:
     """The report of one hanger: readable on screen (light or dark), on paper, by ear."""
     *main, origin = tables(data)
-    return _ENVIRONMENT.get_template("hanger.html.j2").render(
+    return ENVIRONMENT.get_template("hanger.html.j2").render(
         title=words.hanger_name(data.hanger.id, data.hanger.name),
         bridge=data.bridge,
         status=status(data),

@@ -49,7 +49,8 @@ def summary(data: HangerReport) -> str:
 
 def advice(data: HangerReport) -> tuple[str, ...]:
     """What to do next, most urgent first; never empty."""
-    found = [text for text in (_urgent(data), _sampling(data), _width(data)) if text]
+    found = [_urgent(data), _quality(data), _sampling(data), _width(data)]
+    found = [text for text in found if text]
     if math.isnan(data.latest.temperature_c):
         found.append("Record the temperature with the next test: it moves the tension.")
     return tuple(found) or ("Nothing needs doing before the next planned test.",)
@@ -182,6 +183,13 @@ def _urgent(data: HangerReport) -> str:
             return "Repeat the test at another temperature to make the baseline firm."
         case Status.STEADY:
             return ""
+
+
+def _quality(data: HangerReport) -> str:
+    doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
+    if not doubted:
+        return ""
+    return f"Mend what the quality of the latest test warns of: {words.listed(doubted)}."
 
 
 def _sampling(data: HangerReport) -> str:

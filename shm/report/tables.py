@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from shm.report import words
 from shm.report.content import HangerReport, Interval, TrendRow
+from shm.report.quality import quality_table
 from shm.report.summary import tension_change, threshold
+from shm.report.table import Table
 from shm.values import Alert, Drift, Mode, Posterior, PredictedFrequency
-
-
-@dataclass(frozen=True)
-class Table:
-    """One table; every cell is a text with its unit in the cell or in the heading."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
 
 
 def tables(data: HangerReport) -> tuple[Table, ...]:
@@ -95,6 +86,10 @@ def _frequency_row(predicted: PredictedFrequency, measured: Mode | None) -> tupl
         f"{interval.low:.3f} to {interval.high:.3f}",
         words.number(off, "+.2f", "not measured"),
     )
+
+
+def quality(data: HangerReport) -> Table:
+    return quality_table(data.quality, "Quality of the latest test")
 
 
 def parameters(data: HangerReport) -> Table:
@@ -209,6 +204,7 @@ _TABLES: tuple[Callable[[HangerReport], Table], ...] = (
     drift,
     alerts,
     frequencies,
+    quality,
     models,
     parameters,
     history,

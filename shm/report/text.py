@@ -1,15 +1,16 @@
-"""The report as plain text for a terminal of 80 columns or more."""
+"""The report as plain text for a terminal of 100 columns."""
 
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 
 from shm.report import words
 from shm.report.content import HangerReport
 from shm.report.summary import status, summary
-from shm.report.tables import Table, tables
+from shm.report.table import WIDTH, Table, laid_out
+from shm.report.tables import tables
 
-_WIDTH = 100
 _ROWS_SHOWN = 12
 
 
@@ -18,24 +19,20 @@ def text(data: HangerReport) -> str:
     return "\n".join((_head(data), *(_table(table) for table in tables(data))))
 
 
+def headed(title: str, paragraph: str) -> str:
+    """An underlined title and a paragraph."""
+    return f"{title}\n{'=' * len(title)}\n{textwrap.fill(paragraph, WIDTH)}\n"
+
+
 def _head(data: HangerReport) -> str:
     name = words.hanger_name(data.hanger.id, data.hanger.name)
-    title = f"{name}, {data.bridge}: {status(data).value}"
-    return f"{title}\n{'=' * len(title)}\n{textwrap.fill(summary(data), _WIDTH)}\n"
+    return headed(f"{name}, {data.bridge}: {status(data).value}", summary(data))
 
 
 def _table(table: Table) -> str:
-    shown = table.rows if len(table.headings) == 2 else table.rows[:_ROWS_SHOWN]
-    widths = [
-        max(len(cell) for cell in column) for column in zip(table.headings, *shown, strict=True)
-    ]
-    lines = [_line(row, widths) for row in (table.headings, *shown)]
-    lines.insert(1, "  ".join("-" * width for width in widths))
-    if len(shown) < len(table.rows):
-        lines.append(f"... and {len(table.rows) - len(shown)} earlier ones (in HTML and JSON)")
-    note = [textwrap.fill(table.note, _WIDTH)] if table.note else []
-    return "\n".join((table.title.upper(), *lines, *note, ""))
-
-
-def _line(cells: tuple[str, ...], widths: list[int]) -> str:
-    return "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+    """The table; of many tests or alerts only the latest."""
+    left = len(table.rows) - _ROWS_SHOWN
+    if table.headings[0] != "time" or left <= 0:
+        return laid_out(table)
+    note = f"... and {left} earlier ones (in HTML and JSON)"
+    return laid_out(replace(table, rows=table.rows[:_ROWS_SHOWN], note=note))

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from datetime import UTC, datetime
+
+import numpy as np
 
 from shm.report.content import Interval
 
+_LONGEST_NAME = 24
 _ROTATIONAL_SPRINGS = {
     "k1": "transverse, deck end",
     "k2": "longitudinal, deck end",
@@ -68,6 +72,16 @@ def number(value: float, form: str, absent: str = "not known") -> str:
     return format(value, form) if math.isfinite(value) else absent
 
 
+def plain(value: float, digits: int = 3, absent: str = "not known") -> str:
+    """`value` with so many significant digits, never as a power of ten: `0.00021`, `1872`."""
+    if not math.isfinite(value):
+        return absent
+    rounded = float(f"{value:.{digits}g}")
+    if abs(rounded) >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return np.format_float_positional(rounded, trim="-")
+
+
 def probability(value: float) -> str:
     """Three decimals, with no certainty pretended."""
     if not math.isfinite(value):
@@ -107,3 +121,32 @@ def meaning(name: str, model: str) -> str:
     if model.startswith("beam"):
         return f"log10 of end stiffness {spring} ({_ROTATIONAL_SPRINGS[spring]}) in N m/rad"
     return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"
+
+
+def place(name: str, plane: str | None, x_m: float) -> str:
+    """`acc_1, transverse, 2.52 m` of a sensor, as far as it is known."""
+    known = (_shortened(name), plane or "", f"{x_m:.2f} m" if math.isfinite(x_m) else "")
+    return ", ".join(word for word in known if word)
+
+
+def _shortened(name: str) -> str:
+    """Both ends of a long name, since serial numbers stand last."""
+    half = _LONGEST_NAME // 2
+    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half + 1 :]}"
+
+
+def some(shown: int, there: int, what: str) -> str:
+    """` 4 of 16 measured points are drawn.`; nothing where all are."""
+    return f" {shown} of {there} {what} are drawn." if shown < there else ""
+
+
+def counted(count: int, what: str) -> str:
+    """`1 hit`, `5 hits`, `no hit`."""
+    if count == 0:
+        return f"no {what}"
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def listed(items: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 
+from shm.errors import UsageError
+from shm.simulate.disturbances import DISTURBANCES, Channels, Disturbance, Lines, Motion, Planted
+from shm.simulate.disturbances.base import Scene, T, Verb
 from shm.simulate.elements import modes_below, plane_modes
-from shm.simulate.logger import log
-from shm.simulate.pulse import Pulse, draw_pulses, samples_of
+from shm.simulate.logger import Line, logged
+from shm.simulate.pulse import force_of, pulse_of
 from shm.simulate.response import accelerations
 from shm.simulate.state import HammerPlan, HangerState, check
-from shm.values import NAN, PLANES, Channel, FloatArray, Hanger, Recording
+from shm.simulate.strikes import Strike, draw_schedule
+from shm.values import NAN, PLANES, Hanger, Recording
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTest:
+    """A recording and its truth: each disturbance, and the hits in seconds of the recording."""
+
+    recording: Recording
+    planted: tuple[Planted, ...]
+    strikes: tuple[Strike, ...]
 
 
 def hammer_test(
@@ -25,6 +40,7 @@ def hammer_test(
     time: datetime | None = None,
     temperature_c: float = NAN,
     source: str = "simulated",
+    disturbances: Sequence[str] = (),
 ) -> Recording:
     """One continuous recording of all hits: `force`, then `acc_1` (transverse), `acc_2`
     (longitudinal) of the first sensor, `acc_3`, `acc_4` of the second, and so on.
@@ -32,55 +48,113 @@ def hammer_test(
     The logger filters force and accelerations alike (linear phase, flat to 0.4 of the sampling
     rate, -100 dB from 0.5), so nothing is aliased and their ratio is the true accelerance. Modes
     up to twice the sampling rate take part; those above half of it are not excited and only add
-    their quasi-static share. The hanger is at rest before the first hit. The same generator state
-    gives the same recording. Raises UsageError for a state or plan that cannot be.
+    their quasi-static share. The hanger is at rest before the first hit. `disturbances` are names
+    of `DISTURBANCES`. The same generator state gives the same recording, and a disturbance leaves
+    hits and noise as they are without it. Raises UsageError for a state or plan that cannot be.
     """
+    made = simulated_test(hanger, state, plan, rng, disturbances=disturbances)
+    return replace(made.recording, source=source, time=time, temperature_c=temperature_c)
+
+
+def simulated_test(
+    hanger: Hanger,
+    state: HangerState,
+    plan: HammerPlan,
+    rng: np.random.Generator,
+    *,
+    disturbances: Sequence[str] = (),
+) -> SimulatedTest:
+    """The same with what was planted where."""
     check(hanger, state, plan)
-    pulses = draw_pulses(plan, rng)
-    force = log(_force(pulses, plan), plan.force_noise_n, plan.force_range_n, plan.adc_bits, rng)
-    signals = _accelerations(hanger, state, plan, pulses)
-    channels = [Channel("force", "force", force, x_m=plan.hammer_place_m(hanger))]
+    stages = _Stages(disturbances, rng)
+    scene = Scene(hanger, state, plan, draw_schedule(hanger, plan, rng))
+    scene = replace(scene, schedule=stages.run("schedule", scene.schedule, scene))
+    motion = stages.run("motion", _motion(scene), scene)
+    lines = stages.run("lines", _lines(motion, scene), scene)
+    channels: Channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
+    channels = stages.run("channels", channels, scene)
+    return _kept(channels, scene, tuple(stages.planted))
+
+
+class _Stages:
+    """Runs the disturbances of each stage and collects what they planted.
+
+    Each draws from a generator of its own, seeded from a copy of the test's: the test's own draws
+    are the same with and without it.
+    """
+
+    def __init__(self, names: Sequence[str], rng: np.random.Generator):
+        _refuse_unless_hit(names)
+        root = int(copy.deepcopy(rng).integers(2**62))
+        self._disturbances = [_of_name(name) for name in names]
+        self._generators = [np.random.default_rng([root, place]) for place in range(len(names))]
+        self.planted: list[Planted] = []
+
+    def run(self, stage: str, made: T, scene: Scene) -> T:
+        for disturbance, rng in zip(self._disturbances, self._generators, strict=True):
+            verb: Verb[T] | None = getattr(disturbance, stage)
+            if verb:
+                made, planted = verb(made, scene, rng)
+                self.planted.append(planted)
+        return made
+
+
+def _of_name(name: str) -> Disturbance:
+    if name not in DISTURBANCES:
+        raise UsageError(
+            f"{name!r} is no disturbance.", remedy=f"Use one of {', '.join(DISTURBANCES)}."
+        )
+    return DISTURBANCES[name]
+
+
+def _refuse_unless_hit(names: Sequence[str]) -> None:
+    idle = [name for name in names if _of_name(name).needs_hits]
+    if "noise_only" in names and idle:
+        raise UsageError(
+            f"{idle[0]} needs hits, and noise_only has none.", remedy="Leave out one of them."
+        )
+
+
+def _motion(scene: Scene) -> Motion:
+    """Modes, pulses and noise-free accelerations."""
+    plan, state = scene.plan, scene.state
+    count = modes_below(scene.hanger, state, 2 * scene.rate_hz)
+    modes = tuple(plane_modes(scene.hanger, state, plane, count) for plane in PLANES)
+    pulses = tuple(
+        pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.blows
+    )
+    places = plan.sensor_places_m(scene.hanger)
+    moved = [
+        accelerations(own, plane, state.damping_ratio, pulses, places, scene.rate_hz, plan.samples)
+        for own, plane in zip(modes, PLANES, strict=True)
+    ]
+    return Motion(modes, pulses, np.array(moved))
+
+
+def _lines(motion: Motion, scene: Scene) -> Lines:
+    plan, hanger = scene.plan, scene.hanger
+    force = force_of(motion.pulses, plan.samples)
+    lines = [
+        Line("force", "force", force, None, plan.hammer_place_m(hanger),
+             plan.force_noise_n, plan.force_range_n)
+    ]  # fmt: skip
     for index, x_m in enumerate(plan.sensor_places_m(hanger)):
         for number, plane in enumerate(PLANES):
-            values = log(
-                signals[number, index],
-                plan.acceleration_noise_m_s2,
-                plan.acceleration_range_m_s2,
-                plan.adc_bits,
-                rng,
-            )
-            name = f"acc_{2 * index + number + 1}"
-            channels.append(Channel(name, "acceleration", values, plane, x_m))
-    return Recording(source, tuple(channels), plan.sampling_rate_hz, hanger.id, time, temperature_c)
+            lines.append(
+                Line(f"acc_{2 * index + number + 1}", "acceleration",
+                     motion.accelerations[number, index], plane, x_m,
+                     plan.acceleration_noise_m_s2, plan.acceleration_range_m_s2)
+            )  # fmt: skip
+    return tuple(lines)
 
 
-def _force(pulses: Sequence[Pulse], plan: HammerPlan) -> FloatArray:
-    force = np.zeros(plan.samples)
-    for pulse in pulses:
-        places, values = samples_of(pulse, plan.samples)
-        force[places] += values
-    return force
-
-
-def _accelerations(
-    hanger: Hanger, state: HangerState, plan: HammerPlan, pulses: Sequence[Pulse]
-) -> FloatArray:
-    """Noise-free accelerations, shape (planes, sensors, samples)."""
-    modes = modes_below(hanger, state, 2 * plan.sampling_rate_hz)
-    angle = math.radians(plan.hammer_angle_deg)
-    shares = (math.cos(angle), math.sin(angle))
-    return np.array(
-        [
-            share
-            * accelerations(
-                plane_modes(hanger, state, plane, modes),
-                state.damping_ratio,
-                pulses,
-                plan.hammer_place_m(hanger),
-                plan.sensor_places_m(hanger),
-                plan.sampling_rate_hz,
-                plan.samples,
-            )
-            for plane, share in zip(PLANES, shares, strict=True)
-        ]
-    )
+def _kept(channels: Channels, scene: Scene, planted: tuple[Planted, ...]) -> SimulatedTest:
+    """What lies within the ends of the record."""
+    schedule = scene.schedule
+    first = math.ceil(schedule.begin_s * scene.rate_hz)
+    part = slice(first, round(schedule.end_s * scene.rate_hz))
+    cut = tuple(replace(channel, values=channel.values[part]) for channel in channels)
+    recording = Recording("simulated", cut, scene.rate_hz, scene.hanger.id)
+    shift_s = first / scene.rate_hz
+    strikes = tuple(replace(s, start_s=s.start_s - shift_s) for s in schedule.strikes)
+    return SimulatedTest(recording, planted, strikes)

@@ -9,48 +9,100 @@ and J. A. C. Weideman, SIAM Review 56, 2014).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
 
 from shm.simulate.elements import PlaneModes
 from shm.simulate.pulse import Pulse, samples_of
-from shm.values import ComplexArray, FloatArray
+from shm.values import ComplexArray, FloatArray, Plane
+
+_MODES_AT_ONCE = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Samples `begin` up to `end` of a recording with the pulses in it and one damping ratio.
+
+    The first may begin before sample 0, where a pulse does.
+    """
+
+    begin: int
+    end: int
+    damping_ratio: float
+    pulses: tuple[Pulse, ...]
 
 
 def accelerations(
     modes: PlaneModes,
+    plane: Plane,
     damping_ratio: float,
     pulses: Sequence[Pulse],
-    hammer_x_m: float,
     sensors_x_m: Sequence[float],
     sampling_rate_hz: float,
     samples: int,
 ) -> FloatArray:
-    """Accelerations in m/s^2, shape (sensors, samples), of pulses that act at `hammer_x_m`."""
-    excited = modes.at(np.array([hammer_x_m]))[0]
+    """Accelerations of a plane in m/s^2, shape (sensors, samples).
+
+    Each pulse acts where and in which direction its blow struck. From a blow with a damping ratio
+    of its own up to the next blow, everything decays with that one.
+    """
     seen = modes.at(np.array(sensors_x_m))
-    poles = _poles(modes.angular_frequency_rad_s, damping_ratio)
-    driven = [_driven(poles, pulse, sampling_rate_hz) for pulse in pulses]
     out = np.zeros((len(seen), samples))
-    for mode, pole in enumerate(poles):
-        state = _state(pole, mode, pulses, driven, sampling_rate_hz, samples)
-        out += np.outer(seen[:, mode] * excited[mode] / pole.imag, (pole**2 * state).imag)
+    carried = np.zeros(len(modes.angular_frequency_rad_s), complex)
+    for stretch in stretches(pulses, damping_ratio, samples):
+        poles = poles_of(modes.angular_frequency_rad_s, stretch.damping_ratio)
+        driven = [driven_states(poles, modes, plane, p, sampling_rate_hz) for p in stretch.pulses]
+        for first in range(0, len(poles), _MODES_AT_ONCE):
+            block = np.arange(first, min(first + _MODES_AT_ONCE, len(poles)))
+            states = np.array([
+                state_of(poles[m], stretch, [d[:, m] for d in driven], sampling_rate_hz, carried[m])
+                for m in block
+            ])  # fmt: skip
+            carried[block] = states[:, -1]
+            ringing = (poles[block, None] ** 2 * states).imag / poles[block, None].imag
+            kept = slice(max(0, stretch.begin), stretch.end)
+            out[:, kept] += seen[:, block] @ ringing[:, kept.start - stretch.begin :]
     for pulse in pulses:
         places, force = samples_of(pulse, samples)
-        out[:, places] += np.outer(seen @ excited, force)
+        out[:, places] += np.outer(seen @ _pushed(modes, plane, pulse), force)
     return out
 
 
-def _poles(angular_frequency: FloatArray, damping_ratio: float) -> ComplexArray:
+def stretches(pulses: Sequence[Pulse], damping_ratio: float, samples: int) -> Sequence[Stretch]:
+    """The recording cut where the damping ratio changes: at the first sample of a pulse."""
+    begin = min([0, *(pulse.first for pulse in pulses)])
+    found: list[Stretch] = [Stretch(begin, samples, damping_ratio, ())]
+    for pulse in pulses:
+        last, own = found[-1], pulse.strike.damping_ratio
+        ratio = damping_ratio if math.isnan(own) else own
+        if ratio == last.damping_ratio:
+            found[-1] = replace(last, pulses=(*last.pulses, pulse))
+        else:
+            found[-1] = replace(last, end=pulse.first)
+            found.append(Stretch(pulse.first, samples, ratio, (pulse,)))
+    return [stretch for stretch in found if stretch.end > stretch.begin]
+
+
+def poles_of(angular_frequency: FloatArray, damping_ratio: float) -> ComplexArray:
+    """Poles in rad/s, (modes,)."""
     return np.asarray(
         angular_frequency * (-damping_ratio + 1j * np.sqrt(1 - damping_ratio**2)), complex
     )
 
 
-def _driven(poles: ComplexArray, pulse: Pulse, sampling_rate_hz: float) -> ComplexArray:
+def driven_states(
+    poles: ComplexArray, modes: PlaneModes, plane: Plane, pulse: Pulse, sampling_rate_hz: float
+) -> ComplexArray:
     """What a pulse adds to each mode's state within each sample interval, (samples, modes)."""
+    return driven_unit_states(poles, pulse, sampling_rate_hz) * _pushed(modes, plane, pulse)
+
+
+def driven_unit_states(poles: ComplexArray, pulse: Pulse, sampling_rate_hz: float) -> ComplexArray:
+    """The same for modes that take the whole force, (samples, modes)."""
     steps = pulse.fine_n.shape[1] - 1
     step_s = 1 / (sampling_rate_hz * steps)
     weights = np.full(steps + 1, 2 * step_s / 3)
@@ -60,20 +112,27 @@ def _driven(poles: ComplexArray, pulse: Pulse, sampling_rate_hz: float) -> Compl
     return np.asarray(pulse.fine_n @ (weights[:, None] * np.exp(remaining[:, None] * poles)))
 
 
-def _state(
+def state_of(
     pole: complex,
-    mode: int,
-    pulses: Sequence[Pulse],
+    stretch: Stretch,
     driven: Sequence[ComplexArray],
     sampling_rate_hz: float,
-    samples: int,
+    carried: complex = 0j,
 ) -> ComplexArray:
-    """The complex state of one mode at the samples, at rest before the first pulse."""
-    lead = max(0, -min(pulse.first for pulse in pulses))
-    added = np.zeros(lead + samples, complex)
-    for pulse, share in zip(pulses, driven, strict=True):
-        begin = lead + pulse.first + 1
+    """The complex state of one mode over a stretch; `carried` is that just before it.
+
+    `driven` holds what each pulse adds to it, (samples of the pulse,).
+    """
+    added = np.zeros(stretch.end - stretch.begin, complex)
+    for pulse, share in zip(stretch.pulses, driven, strict=True):
+        begin = pulse.first + 1 - stretch.begin
         room = max(0, len(added) - begin)
-        added[begin : begin + len(share)] += share[:room, mode]
-    state = lfilter([1.0], [1.0, -np.exp(pole / sampling_rate_hz)], added)
-    return np.asarray(state[lead:], complex)
+        added[begin : begin + len(share)] += share[:room]
+    factor = np.exp(pole / sampling_rate_hz)
+    return np.asarray(lfilter([1.0], [1.0, -factor], added, zi=[factor * carried])[0], complex)
+
+
+def _pushed(modes: PlaneModes, plane: Plane, pulse: Pulse) -> FloatArray:
+    """Each mode's deflection where a pulse acts, times its share of the force, (modes,)."""
+    at_hammer = modes.at(np.array([pulse.strike.x_m]))[0]
+    return np.asarray(at_hammer * pulse.strike.share(plane))

@@ -10,7 +10,15 @@ from shm.values import NAN, Hanger, Plane
 
 # Fractions of the length that no node of the first eight modes of a pinned or clamped bar meets.
 _SENSORS = (0.21, 0.37)
+_MORE_SENSORS = (0.29, 0.13, 0.45, 0.08, 0.33, 0.25)
 _HAMMER = 0.16
+
+
+def spread_places_m(hanger: Hanger, sensors: int) -> tuple[float, ...]:
+    """Places of 1 to 8 sensors within reach of the deck end."""
+    shares = (*_SENSORS, *_MORE_SENSORS)
+    _refuse_unless(1 <= sensors <= len(shares), f"1 to {len(shares)} sensors are possible")
+    return tuple(sorted(share * hanger.length_m for share in shares[:sensors]))
 
 
 @dataclass(frozen=True)

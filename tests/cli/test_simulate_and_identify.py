@@ -53,8 +53,29 @@ def test_the_document_can_be_written_to_a_file_beside_the_table(
 ) -> None:
     out = tmp_path / "t.modes.json"
     ended = shm("identify", recording, "--hanger-file", hanger_file, "--out", out)
-    assert "frequency (Hz)" in ended.out
+    assert "frequency, Hz" in ended.out
     assert load_modes(out)[0].hanger == 3
+
+
+def test_a_page_and_figures_let_a_person_check_the_modes(
+    shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path
+) -> None:
+    page, figures = tmp_path / "sheet.html", tmp_path / "figures"
+    ask = ("--hanger-file", hanger_file, "--cross-check", "frf", "--html", page)
+    ended = shm("identify", recording, *ask, "--figures", figures, "--json")
+    assert ended.code == 0, ended.err
+    (test,) = ended.document["tests"]
+    checks = {check["name"]: check["verdict"] for check in test["quality"]}
+    assert checks["cross-check"] == checks["noise"] == "good"
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    drawn = {path.stem.rpartition("-")[2] for path in figures.glob("*.png")}
+    assert drawn >= {"time_history", "hits", "response", "stabilisation", "shapes", "quality"}
+
+
+def test_a_page_shows_one_test_only(shm: Shm, recording: Path, tmp_path: Path) -> None:
+    ended = shm("identify", recording, recording, "--html", tmp_path / "sheet.html")
+    assert ended.code == 2
+    assert "--together" in ended.err
 
 
 def test_the_same_seed_simulates_the_same_files(

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from shm.identify import IdentifyOptions, identify
-from shm.identify.frf import END_LEVEL, AveragedResponse, HitRecord, averaged_response
-from shm.identify.hits import find_pulses
+from shm.identify.measuring.frf import (
+    END_LEVEL,
+    AveragedResponse,
+    HitRecord,
+    Window,
+    averaged_response,
+)
+from shm.identify.measuring.hits import find_pulses
 from shm.values import FrequencyResponse, Recording, ResponsePoint
 from tests.identify.signals import Planted, Sensor, recording
 
@@ -94,6 +100,24 @@ def test_the_window_adds_just_the_damping_that_its_time_constant_says() -> None:
     told = IdentifyOptions(2.0, 60.0, window_time_constant_s=tau)
     (mode,) = identify([response], told, test_id="t").test.modes
     assert mode.damping_ratio == pytest.approx(0.001, rel=0.05)
+
+
+@pytest.mark.parametrize("estimator", ["h1", "h2", "hv"])
+def test_the_window_shifts_the_accelerance_alike_in_every_estimator(estimator: str) -> None:
+    """An exponential window of time constant tau turns H(s) into H(s + 1/tau) (closed form)."""
+    slow = Planted(12.0, 0.002, (1.0,))
+    record = _record((slow,), hits=1, seconds=20.0)
+    force = record.channels[0].values
+    signals = np.array([channel.values for channel in record.accelerations])
+    hits = [HitRecord(force, signals, pulse) for pulse in find_pulses(force, RATE_HZ)]
+    window = Window(20, 19 * 1024, 2.0)
+    average = averaged_response(hits, RATE_HZ, 60.0, estimator, window)
+    s = 2j * np.pi * average.frequency_hz + 1 / 2.0
+    omega = 2 * np.pi * slow.frequency_hz
+    expected = s**2 / (s**2 + 2 * slow.damping_ratio * omega * s + omega**2)
+    band = (average.frequency_hz > 5) & (average.frequency_hz < 30)
+    error = np.abs(average.accelerance[0] - expected)[band]
+    assert np.max(error) < 0.02 * np.max(np.abs(expected))
 
 
 def test_hits_of_different_length_are_cut_to_the_shortest() -> None:

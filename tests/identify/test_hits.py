@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import firwin, lfilter
 
-from shm.identify.hits import find_pulses
+from shm.identify.measuring.hits import find_pulses
 from shm.values import FloatArray
 from tests.identify.signals import force_signal, half_sine
 

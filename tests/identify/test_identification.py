@@ -108,6 +108,26 @@ def test_everything_dropped_is_counted_with_a_reason(identified: Identification)
     assert len(identified.hits) == 5
 
 
+def test_each_mode_knows_how_hard_it_rang(identified: Identification) -> None:
+    """A hit of about 5 N s on modal masses of about 130 kg: metres a second squared."""
+    assert all(0.1 < mode.acceleration_m_s2 < 50 for mode in identified.test.modes)
+
+
+def test_what_the_modes_make_of_the_response_follows_it(identified: Identification) -> None:
+    response, fit = identified.frequency_response, identified.fit
+    band = (response.frequency_hz > 3) & (response.frequency_hz < 89)
+    left = np.linalg.norm((response.accelerance - fit)[:, band])
+    assert left < 0.2 * np.linalg.norm(response.accelerance[:, band])
+
+
+def test_a_second_identifier_is_asked_and_compared() -> None:
+    record = recording(hanger_modes(), noise=0.01, seconds=4.0)
+    result = identify([record], replace(OPTIONS, cross_check="ssi"), test_id="t")
+    (check,) = [entry for entry in result.quality if entry.name == "cross-check"]
+    assert check.verdict == "good"
+    assert check.value == 0.0
+
+
 def test_amplitude_is_the_hit_level_over_the_reference_level() -> None:
     options = replace(OPTIONS, reference_force_n=1000.0)
     result = identify([recording(hanger_modes(), noise=0.01)], options, test_id="t")
@@ -164,12 +184,12 @@ def test_few_hits_are_noted() -> None:
     assert any("three hits" in note for note in result.notes)
 
 
-def test_a_recording_of_noise_is_not_identifiable_and_says_what_was_dropped() -> None:
+def test_a_recording_of_noise_is_not_identifiable_and_says_why() -> None:
     rng = np.random.default_rng(5)
     record = recording([Planted(6.0, 0.9, (0.0, 0.0))], BIAXIAL)
     noise = [replace(c, values=rng.standard_normal(len(c.values))) for c in record.accelerations]
     record = replace(record, channels=(record.channels[0], *noise))
-    with pytest.raises(NotIdentifiable, match="not stable") as caught:
+    with pytest.raises(NotIdentifiable, match="than the noise") as caught:
         identify([record], OPTIONS, test_id="t")
     assert caught.value.file == "test.csv"
     assert caught.value.remedy

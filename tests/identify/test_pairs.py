@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.pairs import with_both_planes
+from shm.identify.placing.pairs import blurred, with_both_planes
 from shm.values import ResponsePoint
 
 BIAXIAL = (ResponsePoint("acc_1", "transverse", 2.0), ResponsePoint("acc_2", "longitudinal", 2.0))
@@ -17,33 +17,31 @@ def mode(frequency_hz: float, transverse: float, longitudinal: float) -> FoundMo
     return FoundMode(frequency_hz, 0.001, 0.002, 0.0001, shape, np.full(2, 0.01))
 
 
-def test_an_unresolved_pair_stands_in_both_planes_with_half_its_bandwidth() -> None:
-    found, planes, notes = with_both_planes([mode(10.0, 1.0, 0.9)], ["transverse"], BIAXIAL)
+def test_an_unresolved_pair_stands_in_both_planes_with_a_tenth_of_its_bandwidth() -> None:
+    found, planes = with_both_planes([mode(10.0, 1.0, 0.9)], ["transverse"], BIAXIAL)
     assert planes == ["transverse", "longitudinal"]
-    assert [each.frequency_hz for each in found] == [10.0, 10.0]
-    assert found[0].frequency_sd_hz == pytest.approx(np.hypot(0.001, 0.02))
-    assert len(notes) == 1
+    assert found[0] is found[1]
+    assert blurred(found[0]).frequency_sd_hz == pytest.approx(np.hypot(0.001, 0.004))
 
 
 def test_a_mode_in_one_plane_is_left_alone() -> None:
     modes = [mode(10.0, 1.0, 0.1)]
-    assert with_both_planes(modes, ["transverse"], BIAXIAL) == (modes, ["transverse"], ())
+    assert with_both_planes(modes, ["transverse"], BIAXIAL) == (modes, ["transverse"])
 
 
 def test_a_resolved_pair_in_skewed_directions_is_left_alone() -> None:
     modes = [mode(10.0, 1.0, 0.6), mode(10.05, -0.6, 1.0)]
     planes = ["transverse", "longitudinal"]
-    assert with_both_planes(modes, planes, BIAXIAL) == (modes, planes, ())
+    assert with_both_planes(modes, planes, BIAXIAL) == (modes, planes)
 
 
 def test_nothing_is_split_where_only_one_plane_is_measured() -> None:
     modes = [mode(10.0, 1.0, 0.9)]
     single = (ResponsePoint("acc_1", "transverse"), ResponsePoint("acc_2", None))
-    assert with_both_planes(modes, ["transverse"], single) == (modes, ["transverse"], ())
+    assert with_both_planes(modes, ["transverse"], single) == (modes, ["transverse"])
 
 
-def test_an_unknown_standard_deviation_becomes_half_the_bandwidth() -> None:
+def test_an_unknown_standard_deviation_becomes_a_tenth_of_the_bandwidth() -> None:
     shape = np.array([1.0, 1.0])
     unknown = FoundMode(10.0, np.nan, 0.002, np.nan, shape, np.full(2, np.nan))
-    found, _, _ = with_both_planes([unknown], ["transverse"], BIAXIAL)
-    assert found[0].frequency_sd_hz == pytest.approx(0.02)
+    assert blurred(unknown).frequency_sd_hz == pytest.approx(0.004)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.planes import planes_of, shape_points
+from shm.identify.placing.planes import planes_of, shape_points
 from shm.values import NAN
 from tests.identify.signals import BIAXIAL, Sensor, points
 

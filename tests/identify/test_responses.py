@@ -105,7 +105,7 @@ def test_a_point_with_unknown_lines_in_the_band_is_dropped_and_said_so() -> None
 
 def test_low_coherence_is_refused_and_high_is_not() -> None:
     assert len(_identified([_response(index, 0.0, 0.98) for index in range(3)]).test.modes) == 3
-    with pytest.raises(NotIdentifiable, match="coherence below"):
+    with pytest.raises(NotIdentifiable, match="the force explains 30% of the response"):
         _identified([_response(index, 0.0, 0.3) for index in range(3)])
 
 

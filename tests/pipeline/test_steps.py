@@ -47,8 +47,8 @@ class Logger:
         self.time: datetime | None = NOW
         self.asked: dict[str, Any] = {}
 
-    def read(self, path: Path) -> Recording:
-        return Recording(path.name, (), 512.0, self.hanger, self.time)
+    def read_test(self, path: Path) -> tuple[Recording, ...]:
+        return (Recording(path.name, (), 512.0, self.hanger, self.time),)
 
     def identify(self, records: Any, options: Any, *, test_id: str, hanger: Hanger) -> Any:
         self.asked = {"options": options, "hanger": hanger.id, "source": records[0].source}
@@ -67,7 +67,7 @@ class Logger:
 @pytest.fixture
 def logger(monkeypatch: pytest.MonkeyPatch) -> Logger:
     logger = Logger()
-    monkeypatch.setattr(steps, "read", logger.read)
+    monkeypatch.setattr(steps, "read_test", logger.read_test)
     monkeypatch.setattr(steps, "identify", logger.identify)
     return logger
 

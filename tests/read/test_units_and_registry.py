@@ -24,6 +24,14 @@ from shm.read.universal_marks import number_nodes, sign
         ("mm/s²", "acceleration", 1e-3),
         ("g", "acceleration", 9.80665),
         ("mg", "acceleration", 9.80665e-3),
+        ("µg", "acceleration", 9.80665e-6),
+        ("μm/s²", "acceleration", 1e-6),
+        ("um/s^2", "acceleration", 1e-6),
+        ("cm/s2", "acceleration", 1e-2),
+        ("m s^-2", "acceleration", 1.0),
+        ("daN", "force", 10.0),
+        ("kgf", "force", 9.80665),
+        ("Newtons", "force", 1.0),
     ],
 )
 def test_a_unit_is_known_in_all_its_spellings(text: str, quantity: str, si: float) -> None:
@@ -44,6 +52,7 @@ def test_any_other_unit_is_unknown(text: str) -> None:
         ("m/s2", "N", 1.0),
         ("g", "kN", 9.80665e-3),
         ("(m/s2)/N", "", 1.0),
+        ("(m/s²)(N)", "", 1.0),
         ("g/N", "", 9.80665),
         ("mm", "N", None),
         ("N", "m/s2", None),
@@ -66,19 +75,22 @@ def test_no_two_formats_claim_one_name_or_suffix() -> None:
     assert ".toml" not in suffixes
 
 
-def test_csv_and_universal_files_are_registered() -> None:
-    assert {known.name for known in FORMATS} >= {"CSV", "UFF"}
+def test_all_formats_of_owners_are_registered() -> None:
+    suffixes = {suffix for known in FORMATS for suffix in known.suffixes}
+    assert suffixes >= {".csv", ".uff", ".h5", ".hdf5", ".mat", ".tdms", ".npz", ".npy", ".txt"}
 
 
 def test_the_public_names_are_these() -> None:
     assert sorted(shm.read.__all__) == [
-        "FORMATS", "Format", "Peek", "PeekChannel", "peek", "read", "sidecar_path", "write",
+        "FORMATS", "Format", "Peek", "PeekChannel", "bundle", "holds_test", "peek", "peek_test",
+        "read", "read_test", "sidecar_path", "write",
     ]  # fmt: skip
 
 
 def test_the_sidecar_stands_beside_the_file_whether_there_or_not() -> None:
     assert sidecar_path(Path("spool/h3.2026.csv")) == Path("spool/h3.2026.toml")
     assert sidecar_path(Path("h3.uff")) == Path("h3.toml")
+    assert sidecar_path(Path("h3.2026.txt.gz")) == Path("h3.2026.toml")
 
 
 def test_a_peek_says_si_where_the_name_alone_says_what_is_measured(tmp_path: Path) -> None:

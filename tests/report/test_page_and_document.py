@@ -5,40 +5,14 @@ from __future__ import annotations
 import json as standard_json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from itertools import pairwise
 
 import pytest
 
 from shm import documents
-from shm.report import HangerReport, html, json
-
-VOID = {"meta", "br", "hr", "img", "link", "input"}
-
-
-class Outline(HTMLParser):
-    """Checks that tags nest and keeps their attributes and the visible words."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if not {"style", "script"} & set(self.open):
-            self.words.append(data)
+from shm.report import HangerReport, html, json, text
+from shm.values import QualityCheck
+from tests.report.outline import Outline
 
 
 @pytest.fixture(scope="module")
@@ -133,3 +107,20 @@ def test_unknown_numbers_become_null_in_the_document(bare: HangerReport) -> None
     assert document["selection"] is None
     assert document["posterior"]["r_hat"] is None
     assert document["test"]["temperature_c"] is None
+
+
+def test_the_quality_of_the_latest_test_stands_in_page_text_document_and_advice(
+    bare: HangerReport,
+) -> None:
+    check = QualityCheck("clipping", "warning", 0.99, 0.95, "", "acc_1 clips", "Lower the gain.")
+    judged = replace(bare, quality=(check,))
+    parsed = Outline()
+    parsed.feed(html(judged))
+    told = " ".join(" ".join(parsed.words).split())
+    for page in (told, " ".join(text(judged).split())):
+        assert "clipping ! warning 0.99 0.95 acc_1 clips Lower the gain." in page
+        assert "Mend what the quality of the latest test warns of: clipping." in page
+    assert ("tr", {"class": "warning"}) in parsed.tags
+    document = standard_json.loads(documents.dump(json(judged)))
+    assert document["quality"][0]["name"] == "clipping"
+    assert document["quality"][0]["verdict"] == "warning"

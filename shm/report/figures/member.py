@@ -1,22 +1,53 @@
-"""What a figure of the report declares about itself."""
+"""What a figure declares about itself, and what it is once drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from matplotlib.figure import Figure
 
-from shm.report.content import HangerReport
+from shm.report.figures.render import png, svg
+
+Data = TypeVar("Data")
 
 
 @dataclass(frozen=True)
-class Member:
-    """A figure: `draw` gives None where the report lacks its data; `caption` explains what is
+class Member(Generic[Data]):
+    """A figure: `draw` gives None where `Data` lacks what it shows; `caption` explains what is
     seen, `alt` says what a blind reader needs."""
 
     name: str
     title: str
-    draw: Callable[[HangerReport], Figure | None]
-    caption: Callable[[HangerReport], str]
-    alt: Callable[[HangerReport], str]
+    draw: Callable[[Data], Figure | None]
+    caption: Callable[[Data], str]
+    alt: Callable[[Data], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Illustration:
+    """A drawn figure with the words that go with it."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    figure: Figure
+
+    def svg(self) -> str:
+        """An `<svg>` element whose ids are its own and whose colours follow the page."""
+        return svg(self.figure, self.name, self.title, self.alt)
+
+    def png(self, dots_per_inch: int = 150) -> bytes:
+        """The picture on white."""
+        return png(self.figure, dots_per_inch)
+
+
+def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ...]:
+    """Every figure that `data` holds enough for, in the order of `members`."""
+    return tuple(
+        Illustration(member.name, member.title, member.caption(data), member.alt(data), figure)
+        for member in members
+        if (figure := member.draw(data)) is not None
+    )

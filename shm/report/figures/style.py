@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 
 from shm.values import Plane
@@ -15,6 +18,7 @@ ORANGE = "#d55e00"
 GREEN = "#009e73"
 PURPLE = "#9b4f96"
 RED = "#b00020"
+QUIET = "#565f70"
 # Okabe and Ito (2008), darkened where small marks need it; names are the page's CSS variables.
 PALETTE = {
     "ink": INK,
@@ -24,17 +28,26 @@ PALETTE = {
     "green": GREEN,
     "purple": PURPLE,
     "red": RED,
+    "quiet": QUIET,
 }
 PLANE_COLOURS: dict[Plane, str] = {"transverse": BLUE, "longitudinal": ORANGE}
 PLANE_MARKERS: dict[Plane, str] = {"transverse": "o", "longitudinal": "s"}
 
-_WIDTH_INCHES = 7.4
+WIDTH_INCHES = 7.4
 _SMALL = 9.0
+TINY = 7.5
+"""Size of letters where many panels share a figure, in points."""
 
 
 def new_figure(height_inches: float = 3.4) -> Figure:
     """An empty figure of the page's width, with no pyplot behind it."""
-    return Figure(figsize=(_WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
+    return Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
+
+
+def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
+    """Panels one below the other over one horizontal axis, with these shares of the height."""
+    panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)
+    return list(panels[:, 0])
 
 
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
@@ -63,3 +76,24 @@ def legend_above(axes: Axes, columns: int = 4) -> Legend:
         handlelength=1.6,
         columnspacing=1.4,
     )
+
+
+def legend_of_figure(figure: FigureBase, axes: Sequence[Axes], columns: int = 4) -> None:
+    """One legend over the whole figure for all `axes`, each name once; none where nothing has."""
+    named: dict[str, Artist] = {}
+    for each in axes:
+        handles, names = each.get_legend_handles_labels()
+        named = {**dict(zip(names, handles, strict=True)), **named}
+    if named:
+        figure.legend(
+            list(named.values()),
+            list(named),
+            loc="outside upper left",
+            ncols=columns,
+            fontsize=TINY + 1,
+            labelcolor=INK,
+            frameon=False,
+            borderaxespad=0.2,
+            handlelength=2.0,
+            columnspacing=1.4,
+        )

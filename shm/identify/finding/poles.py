@@ -1,0 +1,97 @@
+"""Poles of state-space models, and how real their shapes are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.identify.contract import Dropped
+from shm.identify.options import IdentifyOptions
+from shm.values import ComplexArray, FloatArray
+
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class PoleSet:
+    """The oscillating poles of one model order.
+
+    `frequency_hz`, `damping_ratio` (poles,); `shapes` (channels, poles), complex, unscaled. A
+    pair of conjugate poles counts once. `dropped` counts the order's other poles.
+    """
+
+    order: int
+    frequency_hz: FloatArray
+    damping_ratio: FloatArray
+    shapes: ComplexArray
+    dropped: tuple[Dropped, ...] = ()
+
+    def chosen(self, keep: BoolArray) -> PoleSet:
+        """The poles where `keep` (poles,) is true."""
+        return PoleSet(
+            self.order,
+            self.frequency_hz[keep],
+            self.damping_ratio[keep],
+            self.shapes[:, keep],
+            self.dropped,
+        )
+
+
+def poles_of(state: FloatArray, output: FloatArray, sampling_rate_hz: float) -> PoleSet:
+    """The poles above the real axis of x[k+1] = state x[k], y = output x."""
+    values, vectors = np.linalg.eig(state)
+    above = values.imag > 0
+    real = len(values) - 2 * int(np.sum(above))
+    rates = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
+    return PoleSet(
+        order=len(state),
+        frequency_hz=np.abs(rates) / (2 * np.pi),
+        damping_ratio=-rates.real / np.abs(rates),
+        shapes=output @ vectors[:, above],
+        dropped=(Dropped("poles", real, "do not oscillate"),),
+    )
+
+
+def in_band(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
+    """Which poles lie in the band, (poles,)."""
+    return np.asarray(
+        (poles.frequency_hz >= options.band_low_hz) & (poles.frequency_hz <= options.band_high_hz)
+    )
+
+
+def plausibly_damped(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
+    """Which poles decay, and no faster than a hanger's mode, (poles,)."""
+    return np.asarray((poles.damping_ratio > 0) & (poles.damping_ratio < options.max_damping_ratio))
+
+
+def collinearity(shape: ComplexArray) -> float:
+    """Modal phase collinearity of a complex shape (channels,): 1 where all phases agree.
+
+    Pappa, Elliott and Schenk (1993), eq. 3 to 7, without the removal of the mean.
+    """
+    real, imaginary = shape.real, shape.imag
+    xx, yy, xy = real @ real, imaginary @ imaginary, real @ imaginary
+    total = xx + yy
+    return float(((xx - yy) ** 2 + 4 * xy**2) / total**2) if total > 0 else 0.0
+
+
+def real_shape(shape: ComplexArray) -> FloatArray:
+    """`shape` (channels,) turned to be as real as it can, its largest value 1."""
+    turned = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
+    return np.asarray(turned / turned[np.argmax(np.abs(turned))])
+
+
+def aligned(shape: FloatArray, reference: FloatArray) -> FloatArray:
+    """`shape` (channels,) scaled to fit `reference` best, by least squares."""
+    return np.asarray(shape * (shape @ reference) / (shape @ shape))
+
+
+def median_shape(shapes: Sequence[ComplexArray]) -> FloatArray:
+    """Median over complex shapes (channels,) made real, its largest value 1."""
+    real = [real_shape(shape) for shape in shapes]
+    middle = np.median([aligned(shape, real[-1]) for shape in real], axis=0)
+    return np.asarray(middle / middle[np.argmax(np.abs(middle))])

@@ -1,0 +1,24 @@
+"""The identifiers by name; a new one is one file and one line here."""
+
+from __future__ import annotations
+
+from shm.errors import UsageError
+from shm.identify.contract import Identifier
+from shm.identify.finding.response_fit import common_denominator_fit
+from shm.identify.finding.ssi import summed_hankel_ssi
+from shm.identify.finding.ssi_input import summed_hankel_ssi_with_input
+
+IDENTIFIERS: dict[str, Identifier] = {
+    "ssi": summed_hankel_ssi,
+    "ssi-input": summed_hankel_ssi_with_input,
+    "frf": common_denominator_fit,
+}
+
+
+def identifier(name: str) -> Identifier:
+    """The identifier of that name; raises UsageError for an unknown one."""
+    if name not in IDENTIFIERS:
+        raise UsageError(
+            f"unknown identifier {name!r}.", remedy=f"Known: {', '.join(IDENTIFIERS)}."
+        )
+    return IDENTIFIERS[name]

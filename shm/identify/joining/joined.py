@@ -1,0 +1,163 @@
+"""The findings of several set-ups of one test as one finding over all points."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
+from shm.identify.finding.jackknife import FREQUENCY_FLOOR
+from shm.identify.joining.matching import Seen, matched
+from shm.identify.joining.pooling import pooled
+from shm.identify.joining.products import Shapes, hammer_roves, joined_shapes, of_hits, of_shapes
+from shm.identify.joining.ringing import levels, ringing
+from shm.identify.options import IdentifyOptions
+from shm.values import NAN, FloatArray, ResponsePoint
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """The modes of a test over `points`; `apart` are the same modes as each set-up has them."""
+
+    points: tuple[ResponsePoint, ...]
+    finding: Finding
+    apart: tuple[tuple[FoundMode, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+def joined(
+    measurements: Sequence[Measurement], findings: Sequence[Finding], options: IdentifyOptions
+) -> Joined:
+    """The modes of all set-ups over all points; those of a single one as they are.
+
+    Frequency and damping are pooled. A mode that one set-up alone has seen is kept if three hits
+    or more prove it there. Without a force, whatever is not seen by all set-ups is dropped: its
+    shape is not known at all points. Raises BadInput where set-ups cannot be joined.
+    """
+    if len(measurements) == 1:
+        return _single(measurements[0], findings[0])
+    groups = matched(measurements, [finding.modes for finding in findings])
+    kept, lost = _sorted_out(groups, len(measurements), bool(measurements[0].driven))
+    dropped = _summed([d for finding in findings for d in finding.dropped]) + lost
+    poles = _all_poles([finding.poles for finding in findings])
+    if not kept:
+        return Joined(measurements[0].points, Finding((), dropped, poles), ((),) * len(findings))
+    pools = [_pool(group, options.frequency_allowance) for group in kept]
+    apart = tuple(_as_seen(kept, pools, number) for number in range(len(measurements)))
+    points, modes = _over_all_points(measurements, pools, apart)
+    return Joined(points, Finding(modes, dropped, poles), apart, (_note(measurements),))
+
+
+def _single(measurement: Measurement, found: Finding) -> Joined:
+    modes = found.modes
+    if measurement.driven and modes:
+        level_m_s2 = levels([ringing(measurement, modes)])
+        modes = tuple(
+            replace(mode, acceleration_m_s2=float(level))
+            for mode, level in zip(modes, level_m_s2, strict=True)
+        )
+    return Joined(measurement.points, replace(found, modes=modes), (modes,))
+
+
+def _over_all_points(
+    measurements: Sequence[Measurement],
+    pools: Sequence[FoundMode],
+    apart: Sequence[Sequence[FoundMode]],
+) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
+    """The pooled modes with their shapes over all points."""
+    if measurements[0].driven:
+        rings = [ringing(m, modes) for m, modes in zip(measurements, apart, strict=True)]
+        products = [of_hits(ring) for ring in rings]
+        level_m_s2 = levels(rings)
+    else:
+        products = [of_shapes(modes) for modes in apart]
+        level_m_s2 = np.full(len(pools), NAN)
+    shapes = joined_shapes(measurements, products)
+    return shapes.points, _modes(pools, shapes, level_m_s2)
+
+
+def _note(measurements: Sequence[Measurement]) -> str:
+    count = len(measurements)
+    if not measurements[0].driven:
+        return f"{count} set-ups are joined by the sensors that they share"
+    if hammer_roves(measurements):
+        return f"{count} set-ups are joined; by reciprocity, shapes stand at the hammer's places"
+    return f"{count} set-ups are joined by the force of their hits"
+
+
+def _sorted_out(
+    groups: Sequence[list[Seen]], set_ups: int, hammered: bool
+) -> tuple[list[list[Seen]], tuple[Dropped, ...]]:
+    kept, lost = [], []
+    for group in groups:
+        reason = _doubt(group, set_ups, hammered)
+        if reason:
+            lost.append(Dropped(f"mode at {group[0].mode.frequency_hz:.4g} Hz", 1, reason))
+        else:
+            kept.append(group)
+    return kept, tuple(lost)
+
+
+def _doubt(group: Sequence[Seen], set_ups: int, hammered: bool) -> str:
+    """Why a mode is not kept; empty where it is."""
+    if not hammered and len(group) < set_ups:
+        return "not seen in all set-ups, so its shape is not known at all points"
+    if len(group) == 1 and math.isnan(group[0].mode.damping_sd):
+        return "seen in one set-up only, with fewer than three hits"
+    return ""
+
+
+def _pool(group: Sequence[Seen], allowance: float) -> FoundMode:
+    """The mode with pooled frequency and damping, still without a shape."""
+    modes = [seen.mode for seen in group]
+    damping_sds = np.array([mode.damping_sd for mode in modes])
+    # Without a standard deviation of its damping, that of a mode's frequency is but a floor.
+    own = np.array([mode.frequency_sd_hz for mode in modes])
+    frequency, frequency_sd = pooled(
+        np.array([mode.frequency_hz for mode in modes]), np.where(np.isnan(damping_sds), NAN, own)
+    )
+    damping, damping_sd = pooled(np.array([mode.damping_ratio for mode in modes]), damping_sds)
+    if math.isnan(frequency_sd):
+        frequency_sd = FREQUENCY_FLOOR * frequency
+    sd = math.hypot(frequency_sd, allowance * frequency)
+    nothing = np.empty(0)
+    return FoundMode(frequency, sd, damping, damping_sd, nothing, nothing)
+
+
+def _as_seen(
+    groups: Sequence[list[Seen]], pools: Sequence[FoundMode], number: int
+) -> tuple[FoundMode, ...]:
+    """Each mode as the set-up of this number has it, or as all have where it did not see it."""
+    return tuple(
+        next((seen.mode for seen in group if seen.set_up == number), pool)
+        for group, pool in zip(groups, pools, strict=True)
+    )
+
+
+def _modes(
+    pools: Sequence[FoundMode], shapes: Shapes, level_m_s2: FloatArray
+) -> tuple[FoundMode, ...]:
+    return tuple(
+        replace(pool, shape=value, shape_sd=sd, acceleration_m_s2=float(level))
+        for pool, value, sd, level in zip(pools, shapes.values, shapes.sds, level_m_s2, strict=True)
+    )
+
+
+def _summed(dropped: Sequence[Dropped]) -> tuple[Dropped, ...]:
+    counts: Counter[tuple[str, str]] = Counter()
+    for entry in dropped:
+        counts[entry.what, entry.reason] += entry.count
+    return tuple(Dropped(what, count, reason) for (what, reason), count in counts.items())
+
+
+def _all_poles(parts: Sequence[Poles]) -> Poles:
+    return Poles(
+        np.concatenate([poles.order for poles in parts]),
+        np.concatenate([poles.frequency_hz for poles in parts]),
+        np.concatenate([poles.damping_ratio for poles in parts]),
+        np.concatenate([poles.stable for poles in parts]),
+    )

@@ -1,0 +1,126 @@
+"""How the found modes ring after each hit: amplitudes, and what the hammer's force makes of them.
+
+After a hit the acceleration at a point is the real part of a sum of c exp(s t) over the modes, with
+s the pole and t from the first sample of the hit's cut. What still rings of the hit before is
+taken off. What is left is made by the force, whose transform is F(s): it is
+phi phi_h s^2 F(s) / (i w_d), with phi the shape for unit modal mass at the point, phi_h at the
+hammer, and w_d the damped angular frequency (Ewins 2000, section 2.4). Force and accelerations
+have passed the same filter, so its gain cancels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.identify.contract import FoundMode, Hit, Measurement
+from shm.values import ComplexArray, FloatArray
+
+_RIDGE = 1e-12
+"""Keeps modes that the ring-down is too short to tell apart from growing against each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ringing:
+    """What each used hit says of each mode; both arrays are (hits, points, modes).
+
+    `amplitude_m_s2` is that of the mode's acceleration right after the hit. `residue` is the shape
+    at the point times that at the hammer, in 1/kg; NaN where the hit before it was not used, so
+    that what still rang is unknown.
+    """
+
+    amplitude_m_s2: FloatArray
+    residue: FloatArray
+
+
+def ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
+    """Amplitudes and residues of `modes` after the used hits of time records."""
+    poles = poles_of_modes(modes)
+    longest = max(signals.shape[1] for signals in measurement.driven)
+    waves = np.exp(np.outer(poles, np.arange(longest) / measurement.sampling_rate_hz))
+    starts = [
+        _at_start(driven, decay, waves)
+        for driven, decay in zip(measurement.driven, measurement.decays, strict=True)
+    ]
+    amplitude, residue = [], []
+    for index, (before, seconds) in enumerate(_before(measurement.hits)):
+        old = starts[before] * np.exp(poles * seconds) if before >= 0 else 0.0
+        driven, decay = measurement.driven[index], measurement.decays[index]
+        force = driven[0, : driven.shape[1] - decay.shape[1]]
+        struck = int(np.argmax(np.abs(force)))
+        transform = (force / measurement.sampling_rate_hz) @ (1 / waves[:, : len(force)]).T
+        made = (starts[index] - old) / transform
+        amplitude.append(np.abs(starts[index] * waves[:, struck]))
+        residue.append((made * 1j * poles.imag / poles**2).real)
+    return Ringing(np.array(amplitude), np.array(residue))
+
+
+def levels(rings: Sequence[Ringing]) -> FloatArray:
+    """Amplitude of each mode in m/s^2 right after a hit, (modes,).
+
+    Median over the hits at the point that moves most, in the set-up in which it does.
+    """
+    medians = [np.median(ring.amplitude_m_s2, axis=0).max(axis=0) for ring in rings]
+    return np.asarray(np.max(medians, axis=0))
+
+
+def poles_of_modes(modes: Sequence[FoundMode]) -> ComplexArray:
+    """The poles in rad/s above the real axis, (modes,)."""
+    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
+    damping = np.array([mode.damping_ratio for mode in modes])
+    return np.asarray(omega * (-damping + 1j * np.sqrt(1 - damping**2)))
+
+
+def _at_start(driven: FloatArray, decay: FloatArray, waves: ComplexArray) -> ComplexArray:
+    """Complex amplitudes (points, modes) of a ring-down, at the first sample of its cut."""
+    free = driven.shape[1] - decay.shape[1]
+    return _amplitudes(decay, waves) / waves[:, free]
+
+
+def _amplitudes(decay: FloatArray, waves: ComplexArray) -> ComplexArray:
+    """Least-squares c (points, modes) of decay = Re(c waves), `waves` (modes, >= samples)."""
+    samples = decay.shape[1]
+    used = waves[:, :samples]
+    right = np.hstack([decay @ used.real.T, -decay @ used.imag.T])
+    gram = _gram(waves[:, 1], samples)
+    scale = np.sqrt(np.diag(gram))
+    scaled = gram / np.outer(scale, scale) + _RIDGE * np.eye(len(gram))
+    solved = np.linalg.solve(scaled, (right / scale).T).T / scale
+    modes = len(waves)
+    return np.asarray(solved[:, :modes] + 1j * solved[:, modes:])
+
+
+def _gram(step: ComplexArray, samples: int) -> FloatArray:
+    """Inner products of the rows [Re waves; -Im waves], whose samples are powers of `step`."""
+    crossed = _geometric(np.outer(step, step.conj()), samples)
+    straight = _geometric(np.outer(step, step), samples)
+    same, other = (crossed + straight) / 2, (crossed - straight) / 2
+    return np.block([[same.real, other.imag], [-same.imag, other.real]])
+
+
+def _geometric(ratio: ComplexArray, terms: int) -> ComplexArray:
+    return np.asarray((1 - ratio**terms) / (1 - ratio))
+
+
+def _before(hits: Sequence[Hit]) -> list[tuple[int, float]]:
+    """Of each used hit, which used hit (by number) came before it in its record, and how long.
+
+    -1 where the hanger is taken to have been at rest: nothing came before, or no hit of all
+    follows a used one. NaN seconds where what still rang is not known.
+    """
+    result = []
+    number = -1
+    last: Hit | None = None
+    for hit in hits:
+        before = last if last and last.record == hit.record else None
+        if hit.used:
+            seconds = hit.start_s - before.start_s if before and before.used else math.nan
+            result.append((number, seconds) if before else (-1, 0.0))
+            number += 1
+        last = hit
+    if all(math.isnan(seconds) for _, seconds in result):
+        return [(-1, 0.0) for _ in result]
+    return result

@@ -1,0 +1,1 @@
+"""From records to measurements: hits, faults, windows, frequency responses, set-ups."""

@@ -1,0 +1,148 @@
+"""Finds the hammer hits in a force signal and judges each at the signal's own sampling rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from shm.values import FloatArray
+
+HIT_SIGMAS = 10.0
+DOUBLE_SIGMAS = 8.0
+LEAST_SHARE_OF_HARDEST = 0.1
+DOUBLE_SHARE = 0.02
+PULSE_SECONDS = 0.006
+GROUP_SECONDS = 0.5
+"""Peaks closer than this are one swing of the hammer, not two hits."""
+RINGING = 0.4
+"""An anti-aliasing filter rings around a pulse by about this share over the distance in samples."""
+RINGING_SAMPLES = 16
+"""So long before a hit its ringing may stand out of the noise: the ring-down before ends there."""
+_BASELINE_SECONDS = 0.25
+_BASELINE_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """One hit in samples: force above the noise from `start` up to `end`, quiet up to `stop`.
+
+    `stop` is shortly before the next hit begins, or where the record ends. `second_peak` is the
+    largest share of the peak force that strikes again before `stop`; 0 where none does.
+    """
+
+    start: int
+    peak: int
+    end: int
+    stop: int
+    peak_force_n: float
+    second_peak: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class HitRecord:
+    """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples)."""
+
+    force: FloatArray
+    accelerations: FloatArray
+    pulse: Pulse
+
+
+def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
+    """The hits in `force` (samples,), NaN where bad; empty where none stands out of the noise.
+
+    A hit stands 10 standard deviations of the noise and a tenth of the hardest hit above a slow
+    baseline, in the direction of the largest excursion: a hammer only pushes.
+    """
+    if np.sum(np.isfinite(force)) < _BASELINE_SAMPLES:
+        return []
+    push, noise = _push(force, sampling_rate_hz)
+    level = max(HIT_SIGMAS * noise, LEAST_SHARE_OF_HARDEST * float(push.max(initial=0.0)))
+    # A pulse may begin with the record: a zero on either side makes its edge a peak.
+    peaks = find_peaks(np.concatenate(([0.0], push, [0.0])), height=level)[0]
+    if not len(peaks):
+        return []
+    groups = _grouped((peaks - 1).tolist(), int(GROUP_SECONDS * sampling_rate_hz))
+    starts = [_start(push, group[0], noise) for group in groups]
+    margin = int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES
+    stops = [*(start - margin for start in starts[1:]), len(push)]
+    return [
+        _pulse(push, group, start, stop, noise, sampling_rate_hz)
+        for group, start, stop in zip(groups, starts, stops, strict=True)
+    ]
+
+
+def _push(force: FloatArray, sampling_rate_hz: float) -> tuple[FloatArray, float]:
+    """Force over its slow baseline, hits positive, 0 where it is NaN; and the noise in it."""
+    good = np.isfinite(force)
+    filled = np.where(good, force, np.median(force[good]))
+    above = filled - _baseline(filled, sampling_rate_hz)
+    low, high = np.quantile(above, [0.05, 0.95])
+    noise = max(1.4826 * float(np.median(np.abs(above))), float(high - low) / 3.29)
+    sign = 1.0 if above.max() >= -above.min() else -1.0
+    return np.where(good, sign * above, 0.0), noise
+
+
+def _baseline(signal: FloatArray, sampling_rate_hz: float) -> FloatArray:
+    """Medians of blocks joined by straight lines: follows drift, not hits."""
+    block = max(_BASELINE_SAMPLES, int(_BASELINE_SECONDS * sampling_rate_hz))
+    blocks = max(2, len(signal) // block)
+    parts = np.array_split(signal, blocks)
+    levels = np.array([np.median(part) for part in parts])
+    # Half a block before the first middle and after the last, the lines are carried on.
+    ends = (levels[0] - (levels[1] - levels[0]) / 2, levels[-1] + (levels[-1] - levels[-2]) / 2)
+    knots = np.concatenate(([0.0], np.arange(blocks) + 0.5, [blocks])) * len(signal) / blocks
+    return np.asarray(np.interp(np.arange(len(signal)), knots, [ends[0], *levels, ends[1]]))
+
+
+def _grouped(peaks: list[int], distance: int) -> list[list[int]]:
+    groups: list[list[int]] = []
+    for peak in peaks:
+        if groups and peak - groups[-1][-1] < distance:
+            groups[-1].append(peak)
+        else:
+            groups.append([peak])
+    return groups
+
+
+def _start(push: FloatArray, peak: int, noise: float) -> int:
+    """The first sample of the rise to `peak`."""
+    quiet = np.flatnonzero(push[:peak] < _quiet(push[peak], noise))
+    return int(quiet[-1]) + 1 if len(quiet) else 0
+
+
+def _quiet(peak_force: float, noise: float) -> float:
+    return max(DOUBLE_SHARE * peak_force, 5 * noise)
+
+
+def _pulse(
+    push: FloatArray, peaks: list[int], start: int, stop: int, noise: float, rate: float
+) -> Pulse:
+    # Peaks this near to the first are its ringing, or it is theirs.
+    near = [peak for peak in peaks if peak - peaks[0] <= _same_pulse(rate)]
+    first = max(near, key=lambda peak: float(push[peak]))
+    falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
+    end = first + int(falls[0]) if len(falls) else stop
+    hardest = float(max(push[peak] for peak in peaks))
+    second = _second_peak(push[first:stop], end - first, noise, rate)
+    return Pulse(start, first, end, stop, hardest, second)
+
+
+def _same_pulse(sampling_rate_hz: float) -> int:
+    return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
+
+
+def _second_peak(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> float:
+    """Share of the first peak's force (`after[0]`) that strikes again; 0 where nothing does.
+
+    Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse is
+    long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more near the pulse,
+    where the ringing of an anti-aliasing filter is still above 2 %.
+    """
+    skip = max(1, fall, int(np.ceil(PULSE_SECONDS * sampling_rate_hz)))
+    later = after[skip:]
+    ringing = RINGING / np.arange(skip, len(after))
+    limit = np.maximum(after[0] * np.maximum(DOUBLE_SHARE, ringing), DOUBLE_SIGMAS * noise)
+    struck = later > limit
+    return float(np.max(later[struck], initial=0.0) / after[0])

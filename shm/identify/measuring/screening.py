@@ -1,0 +1,184 @@
+"""Which hits and channels of a set-up can be used: nothing bad gets through to an identifier.
+
+A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
+force does not: the ring-down is as good as any, the check `clipping` tells what it spoils.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.errors import NotIdentifiable
+from shm.identify.contract import Dropped, Hit
+from shm.identify.measuring.bandlimit import least_seconds
+from shm.identify.measuring.hits import HitRecord, find_pulses
+from shm.identify.measuring.outliers import disagreement, outliers
+from shm.identify.measuring.signal_faults import (
+    CUT_OFF,
+    DOUBLE_HIT,
+    NOT_A_NUMBER,
+    OUTLIER,
+    faults_of_channels,
+)
+from shm.identify.options import IdentifyOptions
+from shm.values import Channel, Recording
+
+_LEAST_SHARE_OF_LONGEST = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """All `hits`; the ring-downs of the `used` ones, with the accelerations of `rows` alone."""
+
+    hits: tuple[Hit, ...]
+    used: tuple[HitRecord, ...]
+    rows: tuple[int, ...]
+    dropped: tuple[Dropped, ...]
+
+
+def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
+    """What can be used of records of one set-up; raises NotIdentifiable where nothing can."""
+    hits, ring_downs = _hits(records)
+    channels, rate = records[0].accelerations, records[0].sampling_rate_hz
+    faults = faults_of_channels(channels, ring_downs, rate, options)
+    rows, dropped = _usable_channels(channels, faults)
+    ring_downs = _with_rows(ring_downs, rows)
+    reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
+    reasons = _with_outliers(ring_downs, reasons, rate, options)
+    used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
+    if not used or not rows:
+        raise _nothing_left(records, reasons, dropped)
+    judged = [
+        replace(hit, used=not reason, reason=reason)
+        for hit, reason in zip(hits, reasons, strict=True)
+    ]
+    return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
+
+
+def _hits(records: Sequence[Recording]) -> tuple[list[Hit], list[HitRecord]]:
+    """Each hit of each record, as a row of the result and with its signals."""
+    hits, ring_downs = [], []
+    for index, record in enumerate(records):
+        force = record.force
+        assert force is not None
+        accelerations = np.array([channel.values for channel in record.accelerations])
+        for pulse in find_pulses(force.values, record.sampling_rate_hz):
+            start_s = pulse.start / record.sampling_rate_hz
+            hits.append(Hit(index, pulse.start, start_s, pulse.peak_force_n))
+            ring_downs.append(HitRecord(force.values, accelerations, pulse))
+    return hits, ring_downs
+
+
+def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
+    """The hits with some rows of their accelerations; hits of one record share them as before."""
+    kept = {
+        id(r.accelerations): r.accelerations
+        if len(rows) == len(r.accelerations)
+        else r.accelerations[rows]
+        for r in {id(r.accelerations): r for r in ring_downs}.values()
+    }
+    return [replace(r, accelerations=kept[id(r.accelerations)]) for r in ring_downs]
+
+
+def _usable_channels(
+    channels: Sequence[Channel], faults: Sequence[Sequence[str]]
+) -> tuple[list[int], tuple[Dropped, ...]]:
+    """Rows of the accelerations that can be used, and those that cannot with the reason.
+
+    Where every channel has a fault after most hits, those stay that have one hit without.
+    """
+    columns = [[each[row] for each in faults] for row in range(len(channels))]
+    some_plane = any(channel.plane for channel in channels)
+    reasons = [
+        _channel_fault(c, f, 0.5, some_plane) for c, f in zip(channels, columns, strict=True)
+    ]
+    if all(reasons):
+        reasons = [
+            _channel_fault(c, f, 1.0, some_plane) for c, f in zip(channels, columns, strict=True)
+        ]
+    dropped = [
+        Dropped(f"channel {c.name}", 1, r) for c, r in zip(channels, reasons, strict=True) if r
+    ]
+    return [row for row, reason in enumerate(reasons) if not reason], tuple(dropped)
+
+
+def _channel_fault(channel: Channel, faults: Sequence[str], most: float, some_plane: bool) -> str:
+    """Why a channel cannot be used; `faults` one a hit, of which it may have a share of `most`."""
+    found = [fault for fault in faults if fault]
+    if faults and (len(found) > most * len(faults) or len(found) == len(faults)):
+        (fault, count), *_ = Counter(found).most_common(1)
+        return fault if count == len(faults) else f"{fault}, after {count} of {len(faults)} hits"
+    if some_plane and channel.plane is None:
+        return "its plane is not stated, those of others are"
+    return ""
+
+
+def _reasons(
+    ring_downs: Sequence[HitRecord],
+    faults: Sequence[Sequence[str]],
+    sampling_rate_hz: float,
+    options: IdentifyOptions,
+) -> list[str]:
+    """Why each hit cannot be used; empty where it can."""
+    longest = max((r.pulse.stop - r.pulse.end for r in ring_downs), default=0)
+    least = max(
+        least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
+    )
+    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
+
+
+def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float) -> str:
+    pulse = ring_down.pulse
+    if not np.all(np.isfinite(ring_down.force[pulse.start : pulse.stop])):
+        return NOT_A_NUMBER
+    if NOT_A_NUMBER in faults:
+        return NOT_A_NUMBER
+    if pulse.second_peak > 0:
+        return DOUBLE_HIT
+    if pulse.stop - pulse.end < least_samples:
+        return CUT_OFF
+    return next((fault for fault in faults if fault), "")
+
+
+def _with_outliers(
+    ring_downs: Sequence[HitRecord],
+    reasons: Sequence[str],
+    sampling_rate_hz: float,
+    options: IdentifyOptions,
+) -> list[str]:
+    """The reasons, with one for each hit that is sound by itself and disagrees with the others."""
+    sound = [index for index, reason in enumerate(reasons) if not reason]
+    band_hz = options.band_low_hz, options.band_high_hz
+    apart = disagreement([ring_downs[index] for index in sound], sampling_rate_hz, band_hz)
+    odd = {index for index, is_odd in zip(sound, outliers(apart), strict=True) if is_odd}
+    return [OUTLIER if index in odd else reason for index, reason in enumerate(reasons)]
+
+
+def _counted(reasons: Sequence[str]) -> tuple[Dropped, ...]:
+    counts = Counter(reason for reason in reasons if reason)
+    return tuple(Dropped("hits", count, reason) for reason, count in counts.items())
+
+
+def _nothing_left(
+    records: Sequence[Recording], reasons: Sequence[str], dropped: Sequence[Dropped]
+) -> NotIdentifiable:
+    if not reasons:
+        what = "no hammer hit stands out of the force signal."
+    elif dropped and len(dropped) == len(records[0].accelerations):
+        what = f"no acceleration channel can be used: {_listed(dropped)}."
+    else:
+        what = f"no hit can be used: {_listed(_counted(reasons))}."
+    return NotIdentifiable(
+        what,
+        file=records[0].source,
+        channel=records[0].force.name if records[0].force and not reasons else "",
+        remedy="Check hammer and sensor cables, and measure again.",
+    )
+
+
+def _listed(dropped: Sequence[Dropped]) -> str:
+    return ", ".join(f"{entry.count} {entry.what} ({entry.reason})" for entry in dropped)

@@ -1,0 +1,159 @@
+"""How well the modes of one plane fit tensioned beams, with orders left out and modes set aside.
+
+Every mode takes the order nearest to it, at the cost of its misfit in frequency and shape, or is
+set aside at a fixed cost; of two modes at one order the better one takes it. Each order passed over
+costs, too. Costs are twice negative log likelihoods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.identify.placing.pattern import Pattern, nearest_orders, tensioned_beam_pattern
+from shm.values import FloatArray, IntArray
+
+Costs: TypeAlias = NDArray[np.float32]
+
+ASIDE_COST = 12.0
+"""Of a mode that is none of the plane: a good fit is believed up to three tolerances."""
+_MOST_SHAPE_COST = 9.0
+_ORDINARY = 0.012
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a hanger strays from the pattern: its frequencies (fraction) and shapes (radians).
+
+    A shape is a direction in the space of its points; it strays by an angle.
+    """
+
+    frequency: float
+    shape: float
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneModes:
+    """Modes of one plane by rising frequency.
+
+    `frequency_hz` (modes,); `position` (points,) as x/L, empty where unknown; `shapes`
+    (modes, points); `shape_sd` and `doubt` (modes,), empty for none: standard deviation of the
+    shape's values, and the cost of taking each for a mode of the hanger at all.
+    """
+
+    frequency_hz: FloatArray
+    position: FloatArray = field(default_factory=lambda: np.empty(0))
+    shapes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    shape_sd: FloatArray = field(default_factory=lambda: np.empty(0))
+    doubt: FloatArray = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The beams that are tried.
+
+    `tensions` (tensions,) are indices of the pattern; `levels` (levels,) logs of the first pinned
+    frequency in Hz; `missing_cost` is that of an order without a mode; `shift` (orders,), empty for
+    none, is the log of the frequencies beside those of a uniform beam.
+    """
+
+    tensions: IntArray
+    levels: FloatArray
+    missing_cost: float
+    shift: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Costs over a grid: `total` (levels, tensions, springs), `orders` from 0 and `costs` a mode.
+
+    `orders` and `costs` have shape (modes, levels, tensions, springs).
+    """
+
+    total: Costs
+    orders: Sequence[IntArray]
+    costs: Sequence[Costs]
+
+    def numbers(self, level: int, tension: int) -> list[int | None]:
+        """Orders from 1 at the best springs of one beam; None for a mode set aside."""
+        spring = int(np.argmin(self.total[level, tension]))
+        found: list[int | None] = []
+        best: dict[int, tuple[float, int]] = {}
+        for mode, (orders, costs) in enumerate(zip(self.orders, self.costs, strict=True)):
+            order, cost = int(orders[level, tension, spring]), float(costs[level, tension, spring])
+            found.append(None)
+            if cost < best.get(order, (ASIDE_COST, 0))[0]:
+                best[order] = (cost, mode)
+        for order, (_, mode) in best.items():
+            found[mode] = order + 1
+        return found
+
+
+def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
+    """The modes of a plane against every beam of the grid."""
+    nearest = nearest_orders(grid.shift)
+    order_table = nearest.order[:, grid.tensions]
+    residual_table = nearest.residual[:, grid.tensions]
+    shape_costs = _shape_costs(plane, grid, tolerance)
+    doubt = plane.doubt if len(plane.doubt) else np.zeros(len(plane.frequency_hz))
+    spread = 2 * np.log(tolerance.frequency / _ORDINARY)
+    orders, costs = [], []
+    for mode, log_frequency in enumerate(np.log(plane.frequency_hz)):
+        entry = nearest.entry(log_frequency - grid.levels)
+        order = order_table[entry]
+        cost = (residual_table[entry] / tolerance.frequency) ** 2 + (spread + doubt[mode])
+        if shape_costs is not None:
+            cost += _of_orders(shape_costs[mode], order)
+        orders.append(order)
+        costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
+    return Alignment(_total(orders, costs, grid), orders, costs)
+
+
+def _of_orders(table: Costs, order: IntArray) -> Costs:
+    """Entries of `table` (tensions, springs, orders) for `order` (levels, tensions, springs)."""
+    tension, spring = np.ogrid[: table.shape[0], : table.shape[1]]
+    return np.asarray(table[tension, spring, order])
+
+
+def _total(orders: Sequence[IntArray], costs: Sequence[Costs], grid: Grid) -> Costs:
+    """Sum over the modes; the better of two at one order counts, the other is set aside."""
+    springs = tensioned_beam_pattern().log_frequency.shape[1]
+    shape = (len(grid.levels), len(grid.tensions), springs)
+    total = np.zeros(shape, np.float32)
+    last, last_cost = np.full(shape, -1, np.int16), np.zeros(shape, np.float32)
+    for order, cost in zip(orders, costs, strict=True):
+        aside = cost >= ASIDE_COST
+        rival = (order == last) & ~aside
+        better = np.minimum(cost, last_cost)
+        gap = np.float32(grid.missing_cost) * (order - last - 1)
+        total += np.where(
+            aside, ASIDE_COST, np.where(rival, ASIDE_COST + better - last_cost, cost + gap)
+        )
+        last_cost = np.where(aside, last_cost, np.where(rival, better, cost))
+        last = np.where(aside, last, order)
+    return total
+
+
+def _shape_costs(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Costs | None:
+    """Misfit of the shapes, (modes, tensions, springs, orders); None where they say nothing."""
+    if len(plane.position) < 2:
+        return None
+    likeness = _likeness(tensioned_beam_pattern(), plane, grid)
+    sd = plane.shape_sd if len(plane.shape_sd) else np.zeros(len(plane.shapes))
+    norm = np.sum(plane.shapes**2, axis=1) + np.finfo(float).tiny
+    variance = tolerance.shape**2 + np.nan_to_num(sd) ** 2 / norm
+    cost = (1 - likeness) / variance[:, np.newaxis, np.newaxis, np.newaxis]
+    return np.asarray(np.minimum(cost, _MOST_SHAPE_COST), np.float32)
+
+
+def _likeness(pattern: Pattern, plane: PlaneModes, grid: Grid) -> FloatArray:
+    """Modal assurance criterion of every mode and order, (modes, tensions, springs, orders)."""
+    expected = pattern.shapes(plane.position, grid.tensions)
+    norms = np.einsum("tsop,tsop->tso", expected, expected)
+    norm = np.sum(plane.shapes**2, axis=1)[:, np.newaxis, np.newaxis, np.newaxis]
+    product = np.tensordot(plane.shapes, expected, axes=(1, 3)) ** 2
+    return np.asarray(product / (norms * norm + np.finfo(float).tiny))

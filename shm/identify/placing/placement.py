@@ -1,0 +1,186 @@
+"""Gives found modes their plane and order, and sets aside what is no mode of the hanger."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.identify.contract import FoundMode, Tone
+from shm.identify.placing.alignment import PlaneModes
+from shm.identify.placing.foreign import doubts, explained, without_tones
+from shm.identify.placing.order import Expected, Numbering, assign_orders
+from shm.identify.placing.pairs import blurred, pair_note, with_both_planes
+from shm.identify.placing.planes import CLOSE, planes_of, principal_angle, shape_points
+from shm.values import NAN, PLANES, ForeignMode, Hanger, Mode, Plane, ResponsePoint, ShapePoint
+
+_NOTED_DEGREES = 5.0
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The hanger's modes plane by plane, what is not one of them, and what was decided."""
+
+    modes: tuple[Mode, ...]
+    set_aside: tuple[ForeignMode, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A found mode in the plane where it may have an order."""
+
+    found: FoundMode
+    plane: Plane
+    shape: tuple[ShapePoint, ...]
+    doubt: float
+
+
+def placed(
+    found: Sequence[FoundMode],
+    points: Sequence[ResponsePoint],
+    hanger: Hanger | None,
+    tones: Sequence[Tone] = (),
+) -> Placement:
+    """The modes with plane, order and shape by position; `tones` are known to be there anyway."""
+    found, steady = without_tones(found, tones)
+    turned_rad = principal_angle(found, points)
+    groups = _candidates(found, points, turned_rad)
+    length_m = hanger.length_m if hanger else NAN
+    numbering = assign_orders(
+        [_plane_modes(group, length_m) for group in groups],
+        Expected.of(hanger) if hanger else None,
+    )
+    ordered = [
+        (candidate, order)
+        for group, orders in zip(groups, numbering.orders, strict=True)
+        for candidate, order in zip(group, orders, strict=True)
+        if order is not None
+    ]
+    kept = [candidate.found for candidate, _ in ordered]
+    pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
+    aside = [mode for mode in found if not any(each is mode for each in kept)]
+    return Placement(
+        modes=tuple(_mode(candidate, order, pairs) for candidate, order in ordered),
+        set_aside=_by_frequency([*steady, *(explained(mode, found, kept) for mode in aside)]),
+        notes=(
+            *_plane_notes(points, turned_rad),
+            *(pair_note(mode) for mode in pairs),
+            *_near_notes(groups, points),
+            *_basis_notes(numbering, hanger, points),
+            *_order_notes(ordered),
+        ),
+    )
+
+
+def _candidates(
+    found: Sequence[FoundMode], points: Sequence[ResponsePoint], turned_rad: float
+) -> list[list[_Candidate]]:
+    """Those of each plane; a mode that may be one of each is in both."""
+    doubt = {id(mode): value for mode, value in zip(found, doubts(found), strict=True)}
+    planes = planes_of(found, points, turned_rad)
+    pairs = list(zip(*with_both_planes(found, planes, points, turned_rad), strict=True))
+    return [
+        [
+            _Candidate(mode, plane, shape_points(mode, plane, points), float(doubt[id(mode)]))
+            for mode, own in pairs
+            if own == plane
+        ]
+        for plane in PLANES
+    ]
+
+
+def _plane_modes(group: Sequence[_Candidate], length_m: float) -> PlaneModes:
+    shapes = [candidate.shape for candidate in group]
+    position = np.array([point.x_m for point in shapes[0]] if shapes else [])
+    values, sd = (
+        np.array([[getattr(point, name) for point in shape] for shape in shapes]).reshape(
+            len(group), len(position)
+        )
+        for name in ("value", "sd")
+    )
+    seen = np.all(np.isfinite(values), axis=0) & bool(np.isfinite(length_m))
+    return PlaneModes(
+        frequency_hz=np.array([candidate.found.frequency_hz for candidate in group]),
+        position=position[seen] / length_m,
+        shapes=values[:, seen],
+        shape_sd=np.nan_to_num(sd[:, seen]).max(axis=1, initial=0.0),
+        doubt=np.array([candidate.doubt for candidate in group]),
+    )
+
+
+def _mode(candidate: _Candidate, order: int, pairs: Sequence[FoundMode]) -> Mode:
+    found = candidate.found
+    if any(found is pair for pair in pairs):
+        found = blurred(found)
+    return Mode(
+        plane=candidate.plane,
+        order=order,
+        frequency_hz=found.frequency_hz,
+        frequency_sd_hz=found.frequency_sd_hz,
+        damping_ratio=found.damping_ratio,
+        damping_sd=found.damping_sd,
+        shape=candidate.shape,
+        acceleration_m_s2=found.acceleration_m_s2,
+    )
+
+
+def _by_frequency(modes: Sequence[ForeignMode]) -> tuple[ForeignMode, ...]:
+    return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
+
+
+def _plane_notes(points: Sequence[ResponsePoint], turned_rad: float) -> list[str]:
+    if not any(point.plane for point in points):
+        return ["no channel states its plane: all modes are taken as transverse"]
+    degrees = abs(math.degrees(turned_rad))
+    if degrees >= _NOTED_DEGREES:
+        return [
+            f"the hanger's planes are turned by {degrees:.0f} degrees from the sensors' axes: each "
+            "mode has the name of the nearer plane"
+        ]
+    return []
+
+
+def _near_notes(
+    groups: Sequence[Sequence[_Candidate]], points: Sequence[ResponsePoint]
+) -> list[str]:
+    if all(any(point.plane == plane for point in points) for plane in PLANES):
+        return []
+    notes = []
+    for plane, group in zip(PLANES, groups, strict=True):
+        frequencies = np.array([candidate.found.frequency_hz for candidate in group])
+        pairs = int(np.sum(frequencies[1:] / frequencies[:-1] - 1 < CLOSE))
+        if pairs:
+            notes.append(
+                f"{pairs} pairs of {plane} modes are too near for one plane, so one of each is set "
+                "aside, which may be the wrong one: measure with a biaxial accelerometer"
+            )
+    return notes
+
+
+def _basis_notes(
+    numbering: Numbering, hanger: Hanger | None, points: Sequence[ResponsePoint]
+) -> list[str]:
+    if numbering.basis == "counting":
+        return ["the modes fit no tensioned beam: they are counted, so orders may be off"]
+    if hanger and numbering.basis == "pattern":
+        return [
+            "the modes do not fit the hanger's description: they are numbered by the pattern of "
+            "their frequencies alone"
+        ]
+    if hanger and not any(np.isfinite(point.x_m) for point in points):
+        return ["no sensor states its position: shapes do not help to number the modes"]
+    return []
+
+
+def _order_notes(ordered: Sequence[tuple[_Candidate, int]]) -> list[str]:
+    notes = []
+    for plane in PLANES:
+        numbers = [order for candidate, order in ordered if candidate.plane == plane]
+        missing = sorted(set(range(1, max(numbers, default=0))) - set(numbers))
+        if missing:
+            listed = ", ".join(str(order) for order in missing)
+            notes.append(f"{plane} order {listed} was not found; the others keep their numbers")
+    return notes

@@ -1,0 +1,79 @@
+"""Check `coherence`: does the force explain the response where the hanger responds?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shm.identify.contract import Measurement
+from shm.identify.quality.inspection import Inspection
+from shm.values import NAN, BoolArray, FloatArray, QualityCheck
+
+_WARNING = 0.8
+_LINES_AROUND = 2
+_STRONGEST = 0.05
+
+
+def check(inspection: Inspection) -> QualityCheck | None:
+    """Median coherence at the found modes, or before they are known where a point moves most.
+
+    Measured frequency responses below `min_coherence` are refused: what is not explained by the
+    force is not a response to it. After hits that are known in time it is a warning: free decays do
+    not need the force, and coherence also falls where a hit came before the last had rung down.
+    """
+    measured = [m for m in inspection.measurements if m.frequency_response is not None]
+    if not measured:
+        return None
+    values = [_coherence(m, inspection) for m in measured]
+    known = np.concatenate([v for v in values if v is not None] or [np.empty(0)])
+    known = known[np.isfinite(known)]
+    refuse = not inspection.records
+    limit = max(_WARNING, inspection.options.min_coherence)
+    if not len(known):
+        return QualityCheck(
+            "coherence", "unknown", NAN, limit, "", _unknown(refuse),
+            "Export the coherence with the responses." if refuse else "Hit at least three times.",
+        )  # fmt: skip
+    value = float(np.median(known))
+    found = f"the force explains {value:.0%} of the response where the hanger responds"
+    if value >= limit:
+        return QualityCheck("coherence", "good", value, limit, "", found)
+    if refuse and value < inspection.options.min_coherence:
+        return QualityCheck(
+            "coherence", "refused", value, inspection.options.min_coherence, "",
+            f"{found}: the rest is noise",
+            "Measure again: check hammer and sensor cables, hit the same point squarely and let "
+            "each hit ring down.",
+        )  # fmt: skip
+    return QualityCheck(
+        "coherence", "warning", value, limit, "", found,
+        "Hit the same point in the same direction, and let each hit ring down before the next.",
+    )  # fmt: skip
+
+
+def _unknown(responses: bool) -> str:
+    return "the responses come without it" if responses else "one hit has none"
+
+
+def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray | None:
+    """Coherence of all points at the lines that count, flat."""
+    response = measurement.frequency_response
+    if response is None or response.coherence is None:
+        return None
+    options, finding = inspection.options, inspection.finding
+    frequency = response.frequency_hz
+    in_band = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
+    if not np.any(in_band):
+        return None
+    if finding is not None and finding.modes:
+        near = _near(frequency, np.array([mode.frequency_hz for mode in finding.modes]))
+        return np.asarray(response.coherence[:, near & in_band].ravel())
+    size = np.where(in_band, np.nan_to_num(np.abs(response.accelerance)), 0.0)
+    least = np.quantile(size[:, in_band], 1 - _STRONGEST, axis=1, keepdims=True)
+    return np.asarray(response.coherence[(size >= least) & in_band])
+
+
+def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:
+    """The lines at modes and two to either side."""
+    spacing = float(frequency_hz[1] - frequency_hz[0])
+    distance = np.abs(frequency_hz[:, None] - modes_hz)
+    return np.asarray(np.any(distance <= (_LINES_AROUND + 0.5) * spacing, axis=1))

@@ -1,0 +1,101 @@
+"""Check `noise`: how far a ring-down stands above what is there without a hit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shm.identify.contract import Measurement
+from shm.identify.measuring.hits import RINGING_SAMPLES
+from shm.identify.quality.inspection import Inspection
+from shm.identify.quality.wording import hits_of
+from shm.values import NAN, FloatArray, QualityCheck, Recording
+
+_REFUSED_DB = 6.0
+"""Two half-second stretches of one noise differ by 1.2 dB (a band of 100 Hz has 50 independent
+values in each); the best of 16 channels, over the quietest of several stretches, by up to 4."""
+_WARNING_DB = 20.0
+_STILL_DB = 1.0
+_MOST_DB = 200.0
+"""More than any converter resolves: what stands higher is computed, not measured."""
+_STRETCH_S = 0.5
+_LEAST_STRETCH_S = 0.1
+_LEAST_SAMPLES = 32
+
+
+def check(inspection: Inspection) -> QualityCheck | None:
+    """Vibration right after a hit over the quietest of what is recorded without one, in dB.
+
+    In the band, of the channel that shows it best, median over the used hits. Quiet is the time
+    before the first hit of a record or the end of a ring-down.
+    """
+    if not hits_of(inspection):
+        return None
+    results = [_ratios_db(m, inspection) for m in inspection.measurements]
+    value = max((db for db, _ in results), default=NAN)
+    seen_before = any(before for _, before in results)
+    found = f"the ring-down begins {value:.0f} dB above the noise"
+    if value >= _WARNING_DB:
+        return QualityCheck("noise", "good", value, _WARNING_DB, "dB", found)
+    if value < (_REFUSED_DB if seen_before else _STILL_DB):
+        return QualityCheck(
+            "noise", "refused", value, _REFUSED_DB, "dB",
+            "after a hit the sensors show hardly more than the noise before it",
+            "Check that the sensors are fixed to this hanger, connected and set to the right "
+            "range; hit harder, and when no machine runs.",
+        )  # fmt: skip
+    if not seen_before:
+        return QualityCheck(
+            "noise", "unknown", NAN, _WARNING_DB, "dB",
+            "nothing is recorded before the hits, and they still ring at the end",
+            "Record half a second before the first hit.",
+        )  # fmt: skip
+    return QualityCheck(
+        "noise", "warning", value, _WARNING_DB, "dB", found,
+        "Hit harder, or measure when wind and traffic are low; fix loose sensors.",
+    )  # fmt: skip
+
+
+def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float, bool]:
+    """Signal to noise of a set-up's best channel, and whether a time before a hit was seen."""
+    after, quiet, before = [], [], False
+    by_record: dict[int, list[int]] = {}
+    for hit in measurement.hits:
+        by_record.setdefault(hit.record, []).append(hit.start)
+    used = {(hit.record, hit.start) for hit in measurement.hits if hit.used}
+    for number, starts in by_record.items():
+        record = inspection.records[number]
+        gap = RINGING_SAMPLES + int(0.01 * record.sampling_rate_hz)
+        ends = [*(start - gap for start in starts[1:]), record.samples]
+        for start, end in zip(starts, ends, strict=True):
+            half = start + (end - start) // 2
+            quiet.append(_power(record, half, end, inspection, last=True))
+            if (number, start) in used:
+                after.append(_power(record, start + gap, half, inspection))
+        lead = _power(record, 0, starts[0] - gap, inspection, last=True)
+        before = before or lead is not None
+        quiet.append(lead)
+    loud = [power for power in after if power is not None]
+    still = [power for power in quiet if power is not None]
+    if not loud or not still:
+        return NAN, before
+    signal = np.median(loud, axis=0)
+    noise = np.maximum(np.nanmin(still, axis=0), signal * 10 ** (-_MOST_DB / 10))
+    ratio = signal / np.maximum(noise, np.finfo(float).tiny)
+    return float(10 * np.log10(max(float(np.nanmax(ratio)), 1e-30))), before
+
+
+def _power(
+    record: Recording, first: int, stop: int, inspection: Inspection, *, last: bool = False
+) -> FloatArray | None:
+    """Mean square in the band of half a second, the first or the last of a stretch, (channels,)."""
+    rate, options = record.sampling_rate_hz, inspection.options
+    length = min(stop - first, int(_STRETCH_S * rate))
+    if length < max(_LEAST_STRETCH_S * rate, _LEAST_SAMPLES):
+        return None
+    begin = stop - length if last else first
+    cut = np.array([c.values[begin : begin + length] for c in record.accelerations])
+    window = np.hanning(length)
+    spectrum = np.fft.rfft((cut - cut.mean(axis=1, keepdims=True)) * window, axis=1)
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    lines = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
+    return np.asarray(np.sum(np.abs(spectrum[:, lines]) ** 2, axis=1) / np.sum(window**2) / length)

@@ -1,0 +1,203 @@
+"""Check `tones`: steady vibration of mains or machines, there whether the hammer hits or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft, rfftfreq
+from scipy.ndimage import maximum_filter1d, median_filter
+
+from shm.identify.contract import Hit, Measurement, Tone
+from shm.identify.options import IdentifyOptions
+from shm.identify.quality.inspection import Inspection
+from shm.identify.quality.stretches import Stretches, stretches
+from shm.values import BoolArray, ComplexArray, FloatArray, QualityCheck, Recording
+
+_PROMINENCE = 30.0
+"""Noise averaged over one channel reaches 14 times its median once in 10,000 lines."""
+_FLOOR_LINES = 201
+_FLOOR_WIDTHS = 12.0
+"""A stretch of T seconds smears a tone over 4 / T Hz. Where ring-downs are short, 201 lines hold
+nothing but the tone: then its floor is the median of three times that."""
+_STEADY = 0.6
+_SAME_BEFORE = 0.3
+_FAINTLY_STEADY = 0.3
+_SURELY_SAME_BEFORE = 0.15
+"""A mode next to a tone unsteadies it in the ring-downs, not before the first hit."""
+_MAY_BE_SAME_BEFORE = 0.75
+_STEADY_UNSEEN_BEFORE = 0.9
+_LOCKED_TO_HITS = 0.6
+"""Of three to five hits, the phases of a mode agree at one frequency near its own by chance."""
+_STEADY_IN_BAND = 0.3
+_MOST_CANDIDATES = 100
+_LEAST_TRANSFORM = 65536
+_MAINS_TOLERANCE = 0.004
+"""A grid's frequency moves by 0.2 Hz in 50 in a bad hour."""
+
+
+def tones(
+    measurements: Sequence[Measurement], records: Sequence[Recording], options: IdentifyOptions
+) -> tuple[Tone, ...]:
+    """The tones in time records, by rising frequency.
+
+    A tone keeps amplitude and phase through all ring-downs' later halves and has them before the
+    first hit. A mode, however lightly damped, gets a new phase with each hit and is not there
+    before the first. Where no quiet time before a hit is recorded, it must not go with the hits.
+    Narrow peaks within a named disturbance band need only half-steadiness. None are found in
+    frequency responses.
+    """
+    hits = [hit for measurement in measurements for hit in measurement.hits]
+    lists = [
+        _tones_of_record(record, [hit for hit in hits if hit.record == number], options)
+        for number, record in enumerate(records)
+    ]
+    return _in_most(lists, options)
+
+
+def check(inspection: Inspection) -> QualityCheck | None:
+    """How many tones lie in the band, and at which frequencies."""
+    if not inspection.records:
+        return None
+    found = tones(inspection.measurements, inspection.records, inspection.options)
+    if not found:
+        return QualityCheck("tones", "good", 0.0, 0.0, "", "no steady vibration in the band")
+    listed = ", ".join(f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in found)
+    return QualityCheck(
+        "tones", "warning", float(len(found)), 0.0, "", f"steady vibration at {listed}",
+        "Switch off machines near the hanger, run the logger from a battery, keep sensor cables "
+        "away from power cables; name known machines as disturbance bands.",
+    )  # fmt: skip
+
+
+def _tones_of_record(
+    record: Recording, hits: Sequence[Hit], options: IdentifyOptions
+) -> list[float]:
+    """Those of the accelerations, and those of the force between hits, where nothing rings."""
+    found = _steady(stretches(record, record.accelerations, hits, options), options)
+    if record.force is None or not hits:
+        return found
+    more = _steady(stretches(record, [record.force], hits, options), options)
+    return found + [f for f in more if all(abs(f / g - 1) > _MAINS_TOLERANCE / 2 for g in found)]
+
+
+def _steady(parts: Stretches, options: IdentifyOptions) -> list[float]:
+    """Frequencies of the tones in some channels, the strongest first."""
+    if not parts.later:
+        return []
+    apart_hz = 2 * parts.rate_hz / min(part.signals.shape[1] for part in parts.later)
+    found: list[float] = []
+    for frequency in _candidates(parts, options):
+        clear = all(abs(frequency - other) > apart_hz for other in found)
+        if clear and _is_tone(frequency, parts, options):
+            found.append(frequency)
+    return found
+
+
+def _candidates(parts: Stretches, options: IdentifyOptions) -> list[float]:
+    """Frequencies of narrow lines in the sum of all later halves, the strongest first."""
+    gated = np.zeros((len(parts.later[0].signals), parts.samples))
+    for part in parts.later:
+        gated[:, part.first : part.first + part.signals.shape[1]] = part.signals
+    # A quarter of a line off, a tone is still steady over the whole record.
+    length = next_fast_len(max(4 * parts.samples, _LEAST_TRANSFORM), real=True)
+    frequency = rfftfreq(length, 1 / parts.rate_hz)
+    lines = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
+    spectra = rfft(gated, n=length, axis=1)[:, lines]
+    power = np.abs(spectra) ** 2
+    floor = np.maximum(np.median(power, axis=1, keepdims=True), np.finfo(float).tiny)
+    power = np.sum(power / floor, axis=0)
+    shortest = min(part.signals.shape[1] for part in parts.later)
+    width = int(min(_FLOOR_WIDTHS * length / shortest, len(power))) | 1
+    floor = np.minimum(median_filter(power, _FLOOR_LINES), median_filter(power, width))
+    peaks = (power == maximum_filter1d(power, 9)) & (power > _PROMINENCE * floor)
+    places = np.flatnonzero(peaks & _may_be_there_before(spectra, length, lines, parts, options))
+    strongest = places[np.argsort(-power[places])][:_MOST_CANDIDATES]
+    tops = frequency[lines][strongest] + frequency[1] * _beside(power, strongest)
+    return [float(value) for value in tops]
+
+
+def _may_be_there_before(
+    spectra: ComplexArray, length: int, lines: BoolArray, parts: Stretches, options: IdentifyOptions
+) -> BoolArray:
+    """At which lines the time before the first hit does not rule a tone out, (lines,).
+
+    Ring-downs short and many make combs of hundreds of lines around each mode.
+    """
+    if parts.before is None:
+        return np.ones(spectra.shape[1], dtype=bool)
+    mean = spectra * 2 / sum(part.weight for part in parts.later)
+    before = rfft(parts.before.signals, n=length, axis=1)[:, lines] * 2 / parts.before.weight
+    change = np.sum(np.abs(before - mean) ** 2, axis=0)
+    there = change < _MAY_BE_SAME_BEFORE * np.sum(np.abs(mean) ** 2, axis=0)
+    frequency = rfftfreq(length, 1 / parts.rate_hz)[lines]
+    for _, low, high in options.disturbance_bands:
+        there |= (frequency >= low) & (frequency <= high)
+    return np.asarray(there)
+
+
+def _beside(power: FloatArray, places: NDArray[np.intp]) -> FloatArray:
+    """How far, in lines, the tops of peaks lie from their largest lines: by a parabola."""
+    inner = np.clip(places, 1, len(power) - 2)
+    left, top, right = (np.log(power[inner + step]) for step in (-1, 0, 1))
+    offset = 0.5 * (left - right) / np.minimum(left - 2 * top + right, -np.finfo(float).eps)
+    return np.asarray(np.where(inner == places, np.clip(offset, -0.5, 0.5), 0.0))
+
+
+def _is_tone(frequency_hz: float, parts: Stretches, options: IdentifyOptions) -> bool:
+    turns = frequency_hz / parts.rate_hz
+    amplitudes = np.array([part.amplitude(turns) for part in parts.later])
+    weights = np.array([part.weight for part in parts.later]) / sum(p.weight for p in parts.later)
+    steady = _steadiness(weights, amplitudes)
+    if any(low <= frequency_hz <= high for _, low, high in options.disturbance_bands):
+        return steady > _STEADY_IN_BAND
+    if parts.before is None:
+        apart = _locked(turns, weights, amplitudes, parts) < _LOCKED_TO_HITS
+        return steady > _STEADY_UNSEEN_BEFORE and apart
+    mean = weights @ amplitudes
+    change = float(np.sum(np.abs(parts.before.amplitude(turns) - mean) ** 2))
+    limit = _SAME_BEFORE if steady > _STEADY else _SURELY_SAME_BEFORE
+    return steady > _FAINTLY_STEADY and change < limit * float(np.sum(np.abs(mean) ** 2))
+
+
+def _steadiness(weights: FloatArray, amplitudes: ComplexArray) -> float:
+    """Power of the mean over the mean power of amplitudes (stretches, channels); 1: all equal."""
+    power = float(np.sum(np.abs(weights @ amplitudes) ** 2))
+    total = float(np.sum(weights @ np.abs(amplitudes) ** 2))
+    return power / max(total, np.finfo(float).tiny)
+
+
+def _locked(
+    turns_a_sample: float, weights: FloatArray, amplitudes: ComplexArray, parts: Stretches
+) -> float:
+    """Steadiness of the amplitudes referred to their hits and forces, 1 for a mode; 0: no hits."""
+    hits = np.array([part.hit for part in parts.later])
+    if not np.all(np.isfinite(hits)):
+        return 0.0
+    forces = np.array([part.force_n for part in parts.later])
+    turned = np.exp(2j * np.pi * turns_a_sample * hits) / forces
+    return _steadiness(weights, amplitudes * turned[:, np.newaxis])
+
+
+def _in_most(lists: Sequence[Sequence[float]], options: IdentifyOptions) -> tuple[Tone, ...]:
+    """One tone for each frequency that at least half of the records have."""
+    pooled = sorted(frequency for each in lists for frequency in each)
+    groups: list[list[float]] = []
+    for frequency in pooled:
+        if groups and frequency / groups[-1][-1] - 1 < _MAINS_TOLERANCE / 2:
+            groups[-1].append(frequency)
+        else:
+            groups.append([frequency])
+    common = [float(np.median(group)) for group in groups if 2 * len(group) >= len(lists)]
+    return tuple(Tone(frequency, _name(frequency, options)) for frequency in common)
+
+
+def _name(frequency_hz: float, options: IdentifyOptions) -> str:
+    for name, low, high in options.disturbance_bands:
+        if low <= frequency_hz <= high:
+            return name
+    order = round(frequency_hz / options.mains_hz)
+    if order >= 1 and abs(frequency_hz / (order * options.mains_hz) - 1) <= _MAINS_TOLERANCE:
+        return "mains" if order == 1 else f"mains, harmonic {order}"
+    return "a machine"

@@ -1,0 +1,139 @@
+"""Named arrays, as HDF5, MATLAB, TDMS and NumPy files hold them, before they are loaded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.read.header import CHANNEL_KEYS
+
+_MOST_COLUMNS = 32
+_MOST_TEXT = 1000  # characters; longer texts say nothing about a channel
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """One array of a file: its shape and numpy kind (i, u, f, c; U for text), not yet its values.
+
+    `load` gives the values in that shape; `attributes` are plain values by lower-case name.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    kind: str
+    item_bytes: int
+    load: Callable[[], NDArray[Any]]
+    attributes: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        return int(np.prod(self.shape, dtype=object))
+
+    @property
+    def is_series(self) -> bool:
+        """Whether it can be a channel: numbers in one row."""
+        return self.kind in "iufc" and len(self.shape) == 1 and self.size > 1
+
+    @property
+    def is_fact(self) -> bool:
+        """Whether it is a single number or a short text."""
+        return self.size <= _MOST_TEXT if self.kind == "U" else self.size == 1
+
+
+@dataclass(frozen=True, eq=False)
+class Arrays:
+    """All that a file holds: variables, facts about the whole, and names of what is left out."""
+
+    variables: tuple[Variable, ...]
+    attributes: Mapping[str, object]
+    left_out: tuple[str, ...] = ()
+
+
+def arranged(arrays: Arrays) -> Arrays:
+    """The same with single numbers and texts as attributes, and tables as single rows.
+
+    `acc_1_unit` becomes the attribute `unit` of `acc_1`, other facts those of the whole. The rows
+    or columns of a table DATA, whichever are longer, become DATA_1, DATA_2, ...
+    """
+    facts = {v.name: _fact(v) for v in arrays.variables if v.is_fact}
+    series = [part for v in arrays.variables if not v.is_fact for part in _parts(v)]
+    own = {v.name: own_facts(v.name, facts) for v in series}
+    taken = {f"{name}_{key}" for name, said in own.items() for key in said}
+    general = {name: value for name, value in facts.items() if name not in taken}
+    variables = (replace(v, attributes={**own[v.name], **v.attributes}) for v in series)
+    return Arrays(tuple(variables), {**general, **arrays.attributes}, arrays.left_out)
+
+
+def own_facts(name: str, facts: Mapping[str, object]) -> dict[str, object]:
+    """What facts such as acc_1_unit say about acc_1."""
+    return {key: facts[f"{name}_{key}"] for key in CHANNEL_KEYS if f"{name}_{key}" in facts}
+
+
+def plain(value: object) -> object:
+    """An attribute as text, number or time; None for anything else."""
+    if isinstance(value, np.ndarray):
+        return plain(value.ravel()[0]) if value.size == 1 else None
+    if isinstance(value, np.datetime64):
+        return str(value)
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    return value if isinstance(value, (str, bool, int, float, datetime)) else None
+
+
+def attributes_of(pairs: Iterable[tuple[str, object]]) -> dict[str, object]:
+    """Attributes that have a plain value, by lower-case name."""
+    found = {str(key).lower(): plain(value) for key, value in pairs}
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """Sorts acc_2 before acc_10."""
+    pieces = re.split(r"(\d+)", name.lower())
+    return [(1, int(p), "") if p.isdecimal() and p.isascii() else (0, 0, p) for p in pieces]
+
+
+def named_apart(paths: Sequence[tuple[str, ...]]) -> list[str]:
+    """The last part of each path where that is unique, else the path with slashes."""
+    last = [path[-1] for path in paths]
+    return [path[-1] if last.count(path[-1]) == 1 else "/".join(path) for path in paths]
+
+
+def _fact(variable: Variable) -> object:
+    values = variable.load()
+    if variable.kind == "U":
+        return "".join(str(text) for text in np.ravel(values)).strip()
+    return plain(values)
+
+
+def _parts(variable: Variable) -> list[Variable]:
+    """The variable itself in one row, or the rows of a table."""
+    lengths = [length for length in variable.shape if length != 1]
+    if variable.kind not in "iufc" or len(lengths) < 2:
+        shape = tuple(lengths) or (1,)
+        return [replace(variable, shape=shape, load=lambda: variable.load().reshape(shape))]
+    if len(variable.shape) != 2 or min(lengths) > _MOST_COLUMNS:
+        return [variable]
+    loaded = cache(variable.load)
+    lies = variable.shape[0] <= variable.shape[1]
+    return [
+        replace(
+            variable,
+            name=f"{variable.name}_{row + 1}",
+            shape=(max(lengths),),
+            load=_row(loaded, row, lies),
+        )
+        for row in range(min(lengths))
+    ]
+
+
+def _row(load: Callable[[], NDArray[Any]], row: int, lies: bool) -> Callable[[], NDArray[Any]]:
+    return lambda: load()[row] if lies else load()[:, row]

@@ -1,0 +1,64 @@
+"""A whole test: one file, or all files of an archive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from shm.errors import BadInput
+from shm.read.base import Peek
+from shm.read.bundles import each_member, entries_of_test, holds_test
+from shm.read.content import head_of
+from shm.read.registry import peek, read
+from shm.values import FrequencyResponse, Recording
+
+T = TypeVar("T")
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek)
+
+
+def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
+    """The files of one test: all of a .zip, in the order of their names, else the one file."""
+    if not holds_test(path):
+        return (read(path),)
+    head_of(path)
+    records = each_member(path, lambda file, name: replace(_named(read, file, name), source=name))
+    return tuple(_told(record, path) for record in records)
+
+
+def peek_test(path: Path) -> tuple[Peek, ...]:
+    """What the headers of each file of a test say; members not readable have that as problem."""
+    if not holds_test(path):
+        return (peek(path),)
+    head_of(path)
+    return tuple(_told(found, path) for found in each_member(path, _peek_member))
+
+
+def _peek_member(file: Path, name: str) -> Peek:
+    try:
+        return replace(_named(peek, file, name), source=name)
+    except BadInput as refusal:
+        return Peek(name, "not readable", (), 0, problems=(str(refusal),))
+
+
+def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
+    """What `verb` gives; its refusals name the member of the archive, not where it was unpacked."""
+    try:
+        return verb(file)
+    except BadInput as refusal:
+        inside = Path(name).with_name(Path(refusal.file or name).name)
+        raise BadInput(
+            refusal.message,
+            file=inside,
+            channel=refusal.channel,
+            line=refusal.line,
+            remedy=refusal.remedy,
+        ) from refusal
+
+
+def _told(found: Found, path: Path) -> Found:
+    """A member with what the sidecar of its archive says of the whole test."""
+    said = entries_of_test(path)
+    known = [key for key in ("hanger", "time", "temperature_c") if key in said.entries]
+    return replace(found, **{key: getattr(said, key) for key in known})

@@ -1,0 +1,125 @@
+"""What each hit left in its record: the pulse, its spectrum, the ring-down after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.identify import Hit
+from shm.report.sheet.channels import strongest_row
+from shm.report.sheet.content import TestSheet
+from shm.report.sheet.thinning import peak_places
+from shm.report.sheet.timeline import channel_of, located_hits
+from shm.values import NAN, BoolArray, FloatArray
+
+REACH_DB = -20.0
+_BEFORE_S, _AFTER_S = 0.006, 0.02
+_FILTER_SAMPLES = 16
+"""An anti-aliasing filter spreads a pulse over so many samples on either side."""
+_SECOND_STRIKE_S = 0.5
+_STRIKES = 0.05
+_TRANSFORM_S = 0.5
+_LEAD, _TAIL = 0.7, 3.0
+"""Room before and after a pulse in a figure, in widths of it."""
+_TINY = 1e-9
+_FADE_BINS = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Blow:
+    """One hit. `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins;
+    `spectrum_hz` and `spectrum_db` (lines,), relative to the spectrum's largest value;
+    `fade_s` and `fade_m_s2_n` (bins,): largest accelerations after the hit per peak force.
+    """
+
+    number: int
+    hit: Hit
+    time_s: FloatArray
+    force_n: FloatArray
+    spectrum_hz: FloatArray
+    spectrum_db: FloatArray
+    fade_s: FloatArray
+    fade_m_s2_n: FloatArray
+
+    @property
+    def near_s(self) -> tuple[float, float]:
+        """From a little before the pulse to a little after the last strike."""
+        struck = self.force_n > _STRIKES * np.nanmax(self.force_n)
+        peak = int(np.nanargmax(self.force_n))
+        width = _run(struck[peak:]) + _run(struck[peak::-1])
+        step_s = float(self.time_s[1] - self.time_s[0])
+        last_s = float(self.time_s[np.flatnonzero(struck)[-1]])
+        return -_LEAD * width * step_s, max(_TAIL * width * step_s, 1.1 * last_s)
+
+    @property
+    def reach_hz(self) -> float:
+        """Where the force first falls to a tenth of its largest; NaN where it never does."""
+        top = int(np.argmax(self.spectrum_db))
+        below = np.flatnonzero(self.spectrum_db[top:] < REACH_DB)
+        return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
+
+
+def blows(sheet: TestSheet) -> list[Blow]:
+    """Every hit whose record is at hand, in the order of the hits."""
+    row = strongest_row(sheet) if sheet.recordings else 0
+    found = [_blow(sheet, number, hit, row) for number, hit in located_hits(sheet)]
+    return [blow for blow in found if blow is not None]
+
+
+def _blow(sheet: TestSheet, number: int, hit: Hit, row: int) -> Blow | None:
+    record = sheet.recordings[hit.record]
+    force, motion = record.force, channel_of(record, row)
+    if force is None or motion is None:
+        return None
+    rate, stop = record.sampling_rate_hz, _stop(sheet, hit)
+    time_s, force_n = _pulse(force.values[:stop], hit, rate)
+    spectrum_hz, spectrum_db = _spectrum(force_n, rate)
+    fade_s, fade = _fade(motion.values[hit.start : stop], rate)
+    return Blow(
+        number, hit, time_s, force_n, spectrum_hz, spectrum_db, fade_s, fade / hit.peak_force_n
+    )
+
+
+def _run(struck: BoolArray) -> int:
+    """How many of the first samples are true."""
+    return len(struck) if np.all(struck) else int(np.argmin(struck))
+
+
+def _stop(sheet: TestSheet, hit: Hit) -> int:
+    """Shortly before the next hit of the same record begins, or where the record ends."""
+    record = sheet.recordings[hit.record]
+    margin = int(_BEFORE_S * record.sampling_rate_hz) + _FILTER_SAMPLES
+    later = [h.start for h in sheet.hits if h.record == hit.record and h.start > hit.start]
+    stop = min([each - margin for each in later], default=record.samples)
+    return max(stop, hit.start + 2)
+
+
+def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatArray]:
+    """The pulse free of its offset, long enough for a second strike to be in it."""
+    before = int(_BEFORE_S * rate) + _FILTER_SAMPLES
+    first = max(0, hit.start - before)
+    part = force[first : hit.start + int(_SECOND_STRIKE_S * rate)]
+    part = part - np.nanmedian(part)
+    if part[np.nanargmax(np.abs(part))] < 0:
+        part = -part
+    least = hit.start - first + int(_AFTER_S * rate) + _FILTER_SAMPLES
+    struck = np.flatnonzero(part > _STRIKES * np.nanmax(part))
+    last = max(least, int(1.1 * struck[-1])) if len(struck) else least
+    places = np.arange(min(last, len(part)))
+    return (first + places - hit.start) / rate, np.asarray(part[places])
+
+
+def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """NaN throughout, so that nothing is drawn, where samples of the pulse are missing."""
+    length = max(len(force_n), int(_TRANSFORM_S * rate))
+    size = np.abs(np.fft.rfft(force_n, n=length))
+    decibel = 20 * np.log10(np.maximum(size / max(float(size.max()), _TINY), _TINY))
+    return np.fft.rfftfreq(length, 1 / rate).astype(np.float64), np.asarray(decibel)
+
+
+def _fade(motion: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    known = motion[np.isfinite(motion)]
+    size = np.abs(motion - np.mean(known)) if len(known) else np.full(len(motion), np.nan)
+    places = peak_places(size, min(_FADE_BINS, len(size)))
+    return places / rate, size[places]

@@ -1,0 +1,28 @@
+"""The figures of one hammer test. A new one: a file with a `FIGURE`, and a line in `MEMBERS`."""
+
+from __future__ import annotations
+
+from shm.report.figures.member import Illustration, Member, drawn
+from shm.report.sheet.content import TestSheet
+from shm.report.sheet.figures.damping import FIGURE as DAMPING
+from shm.report.sheet.figures.hits import FIGURE as HITS
+from shm.report.sheet.figures.quality import FIGURE as QUALITY
+from shm.report.sheet.figures.response import FIGURE as RESPONSE
+from shm.report.sheet.figures.shapes import FIGURE as SHAPES
+from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
+from shm.report.sheet.figures.time_history import FIGURE as TIME_HISTORY
+
+MEMBERS: tuple[Member[TestSheet], ...] = (
+    QUALITY,
+    TIME_HISTORY,
+    HITS,
+    RESPONSE,
+    STABILISATION,
+    SHAPES,
+    DAMPING,
+)
+
+
+def test_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+    """Every figure of one hammer test that its records and modes allow, in reading order."""
+    return drawn(MEMBERS, sheet)

@@ -1,0 +1,112 @@
+"""The curve in which a test's modes are peaks: frequency response, or spectral density."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import welch
+
+from shm.report.sheet.content import TestSheet
+from shm.values import FloatArray, Mode, Recording, ResponsePoint
+
+_LEAST_SEGMENT_S = 20.0
+_SEGMENTS = 8
+_MARGIN = 0.06
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """`values` (points, lines), not negative, on `frequency_hz` (lines,)."""
+
+    points: tuple[ResponsePoint, ...]
+    frequency_hz: FloatArray
+    values: FloatArray
+    quantity: str
+
+    @property
+    def together(self) -> FloatArray:
+        """Root mean square over the points, (lines,)."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.values), axis=0)))
+
+
+def spectrum(sheet: TestSheet) -> Spectrum | None:
+    """The accelerance where somebody hit, else the power spectral density of the records."""
+    response = sheet.identification.frequency_response
+    if response is not None and response.points:
+        values = np.abs(response.accelerance)
+        return Spectrum(response.points, response.frequency_hz, values, "accelerance (m/s²/N)")
+    if response is None and sheet.recordings:
+        return _density(sheet.recordings)
+    return None
+
+
+def _density(records: Sequence[Recording]) -> Spectrum | None:
+    """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
+    first = records[0]
+    alike = [r for r in records if r.sampling_rate_hz == first.sampling_rate_hz]
+    alike = [r for r in alike if len(r.accelerations) == len(first.accelerations)]
+    length = min(record.samples for record in alike)
+    wanted = max(length // _SEGMENTS, int(_LEAST_SEGMENT_S * first.sampling_rate_hz))
+    if not first.accelerations or length < 2:
+        return None
+    estimates = [_welch(record, min(length, wanted)) for record in alike]
+    points = tuple(ResponsePoint(c.name, c.plane, c.x_m) for c in first.accelerations)
+    values = np.mean([values for _, values in estimates], axis=0)
+    return Spectrum(points, estimates[0][0], values, "spectral density ((m/s²)²/Hz)")
+
+
+def _welch(record: Recording, segment: int) -> tuple[FloatArray, FloatArray]:
+    signals = np.array([channel.values for channel in record.accelerations])
+    known = np.isfinite(signals)
+    # A gap counts as rest: it lowers the level a little and hides no peak.
+    rest = np.nan_to_num(signals - np.mean(signals, axis=1, where=known, keepdims=True))
+    frequency_hz, values = welch(rest, record.sampling_rate_hz, nperseg=segment, axis=1)
+    return frequency_hz, values
+
+
+def shown_range(sheet: TestSheet) -> tuple[float, float]:
+    """Lowest and highest frequency to draw, in Hz."""
+    low, high = searched_range(sheet)
+    return (0.0 if low < 0.15 * high else low - _MARGIN * (high - low), high * (1 + _MARGIN / 2))
+
+
+def searched_range(sheet: TestSheet) -> tuple[float, float]:
+    """The band in Hz; where it is not known, from the lowest to the highest that was found."""
+    if sheet.band_hz is not None:
+        return sheet.band_hz
+    found = [mode.frequency_hz for mode in sheet.modes]
+    found += [each.frequency_hz for each in sheet.identification.set_aside]
+    found += sheet.identification.poles.frequency_hz.tolist()
+    return (min(found), max(found)) if found else (0.0, math.inf)
+
+
+def telling_points(
+    points: Sequence[ResponsePoint], modes: Sequence[Mode], values: FloatArray, most: int
+) -> list[int]:
+    """Indices of at most `most` points that between them show the modes best, in their order.
+
+    `values` (points, modes) is how strongly each point shows each mode. Planes take turns.
+    """
+    share = values / np.maximum(np.max(values, axis=0, initial=0.0), np.finfo(float).tiny)
+    planes = list(dict.fromkeys(point.plane for point in points))
+    covered = np.zeros((len(planes), len(modes)))
+    chosen: list[int] = []
+    for turn in range(len(points)):
+        plane = turn % len(planes)
+        left = [i for i, p in enumerate(points) if p.plane == planes[plane] and i not in chosen]
+        if left and len(chosen) < most:
+            best = max(left, key=lambda i: float(np.sum(np.maximum(covered[plane], share[i]))))
+            covered[plane] = np.maximum(covered[plane], share[best])
+            chosen.append(best)
+    return sorted(chosen)
+
+
+def shown_points(sheet: TestSheet, found: Spectrum, most: int) -> list[int]:
+    """Indices of the points of `found` that are drawn."""
+    lines = np.searchsorted(found.frequency_hz, [mode.frequency_hz for mode in sheet.modes])
+    lines = np.minimum(lines, len(found.frequency_hz) - 1)
+    values = np.nan_to_num(found.values[:, lines])
+    return telling_points(found.points, sheet.modes, values, most)

@@ -1,0 +1,130 @@
+"""A hanger that wind moves: white noise on each mode, no hammer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import NotIdentifiable, UsageError
+from shm.identify import Identification, IdentifyOptions, identify
+from shm.identify import identification as module
+from shm.identify.finding.registry import IDENTIFIERS
+from shm.identify.measuring.ambient import LEAST_PARTS, MOST_PARTS, ambient_measurement
+from shm.values import Recording
+from tests.identify.signals import Planted, Sensor, as_recording, response
+
+RATE_HZ = 128.0
+OPTIONS = IdentifyOptions(3.0, 40.0)
+MODES = (
+    Planted(6.0, 0.004, (1.0, 0.2, 0.6)),
+    Planted(6.3, 0.004, (-0.2, 1.0, -0.1)),
+    Planted(13.5, 0.003, (0.8, 0.1, -0.7)),
+    Planted(23.0, 0.003, (0.1, -0.9, 0.1)),
+)
+SENSORS = (Sensor("transverse", 2.0), Sensor("longitudinal", 2.0), Sensor("transverse", 3.5))
+
+
+def _record(seconds: float = 900.0, seed: int = 0, noise: float = 0.02) -> Recording:
+    rng = np.random.default_rng(seed)
+    samples = round(seconds * RATE_HZ)
+    total = np.zeros((3, samples))
+    for mode in MODES:
+        wind = rng.standard_normal(samples)
+        total += response([mode], wind, RATE_HZ) - np.outer(mode.shape, wind)
+    total += noise * np.std(total) * rng.standard_normal(total.shape)
+    record = as_recording(np.zeros(samples), total, RATE_HZ, SENSORS)
+    return replace(record, channels=record.channels[1:])
+
+
+RECORD = _record()
+
+
+def _with(record: Recording, row: int, first: int, last: int, value: float) -> Recording:
+    channels = list(record.channels)
+    values = channels[row].values.copy()
+    values[first:last] = value
+    channels[row] = replace(channels[row], values=values)
+    return replace(record, channels=tuple(channels))
+
+
+@pytest.fixture(scope="module")
+def identified() -> Identification:
+    return identify([RECORD], OPTIONS, test_id="wind")
+
+
+def test_the_modes_are_found_without_a_hammer(identified: Identification) -> None:
+    found = sorted(identified.test.modes, key=lambda mode: mode.frequency_hz)
+    assert len(found) == 4
+    for mode, planted in zip(found, MODES, strict=True):
+        assert mode.frequency_hz == pytest.approx(planted.frequency_hz, rel=2e-3)
+        assert abs(mode.frequency_hz - planted.frequency_hz) < 4 * mode.frequency_sd_hz
+        assert abs(mode.damping_ratio - planted.damping_ratio) < 4 * mode.damping_sd
+    assert [mode.plane for mode in found] == [
+        "transverse", "longitudinal", "transverse", "longitudinal",
+    ]  # fmt: skip
+
+
+def test_what_needs_a_hit_is_unknown(identified: Identification) -> None:
+    assert identified.frequency_response is None
+    assert identified.fit is None
+    assert identified.hits == ()
+    assert np.isnan(identified.test.amplitude)
+    assert all(np.isnan(mode.acceleration_m_s2) for mode in identified.test.modes)
+
+
+def test_the_record_is_cut_into_equal_parts() -> None:
+    measurement = ambient_measurement([RECORD], OPTIONS)
+    lengths = {part.shape[1] for part in measurement.decays}
+    assert len(measurement.decays) == MOST_PARTS
+    assert max(lengths) - min(lengths) <= 1
+    assert measurement.frequency_response is None
+
+
+def test_gaps_are_cut_out() -> None:
+    gap = slice(20_000, 20_400)
+    measurement = ambient_measurement([_with(RECORD, 1, gap.start, gap.stop, np.nan)], OPTIONS)
+    assert LEAST_PARTS <= len(measurement.decays) <= MOST_PARTS
+    assert all(np.isfinite(part).all() for part in measurement.decays)
+
+
+def test_a_dead_or_mostly_unknown_channel_is_dropped() -> None:
+    for value, reason in ((0.3, "never changes"), (np.nan, "not-a-number")):
+        record = _with(RECORD, 2, 0, RECORD.samples, value)
+        measurement = ambient_measurement([record], OPTIONS)
+        assert [point.name for point in measurement.points] == ["acc_1", "acc_2"]
+        assert reason in measurement.dropped[0].reason
+
+
+def test_no_channel_left_is_not_identifiable() -> None:
+    record = replace(RECORD, channels=RECORD.channels[:1])
+    with pytest.raises(NotIdentifiable, match="no acceleration channel"):
+        ambient_measurement([_with(record, 0, 0, record.samples, 0.0)], OPTIONS)
+
+
+def test_a_short_record_is_not_identifiable_and_says_how_long_it_must_be() -> None:
+    with pytest.raises(NotIdentifiable, match="too short") as caught:
+        identify([_record(20.0)], OPTIONS, test_id="t")
+    assert "minutes" in caught.value.remedy
+
+
+def test_set_ups_are_joined_by_the_sensor_that_they_share() -> None:
+    """Sensors 1 and 2, then 1 and 3: three points of one shape."""
+    parts = [
+        replace(record, channels=(record.channels[0], record.channels[row]))
+        for row, record in ((1, RECORD), (2, _record(seed=1)))
+    ]
+    result = identify(parts, OPTIONS, test_id="t")
+    assert any("sensors that they share" in note for note in result.notes)
+    (mode,) = [m for m in result.test.modes if abs(m.frequency_hz - 13.5) < 0.1]
+    values = {point.x_m: point.value for point in mode.shape}
+    assert values[3.5] / values[2.0] == pytest.approx(-0.7 / 0.8, abs=0.03)
+
+
+def test_an_identifier_that_needs_the_force_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(IDENTIFIERS, "by-force", IDENTIFIERS["ssi"])
+    assert "by-force" not in module.WITHOUT_FORCE
+    with pytest.raises(UsageError, match="needs the hammer's force") as caught:
+        identify([RECORD], replace(OPTIONS, identifier="by-force"), test_id="t")
+    assert "ssi" in caught.value.remedy

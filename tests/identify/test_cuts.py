@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.identify.measuring.cuts import LEAD_SECONDS, Cut, cut
+from shm.identify.measuring.frf import HitRecord
+from shm.identify.measuring.hits import find_pulses
+from tests.identify.signals import Planted, Sensor, recording
+
+RATE_HZ = 1024.0
+MODE = Planted(13.5, 0.004, (1.0,))
+
+
+def _hits(**changes: float) -> list[HitRecord]:
+    keywords = {"hits": 2, "seconds": 4.0, "rate_hz": RATE_HZ, **changes}
+    record = recording([MODE], (Sensor(),), **keywords)  # type: ignore[arg-type]
+    force = record.channels[0].values
+    signals = np.array([channel.values for channel in record.accelerations])
+    return [HitRecord(force, signals, pulse) for pulse in find_pulses(force, RATE_HZ)]
+
+
+def _impulse(hit: HitRecord) -> float:
+    return float(np.sum(hit.force[hit.pulse.start : hit.pulse.end])) / RATE_HZ
+
+
+@pytest.mark.parametrize("hit", _hits())
+def test_the_force_keeps_its_impulse_and_its_place(hit: HitRecord) -> None:
+    found = cut(hit, RATE_HZ, 50.0)
+    assert found.sampling_rate_hz == 128.0
+    assert np.sum(found.driven[0]) / 128.0 == pytest.approx(_impulse(hit), rel=0.005)
+    lead = LEAD_SECONDS + 16 / 128.0 + (hit.pulse.peak - hit.pulse.start) / RATE_HZ
+    assert np.argmax(found.driven[0]) / 128.0 == pytest.approx(lead, abs=1 / 128.0)
+
+
+def test_the_free_part_holds_nothing_of_the_pulse() -> None:
+    found = cut(_hits()[0], RATE_HZ, 50.0)
+    assert np.max(np.abs(found.driven[0, found.free :])) < 0.01 * found.driven[0].max()
+    np.testing.assert_array_equal(found.decay, found.driven[1:, found.free :])
+
+
+def test_free_motion_is_the_same_exponential_as_before_the_filter() -> None:
+    """A step of k samples multiplies the analytic signal of one mode by exp(s k / rate)."""
+    decay = cut(_hits()[0], RATE_HZ, 50.0).decay[0]
+    omega = 2 * np.pi * MODE.frequency_hz
+    pole = omega * (-MODE.damping_ratio + 1j * np.sqrt(1 - MODE.damping_ratio**2))
+    step = np.exp(pole / 128.0)
+    rest = decay[2:] - 2 * step.real * decay[1:-1] + abs(step) ** 2 * decay[:-2]
+    # The mean that is taken off is not zero: a constant remains.
+    assert np.ptp(rest) < 1e-3 * np.ptp(decay)
+
+
+def test_all_hits_have_the_same_lead_even_where_the_record_begins_with_the_hit() -> None:
+    def struck(hit: HitRecord) -> int:
+        return int(np.argmax(cut(hit, RATE_HZ, 50.0).driven[0]))
+
+    early = _hits(lead_s=0.002)
+    assert {struck(hit) for hit in early + _hits()} <= {struck(early[0]), struck(early[0]) + 1}
+
+
+def test_unknown_samples_before_the_hit_do_not_reach_it() -> None:
+    hit = _hits()[0]
+    signals = hit.accelerations.copy()
+    signals[0, hit.pulse.start - 100 : hit.pulse.start - 60] = np.nan
+    found: Cut = cut(replace(hit, accelerations=signals), RATE_HZ, 50.0)
+    assert np.all(np.isfinite(found.driven))
+    np.testing.assert_allclose(found.decay, cut(hit, RATE_HZ, 50.0).decay)
+
+
+def test_a_slow_record_is_not_thinned() -> None:
+    hit = _hits()[0]
+    found = cut(hit, RATE_HZ, 400.0)
+    assert found.sampling_rate_hz == RATE_HZ
+    assert found.driven.shape[1] == hit.pulse.stop - hit.pulse.start + int(LEAD_SECONDS * RATE_HZ)

@@ -1,0 +1,307 @@
+"""Each check is good on a sound record and not good where its fault is planted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import NotIdentifiable
+from shm.identify.contract import Finding, FoundMode, Measurement, Poles
+from shm.identify.measuring.prediction import surprise
+from shm.identify.measuring.setups import measured_recordings
+from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
+from shm.values import FloatArray, FrequencyResponse, Recording, ResponsePoint
+from tests.identify.planted import (
+    FIRST,
+    OPTIONS,
+    SLOT,
+    SOUND,
+    changed,
+    check_of,
+    inspection,
+    tone,
+)
+from tests.identify.signals import (
+    Planted,
+    as_recording,
+    force_signal,
+    half_sine,
+    hanger_modes,
+    recording,
+    response,
+)
+
+
+def test_a_sound_test_has_nothing_to_remark() -> None:
+    figures = assess(inspection(SOUND))
+    assert [figure.verdict for figure in figures] == (len(CHECKS) - 1) * ["good"]
+    assert all(not figure.remedy for figure in figures)
+    assert refusal(figures, "test.csv") is None
+
+
+def test_a_hit_struck_twice_is_told_with_its_second() -> None:
+    pulse = half_sine(1024.0, 500.0)
+
+    def strike(force: FloatArray) -> None:
+        force[SLOT + FIRST + 60 : SLOT + FIRST + 60 + len(pulse)] += pulse
+
+    found = check_of("double hits", changed("force", strike))
+    assert (found.verdict, found.value) == ("warning", 1.0)
+    assert "8.5 s" in found.found
+
+
+def test_clipped_ring_downs_are_told() -> None:
+    limit = 0.3 * float(np.abs(SOUND.channels[1].values).max())
+    found = check_of("clipping", changed("acc_1", lambda v: np.clip(v, -limit, limit, out=v)))
+    assert found.verdict == "warning"
+    assert "acc_1" in found.found
+
+
+def test_a_clipped_force_is_told_and_its_hits_are_used() -> None:
+    record = changed("force", lambda v: np.clip(v, None, 1000.0, out=v))
+    found = check_of("clipping", record)
+    assert (found.verdict, found.value) == ("warning", 5.0)
+    assert "force is clipped" in found.found
+    assert check_of("hits", record).value == 5
+
+
+def test_two_hits_of_one_peak_force_to_the_last_bit_are_clipped() -> None:
+    """A pulse of few samples may reach the limit only once a hit."""
+    first, second = (slice(hit * SLOT, (hit + 1) * SLOT) for hit in (0, 1))
+
+    def saturate(force: FloatArray) -> None:
+        for hit in (first, second):
+            force[hit][np.argmax(force[hit])] = 3000.0
+
+    found = check_of("clipping", changed("force", saturate))
+    assert (found.verdict, found.value) == ("warning", 2.0)
+    assert check_of("clipping").verdict == "good"
+
+
+def test_a_known_full_scale_tells_a_clipped_signal_by_one_sample() -> None:
+    top = float(np.abs(SOUND.channels[1].values).max())
+    channels = [replace(c, full_scale=top) if c.name == "acc_1" else c for c in SOUND.channels]
+    assert check_of("clipping", replace(SOUND, channels=tuple(channels))).verdict == "warning"
+
+
+def test_a_loose_cable_is_told() -> None:
+    def crackle(values: FloatArray) -> None:
+        values[SLOT + 3000 : SLOT + 3050] += 20 * np.random.default_rng(0).standard_normal(50)
+
+    found = check_of("cable", changed("acc_2", crackle))
+    assert (found.verdict, found.value) == ("warning", 1.0)
+
+
+def test_a_jump_that_comes_back_slowly_is_a_surprise() -> None:
+    """It disturbs most of the blocks around it: those before it tell what is usual."""
+    rng, step = np.random.default_rng(0), np.arange(4000)
+    rings = np.sum([np.sin(2 * np.pi * f * step + f) for f in (0.05, 0.13, 0.22)], axis=0)
+    parts = np.exp(-0.002 * step) * rings + 0.01 * rng.standard_normal((3, 4000))
+    assert max(surprise(parts)) < 3.0
+    parts[1, 1500:] += np.exp(-np.arange(2500) / 200)
+    assert [value > 10.0 for value in surprise(parts)] == [False, True, False]
+
+
+def test_a_missing_sample_is_told() -> None:
+    def lose(values: FloatArray) -> None:
+        values[SLOT + 3000] = np.nan
+
+    found = check_of("drop-outs", changed("acc_2", lose))
+    assert (found.verdict, found.value) == ("warning", 1.0)
+
+
+def test_a_record_that_begins_with_its_hit_is_told() -> None:
+    late = replace(
+        SOUND, channels=tuple(replace(c, values=c.values[FIRST + 1 :]) for c in SOUND.channels)
+    )
+    found = check_of("pre-trigger", late)
+    assert (found.verdict, found.value) == ("warning", 0.0)
+    assert check_of("hits", late).value == 5
+    assert check_of("pre-trigger").value == pytest.approx(500.0, abs=2)
+
+
+def test_the_level_at_the_end_of_a_ring_down_is_told() -> None:
+    """A mode of 10 Hz and 1 % falls by exp(-2 pi 0.1 t): 0.9 of 7.75 s are 38 dB."""
+    modes = [Planted(10.0, 0.01, (1.0, 0.4))]
+    found = check_of("ring-down", recording(modes, noise=1e-4, lead_s=0.5))
+    assert found.value == pytest.approx(-38.0, abs=1.0)
+    assert found.verdict == "good"
+
+
+def test_a_ring_down_cut_off_is_told() -> None:
+    short = replace(
+        SOUND,
+        channels=tuple(replace(c, values=c.values[: 4 * SLOT + 1200]) for c in SOUND.channels),
+    )
+    found = check_of("ring-down", short)
+    assert found.verdict == "warning"
+    assert "cut off" in found.found
+
+
+def _softly_hit(seconds: float) -> Recording:
+    pulse = half_sine(1024.0, 400.0, seconds)
+    force = np.zeros(5 * SLOT)
+    for hit in range(5):
+        force[hit * SLOT + FIRST : hit * SLOT + FIRST + len(pulse)] = pulse
+    rng = np.random.default_rng(0)
+    accelerations = response(hanger_modes(20.0), force, 1024.0)
+    noise = 0.001 * rng.standard_normal(accelerations.shape)
+    return as_recording(
+        force + 0.2 * rng.standard_normal(len(force)), accelerations + noise, 1024.0
+    )
+
+
+def test_a_soft_tip_is_told_with_the_frequency_it_reaches() -> None:
+    """A half sine of 40 ms is first zero at 1.5 / 0.04 = 37.5 Hz, a tenth of its largest before."""
+    found = check_of("force spectrum", _softly_hit(0.04))
+    assert found.verdict == "warning"
+    assert "reaches 33 Hz" in found.found or "reaches 34 Hz" in found.found
+    assert check_of("hits", _softly_hit(0.04)).value == 5
+    assert check_of("force spectrum").value > -3
+
+
+def test_a_steady_tone_is_told_and_no_mode_is() -> None:
+    """0.2 m/s^2 at 41.3 Hz in both channels, where the modes ring with several."""
+    added = tone(5 * SLOT, 41.3, 0.2)
+    record = changed("acc_1", lambda v: np.add(v, added, out=v))
+    found = tones(measured_recordings([record], OPTIONS), [record], OPTIONS)
+    assert [t.frequency_hz for t in found] == pytest.approx([41.3], abs=0.02)
+    assert found[0].name == "a machine"
+    assert check_of("tones", record).value == 1.0
+
+
+def test_mains_and_named_machines_are_named() -> None:
+    added = tone(5 * SLOT, 40.02, 0.2) + tone(5 * SLOT, 45.5, 0.2)
+    record = changed("acc_1", lambda v: np.add(v, added, out=v))
+    options = replace(OPTIONS, mains_hz=40.0, disturbance_bands=(("pump", 45.0, 46.0),))
+    found = tones(measured_recordings([record], options), [record], options)
+    assert [t.name for t in found] == ["mains", "pump"]
+
+
+def test_a_lightly_damped_mode_is_no_tone() -> None:
+    """0.01 % at 12 Hz: it still rings at the end, but each hit gives it a new phase."""
+    modes = [Planted(12.0, 1e-4, (1.0, 0.5)), Planted(31.0, 1e-4, (0.5, 1.0))]
+    assert check_of("tones", recording(modes, noise=0.02, lead_s=0.6)).verdict == "good"
+
+
+def test_a_weak_tone_between_short_ring_downs_is_told() -> None:
+    """Halves of ring-downs of 3 s smear it over 3 Hz; it has 1/50 of the signal's rms, as noise."""
+    modes = [Planted(20.0, 0.002, (1.0, 0.5)), Planted(31.0, 0.002, (0.5, 1.0))]
+    sound = recording(modes, seconds=3.0, noise=20.0, lead_s=0.6)
+    assert check_of("tones", sound).verdict == "good"
+    added = tone(len(sound.channels[0].values), 25.3, 20.0)
+    humming = changed("acc_1", lambda v: np.add(v, added, out=v), sound)
+    found = tones(measured_recordings([humming], OPTIONS), [humming], OPTIONS)
+    assert [t.frequency_hz for t in found] == pytest.approx([25.3], abs=0.02)
+
+
+def test_mains_in_the_force_alone_is_told() -> None:
+    record = changed("force", lambda v: np.add(v, tone(5 * SLOT, 40.0, 0.5), out=v))
+    assert check_of("tones", record).value == 1.0
+
+
+@pytest.mark.parametrize("hits", [3, 5])
+def test_without_time_before_the_first_hit_only_what_ignores_the_hits_is_a_tone(hits: int) -> None:
+    modes = [Planted(12.0, 1e-4, (1.0, 0.5)), Planted(31.0, 1e-4, (0.5, 1.0))]
+    ringing = recording(modes, hits=hits, noise=0.002, lead_s=0.6)
+    late = replace(
+        ringing, channels=tuple(replace(c, values=c.values[600:]) for c in ringing.channels)
+    )
+    assert check_of("tones", late).verdict == "good"
+    added = tone(len(late.channels[0].values), 40.07, 0.05)
+    humming = changed("acc_1", lambda v: np.add(v, added, out=v), late)
+    assert check_of("tones", humming).value == 1.0
+
+
+def test_one_hit_of_another_direction_is_told_and_left_out() -> None:
+    rng = np.random.default_rng(0)
+    force = force_signal([hit * SLOT + FIRST for hit in range(5)], 5 * SLOT, 1024.0, 5 * [2000.0])
+    odd = np.zeros_like(force)
+    odd[2 * SLOT : 3 * SLOT] = force[2 * SLOT : 3 * SLOT]
+    straight = hanger_modes(20.0)
+    turned = [replace(mode, drive=mode.drive * (-1) ** n) for n, mode in enumerate(straight)]
+    total = response(straight, force - odd, 1024.0) + response(turned, odd, 1024.0)
+    total += 0.02 * rng.standard_normal(total.shape)
+    found = check_of("repeatability", as_recording(force, total, 1024.0))
+    assert found.verdict == "warning"
+    assert "16.5 s" in found.found
+    assert check_of("repeatability").value < 0.01
+
+
+def test_fewer_than_three_hits_are_a_warning() -> None:
+    found = check_of("hits", recording(hanger_modes(), hits=2, noise=0.02, lead_s=0.5))
+    assert (found.verdict, found.value, found.limit) == ("warning", 2, 3)
+
+
+def test_sensors_that_feel_nothing_of_the_hits_are_refused() -> None:
+    rng = np.random.default_rng(3)
+    record = as_recording(SOUND.channels[0].values, rng.standard_normal((2, 5 * SLOT)), 1024.0)
+    found = check_of("noise", record)
+    assert found.verdict == "refused"
+    error = refusal([found], "test.csv")
+    assert isinstance(error, NotIdentifiable)
+    assert error.remedy
+    assert "noise" in error.message
+
+
+def test_the_signal_to_noise_ratio_is_about_what_was_planted() -> None:
+    """One mode at 20 Hz of 0.2 %, amplitude a: a^2 / 2 over the noise between 2 and 50 Hz."""
+    quiet = recording([Planted(20.0, 0.002, (1.0, 0.5))], noise=0.0, lead_s=0.5)
+    after = np.std(quiet.channels[1].values[FIRST + 20 : FIRST + 400])
+    noisy = recording([Planted(20.0, 0.002, (1.0, 0.5))], noise=0.05 * float(after), lead_s=0.5)
+    expected = 20 * np.log10(1 / 0.05) + 10 * np.log10(512 / 48)
+    assert check_of("noise", noisy).value == pytest.approx(expected, abs=3.0)
+
+
+def test_a_single_hit_that_begins_with_its_record_is_refused() -> None:
+    record = recording(hanger_modes(20.0), hits=1, noise=0.02, lead_s=0.0)
+    assert check_of("hits", record).verdict == "refused"
+    assert check_of("hits", recording(hanger_modes(), hits=1, noise=0.02)).verdict == "warning"
+
+
+def _responses(coherence: float | None) -> Inspection:
+    frequency = np.arange(201) * 0.25
+    size = 1 / (1 + (frequency - 20.0) ** 2)
+    given = None if coherence is None else np.full((1, 201), coherence)
+    measured = FrequencyResponse(
+        "r.unv", (ResponsePoint("p"),), frequency, size[np.newaxis].astype(complex), given
+    )
+    return Inspection(
+        [], [Measurement("r.unv", measured.points, (np.ones((1, 64)),), 100.0, measured)], OPTIONS
+    )
+
+
+@pytest.mark.parametrize(
+    ("coherence", "verdict"), [(0.99, "good"), (0.7, "warning"), (0.31, "refused")]
+)
+def test_measured_responses_are_judged_by_their_coherence(coherence: float, verdict: str) -> None:
+    (found,) = assess(_responses(coherence))
+    assert (found.name, found.verdict) == ("coherence", verdict)
+    assert found.value == pytest.approx(coherence)
+
+
+def test_responses_without_coherence_say_so() -> None:
+    (found,) = assess(_responses(None))
+    assert found.verdict == "unknown"
+    assert np.isnan(found.value)
+
+
+def _finding(*frequencies_hz: float) -> Finding:
+    nothing = np.empty(0)
+    modes = tuple(FoundMode(f, 0.0, 0.001, 0.0, np.ones(2), np.zeros(2)) for f in frequencies_hz)
+    return Finding(modes, (), Poles(nothing, nothing, nothing, np.empty(0, dtype=bool)))
+
+
+def test_two_identifiers_are_compared_mode_by_mode() -> None:
+    sound = inspection(SOUND)
+    both = replace(sound, finding=_finding(6.0, 13.5), cross_check=_finding(6.006, 13.5, 40.0))
+    (found,) = [figure for figure in assess(both) if figure.name == "cross-check"]
+    assert found.value == pytest.approx(1e-3)
+    assert found.verdict == "good"
+    assert "40.00 Hz" in found.found
+    apart = replace(both, cross_check=_finding(6.03))
+    (found,) = [figure for figure in assess(apart) if figure.name == "cross-check"]
+    assert (found.verdict, found.value) == ("warning", pytest.approx(5e-3))
+    assert "13.50 Hz" in found.found

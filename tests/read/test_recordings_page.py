@@ -1,0 +1,84 @@
+"""docs/recordings.md: its examples are run, its files peeked into."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.read import FORMATS, peek, read, sidecar_path
+from shm.read.limits import LARGEST_BYTES, MOST_ACCELERATIONS
+from shm.read.packed import MOST_MEMBERS
+from shm.read.units import unit_of
+from shm.values import FrequencyResponse, Recording
+from shm_cli.main import run
+
+PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_the_python_examples_write_files_that_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for block in blocks("python"):
+        exec(block, names)
+    files = sorted(tmp_path.iterdir())
+    assert [path.suffix for path in files] == [".h5", ".mat", ".npz", ".tdms"]
+    for path in files:
+        assert peek(path).problems == ()
+        found = read(path)
+        assert isinstance(found, Recording)
+        assert found.force is not None
+        np.testing.assert_allclose(
+            found.accelerations[0].values, 9.80665 * np.asarray(names["acceleration"])
+        )
+    assert run(["ingest", "--peek", *map(str, files)]) == 0
+
+
+def test_the_texts_are_read(tmp_path: Path) -> None:
+    record, response = [text for text in blocks("") if text.startswith("# hanger")]
+    for name, text in (("record.csv", record), ("response.csv", response)):
+        head, row = text.rsplit("\n...", 1)[0].rsplit("\n", 1)
+        cells = row.split(",")
+        lines = [",".join([str(i), *cells[1:]]) for i in range(20)]
+        (tmp_path / name).write_text("\n".join([head, *lines]))
+        assert peek(tmp_path / name).problems == ()
+    assert isinstance(read(tmp_path / "record.csv"), Recording)
+    assert isinstance(read(tmp_path / "response.csv"), FrequencyResponse)
+
+
+def test_the_sidecars_are_read(tmp_path: Path, recording: Recording) -> None:
+    first, calibration, whole = blocks("toml")
+    assert set(tomllib.loads(first)["channel"]) == {"Time_chan_1", "Time_chan_2"}
+    path = tmp_path / "test.csv"
+    head = "# sampling_rate_hz: 9\nforce,acc_1,acc_2,acc_3\n"
+    path.write_text(head + "1,2,3,4\n" * 20)
+    sidecar_path(path).write_text(whole)
+    found = read(path)
+    assert isinstance(found, Recording)
+    assert [c.name for c in found.channels] == ["force", "acc_1", "acc_2"]
+    sidecar_path(path).write_text(calibration)
+    assert [c.full_scale for c in peek(path).channels[:2]] == [2200.0, 50.0]
+
+
+def test_the_page_names_every_format_unit_and_limit() -> None:
+    for suffix in [suffix for known in FORMATS for suffix in known.suffixes]:
+        assert f"`{suffix}`" in PAGE
+    units = re.search(r"Units: (.*?) for forces; (.*?) for\s+accelerations", PAGE, re.DOTALL)
+    assert units is not None
+    named = re.sub(r"\(also (.*?)\)", r", \1", f"{units[1]}, {units[2]}")
+    assert all(unit_of(unit) for unit in re.split(r",\s*", named) if unit.strip())
+    for limit in (
+        f"1 to {MOST_ACCELERATIONS} acc",
+        f"{LARGEST_BYTES >> 20} MB",
+        f"{MOST_MEMBERS} f",
+    ):
+        assert limit in PAGE.replace("\n", " ")

@@ -1,0 +1,96 @@
+"""A hanger in wind and traffic: stationary, with the poles and shapes of its modes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import find_peaks, welch
+
+from shm.errors import UsageError
+from shm.simulate import (
+    AmbientPlan,
+    HangerState,
+    ambient_test,
+    natural_frequencies,
+    spread_places_m,
+)
+from shm.values import Hanger, Recording
+
+STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8, damping_ratio=0.01)
+PLAN = AmbientPlan(seconds=200.0)
+
+
+def simulate(hanger: Hanger, plan: AmbientPlan = PLAN, seed: int = 1) -> Recording:
+    return ambient_test(hanger, STATE, plan, np.random.default_rng(seed))
+
+
+def test_nobody_hits_so_there_is_no_force(hanger: Hanger) -> None:
+    recording = simulate(hanger)
+    assert recording.force is None
+    assert [c.name for c in recording.channels] == ["acc_1", "acc_2", "acc_3", "acc_4"]
+    assert recording.duration_s == 200.0
+
+
+def test_the_spectrum_peaks_at_the_natural_frequencies_of_the_plane(hanger: Hanger) -> None:
+    recording = simulate(hanger)
+    for plane, own in enumerate(natural_frequencies(hanger, STATE, 5)):
+        lines, density = welch(recording.accelerations[plane].values, 512, nperseg=4096)
+        for frequency in own:
+            near = np.abs(lines / frequency - 1) < 0.06
+            peak = lines[near][density[near].argmax()]
+            assert peak == pytest.approx(frequency, rel=0.02)
+
+
+def test_a_mode_falls_off_with_its_own_damping(hanger: Hanger) -> None:
+    """The correlation of a band-passed record decays as exp(-zeta w t)."""
+    own = natural_frequencies(hanger, STATE, 1)[0, 0]
+    values = simulate(hanger, AmbientPlan(seconds=1000.0)).accelerations[0].values
+    lines = np.fft.rfftfreq(len(values), 1 / 512)
+    spectrum = np.abs(np.fft.rfft(values)) ** 2 * np.exp(-0.5 * ((lines - own) / 0.7) ** 2)
+    correlation = np.fft.irfft(spectrum)[: 5 * 512]
+    peaks, _ = find_peaks(correlation)
+    late = peaks[(peaks > 512) & (peaks < 3 * 512)] / 512
+    rate = -np.polyfit(late, np.log(correlation[(late * 512).round().astype(int)]), 1)[0]
+    assert rate / (2 * np.pi * own) == pytest.approx(0.01, rel=0.35)
+
+
+def test_the_record_is_as_strong_at_its_beginning_as_at_its_end(hanger: Hanger) -> None:
+    """It does not start from rest: light damping would take minutes to build up."""
+    state = HangerState(711e3, damping_ratio=0.0005)
+    rng = np.random.default_rng(5)
+    first, last = [], []
+    for _ in range(8):
+        values = ambient_test(hanger, state, AmbientPlan(seconds=20.0), rng).channels[0].values
+        parts = np.split(values, 10)
+        first.append(np.mean(parts[0] ** 2))
+        last.append(np.mean(parts[-1] ** 2))
+    assert np.mean(first) == pytest.approx(np.mean(last), rel=0.3)
+
+
+def test_the_sensor_that_moves_most_has_the_level_that_was_asked_for(hanger: Hanger) -> None:
+    plan = AmbientPlan(seconds=100.0, acceleration_m_s2=0.3, acceleration_noise_m_s2=0.0)
+    levels = [np.std(channel.values) for channel in simulate(hanger, plan).channels]
+    assert max(levels) == pytest.approx(0.3, rel=0.01)
+
+
+def test_the_same_seed_gives_the_same_wind(hanger: Hanger) -> None:
+    first, again, other = (simulate(hanger, seed=seed).channels[0].values for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_a_plan_that_cannot_be_is_refused(hanger: Hanger) -> None:
+    with pytest.raises(UsageError, match="positive"):
+        simulate(hanger, AmbientPlan(seconds=0.0))
+    with pytest.raises(UsageError, match="between 0 and 12 m"):
+        simulate(hanger, AmbientPlan(sensors_x_m=(13.0,)))
+
+
+def test_sensors_are_spread_over_what_can_be_reached(hanger: Hanger) -> None:
+    for sensors in range(1, 9):
+        places = spread_places_m(hanger, sensors)
+        assert len(set(places)) == sensors
+        assert list(places) == sorted(places)
+        assert max(places) < hanger.length_m / 2
+    with pytest.raises(UsageError, match="1 to 8"):
+        spread_places_m(hanger, 9)
