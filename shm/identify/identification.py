@@ -77,10 +77,10 @@ def identify(
     measurements = measured(records, options)
     found = _found(measurements, options.identifier, options)
     second = _cross_check(measurements, options)
-    quality = assess(Inspection(recordings, measurements, options, found.finding, second))
+    steady = tones(measurements, recordings, options)
+    quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if refused := refusal(quality, records[0].source):
         raise refused
-    steady = tones(measurements, recordings, options)
     placement = placed(found.finding.modes, found.points, hanger, steady)
     if not placement.modes:
         raise _nothing_found(records[0].source, found.finding, placement)

@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.identify import IdentifyOptions
 from shm.identify.measuring.setups import measured_recordings
-from shm.identify.quality import Inspection, assess
+from shm.identify.quality import Inspection, assess, tones
 from shm.values import FloatArray, QualityCheck, Recording
 from tests.identify.signals import hanger_modes, recording
 
@@ -33,7 +33,8 @@ def changed(
 
 
 def inspection(record: Recording, options: IdentifyOptions = OPTIONS) -> Inspection:
-    return Inspection([record], measured_recordings([record], options), options)
+    measurements = measured_recordings([record], options)
+    return Inspection([record], measurements, options, tones(measurements, [record], options))
 
 
 def check_of(

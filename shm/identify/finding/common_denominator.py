@@ -141,11 +141,13 @@ def polished(highest: ComplexArray, log_z: ComplexArray, rounds: int = 3) -> Com
     NaN where a step leads far away: there is no root near.
     """
     exponents = np.arange(highest.shape[1])
+    lost = np.zeros(log_z.shape, dtype=bool)
     for _ in range(rounds):
         powers = highest * np.exp(log_z[:, np.newaxis] * exponents)
         step = powers.sum(axis=1) / (powers @ exponents)
-        log_z = np.where(np.abs(step) < _LONGEST_STEP, log_z - step, np.nan)
-    return log_z
+        lost |= np.abs(step) > _LONGEST_STEP
+        log_z = np.where(lost, log_z, log_z - step)
+    return np.where(lost, np.nan, log_z)
 
 
 def residues(

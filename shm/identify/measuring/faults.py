@@ -17,8 +17,8 @@ _TOP = 200
 _CROWDED = 8.0
 _MOVES = 30.0
 _FINE = 4000.0
-"""Levels up to the peak: forces of hits differ by tens of percent, so that two in a thousand tests
-or fewer have the same by chance."""
+"""Levels up to the peak: forces of hits differ by tens of percent, a thousand levels, so that two
+are hardly the same by chance."""
 
 
 def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from shm.identify.contract import Finding, Measurement
+from shm.identify.contract import Finding, Measurement, Tone
 from shm.identify.options import IdentifyOptions
 from shm.values import QualityCheck, Recording
 
@@ -16,13 +16,14 @@ class Inspection:
     """A test before its modes are numbered.
 
     `records` are the time records, none where frequency responses were given; `measurements` one a
-    set-up; `finding` what the identifier found, None where it has not run yet; `cross_check` what a
-    second identifier found, None where none was asked.
+    set-up; `tones` ring steadily in them; `finding` is what the identifier found, None where it has
+    not run yet; `cross_check` what a second identifier found, None where none was asked.
     """
 
     records: Sequence[Recording]
     measurements: Sequence[Measurement]
     options: IdentifyOptions
+    tones: Sequence[Tone] = ()
     finding: Finding | None = None
     cross_check: Finding | None = None
 

@@ -60,7 +60,7 @@ def check(inspection: Inspection) -> QualityCheck | None:
     """How many tones lie in the band, and at which frequencies."""
     if not inspection.records:
         return None
-    found = tones(inspection.measurements, inspection.records, inspection.options)
+    found = inspection.tones
     if not found:
         return QualityCheck("tones", "good", 0.0, 0.0, "", "no steady vibration in the band")
     listed = ", ".join(f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in found)
