@@ -11,7 +11,7 @@ import numpy as np
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, Hit, Measurement, Poles
 from shm.identify.finding.jackknife import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.finding.registry import identifier
+from shm.identify.finding.registry import WITHOUT_FORCE, identifier
 from shm.identify.finishing import coherent_only, without_window
 from shm.identify.joining.fit import fitted
 from shm.identify.joining.joined import Joined, joined
@@ -56,8 +56,6 @@ class Identification:
     fit: ComplexArray | None = None
 
 
-WITHOUT_FORCE = frozenset({"ssi"})
-"""Identifiers that can do with accelerations alone."""
 _DEFAULTS = IdentifyOptions()
 
 

@@ -305,3 +305,15 @@ def test_two_identifiers_are_compared_mode_by_mode() -> None:
     (found,) = [figure for figure in assess(apart) if figure.name == "cross-check"]
     assert (found.verdict, found.value) == ("warning", pytest.approx(5e-3))
     assert "13.50 Hz" in found.found
+
+
+@pytest.mark.parametrize(("seen", "verdict"), [((6.0, 13.5), "good"), ((6.0,), "warning")])
+def test_a_second_identifier_may_miss_a_mode_but_not_most(
+    seen: tuple[float, ...], verdict: str
+) -> None:
+    both = replace(
+        inspection(SOUND), finding=_finding(6.0, 13.5, 24.0), cross_check=_finding(*seen)
+    )
+    (found,) = [figure for figure in assess(both) if figure.name == "cross-check"]
+    assert found.verdict == verdict
+    assert "24.00 Hz" in found.found

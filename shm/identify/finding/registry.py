@@ -13,6 +13,8 @@ IDENTIFIERS: dict[str, Identifier] = {
     "ssi-input": summed_hankel_ssi_with_input,
     "frf": common_denominator_fit,
 }
+WITHOUT_FORCE = frozenset({"ssi"})
+"""Those that can do with accelerations alone."""
 
 
 def identifier(name: str) -> Identifier:

@@ -10,7 +10,7 @@ from shm.identify.quality.wording import hits_for, hits_of, places
 from shm.values import FloatArray, QualityCheck
 
 _LIMIT_DB = -3.0
-"""Above it damping is read from less than a third of a decay: its error passes its value's half."""
+"""Above it less than a third of a time constant is seen: damping rests on a small difference."""
 
 
 def check(inspection: Inspection) -> QualityCheck | None:
