@@ -12,7 +12,7 @@ _LIMIT = 0.003
 """Largest error of a frequency that the project allows."""
 _SAME_MODE = 0.01
 _LEAST_COMMON = 0.5
-"""Of sound simulated tests the fit to frequency responses lacks a weak or a close mode in a third."""
+"""In a third of sound simulated tests the fit to frequency responses lacks a weak or close mode."""
 
 
 def check(inspection: Inspection) -> QualityCheck | None:
