@@ -56,7 +56,7 @@ def show(scores: list[TestScore], console: Console) -> None:
 
 def fragment(scores: list[TestScore], seed: int) -> str:
     """The tables as markdown."""
-    head = [f"{len(scores)} tests, seed {seed}.", ""]
+    head = f"{len(scores)} tests, seed {seed}."
     rows = [COLUMNS, ("---",) * len(COLUMNS), *table(scores)]
     told = [("planted", "flagged"), ("---", "---"), *flags(scores)]
     calls = [("check", "sound tests in which it is not good"), ("---", "---")]
@@ -64,7 +64,7 @@ def fragment(scores: list[TestScore], seed: int) -> str:
     lines = [
         "\n".join(f"| {' | '.join(cells)} |" for cells in part) for part in (rows, told, calls)
     ]
-    return "\n".join(head) + "\n\n".join(lines)
+    return "\n\n".join([head, *lines])
 
 
 def main() -> int:
