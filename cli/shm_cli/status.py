@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import rich_click as click
@@ -51,10 +52,17 @@ def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
     found: dict[str, list[str]] = {}
     for row in rows:
         said = f"{', '.join(row['competing']) or 'no model class'} may compete"
-        for name, reason in row["not_applicable"].items():
-            said += f"; {name} does not apply: {reason}"
-        found.setdefault(said.removesuffix(".") + ".", []).append(str(row["hanger"]))
+        for reason, names in _by_reason(row["not_applicable"]).items():
+            said += f"; {', '.join(names)} {'do' if names[1:] else 'does'} not apply: {reason}"
+        found.setdefault(f"{said}.", []).append(str(row["hanger"]))
     return {said: ", ".join(hangers) for said, hangers in found.items()}
+
+
+def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for name, reason in not_applicable.items():
+        found.setdefault(reason.removesuffix("."), []).append(name)
+    return found
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
