@@ -151,7 +151,7 @@ def test_status_says_which_classes_may_compete_and_why_others_do_not(
     path.write_text(path.read_text().replace("id = 4", 'id = 4\nmodels = ["beam2"]'))
     told = shm("--workspace", workspace.folder, "status").out
     assert "hanger 3: beam1, beam2 may compete; plated does not apply: it needs" in told
-    assert "hanger 4: beam2 may compete; beam1 does not apply: the hanger's" in told
+    assert "hanger 4: beam2 may compete; beam1, plated do not apply: the hanger's" in told
     rows = shm("--workspace", workspace.folder, "status", "--json").document["hangers"]
     assert [row["competing"] for row in rows] == [["beam1", "beam2"], ["beam2"]]
     assert set(rows[0]["not_applicable"]) == {"plated"}
