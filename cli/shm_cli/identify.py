@@ -27,6 +27,7 @@ from shm_cli.common import (
 )
 
 _DEFAULT = Settings()
+_NONE = "none"
 
 
 @click.command()
@@ -56,7 +57,9 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--cross-check",
-    type=click.Choice(list(IDENTIFIERS)),
+    type=click.Choice([*IDENTIFIERS, _NONE]),
+    default=_DEFAULT.cross_check,
+    show_default=True,
     help="A second identifier whose frequencies are compared.",
 )
 @click.option(
@@ -73,6 +76,13 @@ _DEFAULT = Settings()
     show_default=True,
     metavar="N",
     help="A hit this hard, in N, has amplitude 1.",
+)
+@click.option(
+    "--frequency-allowance",
+    type=click.FloatRange(min=0, max=0.01),
+    default=_DEFAULT.frequency_allowance,
+    show_default=True,
+    help="Part of a frequency that differs from test to test unseen.",
 )
 @click.option(
     "--mains",
@@ -157,9 +167,10 @@ def command(
 def _options(
     band: tuple[float, float],
     identifier: str,
-    cross_check: str | None,
+    cross_check: str,
     estimator: Any,
     reference_force: float,
+    frequency_allowance: float,
     mains: float,
     window: float,
 ) -> IdentifyOptions:
@@ -167,9 +178,10 @@ def _options(
         band_low_hz=band[0],
         band_high_hz=band[1],
         identifier=identifier,
-        cross_check=cross_check or "",
+        cross_check="" if cross_check == _NONE else cross_check,
         estimator=estimator,
         reference_force_n=reference_force,
+        frequency_allowance=frequency_allowance,
         mains_hz=mains,
         window_time_constant_s=window,
     )

@@ -61,7 +61,7 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path
 ) -> None:
     page, figures = tmp_path / "sheet.html", tmp_path / "figures"
-    ask = ("--hanger-file", hanger_file, "--cross-check", "frf", "--html", page)
+    ask = ("--hanger-file", hanger_file, "--html", page)
     ended = shm("identify", recording, *ask, "--figures", figures, "--json")
     assert ended.code == 0, ended.err
     (test,) = ended.document["tests"]
@@ -70,6 +70,19 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     drawn = {path.stem.rpartition("-")[2] for path in figures.glob("*.png")}
     assert drawn >= {"time_history", "hits", "response", "stabilisation", "shapes", "quality"}
+
+
+def test_standard_deviations_hold_what_differs_from_test_to_test(
+    shm: Shm, recording: Path, hanger_file: Path
+) -> None:
+    def sds(*allowance: object) -> list[float]:
+        ask = ("--hanger-file", hanger_file, "--cross-check", "none", *allowance, "--json")
+        (test,) = shm("identify", recording, *ask).document["tests"]
+        return [mode["frequency_sd_hz"] / mode["frequency_hz"] for mode in test["modes"]]
+
+    alone, more = sds("--frequency-allowance", 0), sds("--frequency-allowance", 0.001)
+    assert more == pytest.approx(np.hypot(alone, 0.001))
+    assert min(sds()) >= 1e-4
 
 
 def test_a_page_shows_one_test_only(shm: Shm, recording: Path, tmp_path: Path) -> None:
