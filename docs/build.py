@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.settings import TABLE
+from shm.settings import TABLE, Setting
 from shm_cli.main import VERBS, cli
 from shm_cli.validate import compared, markdown
 from shm_cli.validation import frequencies, selection
@@ -61,22 +61,20 @@ def settings_page() -> str:
         "| setting | default | unit | range | environment | meaning |\n|---|---|---|---|---|---|\n"
     )
     rows = [
-        f"| `{row.name}` | {row.default} | {row.unit} | {_range(row.low, row.high)} "
+        f"| `{row.name}` | {row.default} | {row.unit} | {_range(row)} "
         f"| `{row.environment_variable}` | {row.help} |"
         for row in TABLE
     ]
     return head + "\n".join(rows) + "\n"
 
 
-def _range(low: float | None, high: float | None) -> str:
-    return " ".join(
-        text
-        for text in (
-            "" if low is None else f"from {low:g}",
-            "" if high is None else f"to {high:g}",
-        )
-        if text
+def _range(row: Setting) -> str:
+    bounds = (
+        ", ".join(row.choices),
+        "" if row.low is None else f"from {row.low:g}",
+        "" if row.high is None else f"to {row.high:g}",
     )
+    return " ".join(text for text in bounds if text)
 
 
 def _fill_in(path: Path, name: str, table: str) -> None:

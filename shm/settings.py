@@ -16,7 +16,7 @@ from shm.errors import BadInput
 
 @dataclass(frozen=True)
 class Setting:
-    """One row of the table; `low` and `high` bound numbers, both included."""
+    """One row of the table; `low` and `high` bound numbers, both included, `choices` texts."""
 
     name: str
     default: float | int | str
@@ -24,6 +24,7 @@ class Setting:
     help: str
     low: float | None = None
     high: float | None = None
+    choices: tuple[str, ...] = ()
 
     @property
     def environment_variable(self) -> str:
@@ -35,6 +36,8 @@ class Setting:
             value = type(self.default)(raw)
         except (TypeError, ValueError):
             raise self._refusal(raw, source) from None
+        if self.choices and value not in self.choices:
+            raise self._not_chosen(raw, source)
         rounded = isinstance(raw, float) and value != raw
         if rounded or (isinstance(value, int | float) and not self._holds(value)):
             raise self._refusal(raw, source)
@@ -42,6 +45,14 @@ class Setting:
 
     def _holds(self, value: float) -> bool:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+    def _not_chosen(self, raw: object, source: str) -> BadInput:
+        listed = ", ".join(self.choices)
+        return BadInput(
+            f"setting {self.name} = {raw!r} is none of {listed}.",
+            file=source,
+            remedy=f"Give one of {listed}; the default is {self.default}.",
+        )
 
     def _refusal(self, raw: object, source: str) -> BadInput:
         kind = {int: "a whole number", float: "a number", str: "a text"}[type(self.default)]
@@ -62,6 +73,11 @@ def _row(
     )
 
 
+def _choice(help_text: str, *choices: str) -> Any:
+    """A text that is one of `choices`, the first of which is the default."""
+    return field(default=choices[0], metadata={"unit": "", "help": help_text, "choices": choices})
+
+
 @dataclass(frozen=True)
 class Settings:
     """The values in force; each field is a row of `TABLE`: default, unit, help, low, high."""
@@ -76,11 +92,11 @@ class Settings:
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
-    identifier: str = _row("ssi", "", "how modes are found", None, None)
-    cross_check: str = _row(
-        "frf", "", "a second identifier to compare with; empty: none", None, None
+    identifier: str = _choice("how modes are found", "ssi", "ssi-input", "frf")
+    cross_check: str = _choice(
+        "a second identifier to compare with", "frf", "ssi", "ssi-input", "none"
     )
-    estimator: str = _row("h1", "", "of frequency responses: h1, h2 or hv", None, None)
+    estimator: str = _choice("of frequency responses", "h1", "h2", "hv")
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
     frequency_allowance: float = _row(
         1e-4, "", "part of a frequency that differs from test to test unseen", 0, 0.01

@@ -27,7 +27,6 @@ from shm_cli.common import (
 )
 
 _DEFAULT = Settings()
-_NONE = "none"
 
 
 @click.command()
@@ -57,7 +56,7 @@ _NONE = "none"
 )
 @click.option(
     "--cross-check",
-    type=click.Choice([*IDENTIFIERS, _NONE]),
+    type=click.Choice([*IDENTIFIERS, "none"]),
     default=_DEFAULT.cross_check,
     show_default=True,
     help="A second identifier whose frequencies are compared.",
@@ -178,7 +177,7 @@ def _options(
         band_low_hz=band[0],
         band_high_hz=band[1],
         identifier=identifier,
-        cross_check="" if cross_check == _NONE else cross_check,
+        cross_check=cross_check,
         estimator=estimator,
         reference_force_n=reference_force,
         frequency_allowance=frequency_allowance,

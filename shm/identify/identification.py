@@ -17,7 +17,7 @@ from shm.identify.joining.fit import fitted
 from shm.identify.joining.joined import Joined, joined
 from shm.identify.joining.products import joined_response
 from shm.identify.measuring.setups import measured
-from shm.identify.options import IdentifyOptions
+from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.placing.placement import Placement, placed
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.values import (
@@ -103,7 +103,7 @@ def identify(
 def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:
     """What the second identifier finds; None where none is asked or these records have no force."""
     name = options.cross_check
-    if not name or not _can_do(name, measurements):
+    if name == NO_CROSS_CHECK or not _can_do(name, measurements):
         return None
     return _found(measurements, name, options).finding
 

@@ -9,6 +9,8 @@ from typing import Literal
 from shm.errors import UsageError
 from shm.values import NAN
 
+NO_CROSS_CHECK = "none"
+
 
 @dataclass(frozen=True)
 class IdentifyOptions:
@@ -30,7 +32,7 @@ class IdentifyOptions:
     `window_time_constant_s`: of the exponential window already in a given frequency response.
     `estimator`: of the frequency response: `h1` (noise in the responses), `h2` (noise in the
     force), `hv` (noise in both).
-    `cross_check`: name of a second identifier whose frequencies are compared; empty: none.
+    `cross_check`: name of a second identifier whose frequencies are compared, or `none`.
     `frequency_allowance`: standard deviation, as a fraction, of what differs from one test to the
     next without being seen within one (mounting of sensors, rest of the temperature): added to
     that of each frequency.
@@ -54,7 +56,7 @@ class IdentifyOptions:
     reference_force_n: float = NAN
     window_time_constant_s: float = math.inf
     estimator: Literal["h1", "h2", "hv"] = "h1"
-    cross_check: str = ""
+    cross_check: str = NO_CROSS_CHECK
     frequency_allowance: float = 0.0
     mains_hz: float = 50.0
     disturbance_bands: tuple[tuple[str, float, float], ...] = ()

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args, get_type_hints
+
 import pytest
 
 from shm.errors import BadInput
+from shm.identify import IDENTIFIERS, IdentifyOptions
+from shm.identify.options import NO_CROSS_CHECK
 from shm.settings import TABLE, Settings, load_settings
 
 
@@ -46,3 +50,17 @@ def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
 
 def test_model_names_are_split_and_trimmed() -> None:
     assert load_settings({"models": " beam1, beam2,"}, {}, {}).model_names == ("beam1", "beam2")
+
+
+@pytest.mark.parametrize("name", ["identifier", "cross_check", "estimator"])
+def test_a_name_that_is_none_of_the_choices_is_refused_with_them(name: str) -> None:
+    with pytest.raises(BadInput, match=f"setting {name} = 'best' is none of") as caught:
+        load_settings({name: "best"}, environment={})
+    assert getattr(Settings(), name) in caught.value.remedy
+
+
+def test_every_identifier_can_be_chosen() -> None:
+    choices = {row.name: set(row.choices) for row in TABLE}
+    assert choices["identifier"] == set(IDENTIFIERS)
+    assert choices["cross_check"] == {*IDENTIFIERS, NO_CROSS_CHECK}
+    assert choices["estimator"] == set(get_args(get_type_hints(IdentifyOptions)["estimator"]))
