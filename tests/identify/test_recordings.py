@@ -146,3 +146,9 @@ def test_a_record_too_slow_for_the_band_is_refused() -> None:
 def test_records_of_different_sampling_rates_are_refused() -> None:
     with pytest.raises(BadInput, match="sampling rate differs"):
         measured([RECORD, recording(hanger_modes(), rate_hz=2048.0)], OPTIONS)
+
+
+def test_rates_read_off_rounded_times_are_one_rate() -> None:
+    rounded = replace(RECORD, sampling_rate_hz=RECORD.sampling_rate_hz * (1 + 1e-7))
+    (measurement,) = measured([RECORD, rounded], OPTIONS)
+    assert len(measurement.decays) == 2 * len(measured([RECORD], OPTIONS)[0].decays)

@@ -21,6 +21,10 @@ from shm.identify.options import IdentifyOptions
 from shm.values import Channel, FrequencyResponse, Recording
 
 
+_SAME_RATE = 1e-5
+"""Rates read off columns of rounded times differ by less, and no frequency feels it."""
+
+
 @dataclass(frozen=True, eq=False)
 class _SetUp:
     """Records of one set-up and where they stand among those of the test."""
@@ -105,7 +109,7 @@ def _refuse_incomplete(record: Recording, hammered: bool, options: IdentifyOptio
 
 
 def _refuse_other_rate(first: Recording, record: Recording) -> None:
-    if record.sampling_rate_hz != first.sampling_rate_hz:
+    if not math.isclose(record.sampling_rate_hz, first.sampling_rate_hz, rel_tol=_SAME_RATE):
         raise BadInput(
             f"its sampling rate differs from that of {first.source}.",
             file=record.source,

@@ -46,8 +46,7 @@ def spectrum(sheet: TestSheet) -> Spectrum | None:
 def _density(records: Sequence[Recording]) -> Spectrum | None:
     """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
     first = records[0]
-    alike = [r for r in records if r.sampling_rate_hz == first.sampling_rate_hz]
-    alike = [r for r in alike if len(r.accelerations) == len(first.accelerations)]
+    alike = [r for r in records if len(r.accelerations) == len(first.accelerations)]
     length = min(record.samples for record in alike)
     wanted = max(length // _SEGMENTS, int(_LEAST_SEGMENT_S * first.sampling_rate_hz))
     if not first.accelerations or length < 2:
