@@ -20,7 +20,6 @@ from shm.identify.measuring.screening import Screening, screened
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, FrequencyResponse, Recording
 
-
 _SAME_RATE = 1e-5
 """Rates read off columns of rounded times differ by less, and no frequency feels it."""
 
