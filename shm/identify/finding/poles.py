@@ -85,6 +85,14 @@ def real_shape(shape: ComplexArray) -> FloatArray:
     return np.asarray(turned / turned[np.argmax(np.abs(turned))])
 
 
+def modal_assurance(one: FloatArray, other: FloatArray) -> float:
+    """Modal assurance criterion of two real shapes (channels,); 1 of shapes at a single channel.
+
+    Allemang and Brown (1982).
+    """
+    return float((one @ other) ** 2 / ((one @ one) * (other @ other)))
+
+
 def aligned(shape: FloatArray, reference: FloatArray) -> FloatArray:
     """`shape` (channels,) scaled to fit `reference` best, by least squares."""
     return np.asarray(shape * (shape @ reference) / (shape @ shape))

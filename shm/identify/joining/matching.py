@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from shm.identify.contract import FoundMode, Measurement
+from shm.identify.finding.poles import modal_assurance
 from shm.identify.measuring.points import Place, place_of
 from shm.identify.placing.planes import transverse_share
 from shm.values import PLANES, FloatArray
@@ -89,18 +90,14 @@ def _likeness(one: Seen, other: Seen) -> float:
     common = sorted(one.shape.keys() & other.shape.keys(), key=str)
     shapes = [np.array([seen.shape[place] for place in common]) for seen in (one, other)]
     if all(_tells(part, seen.shape) for part, seen in zip(shapes, (one, other), strict=True)):
-        return _mac(*shapes)
+        return modal_assurance(*shapes)
     if np.isnan(one.transverse) or np.isnan(other.transverse):
         return 1.0
     directions = [
         np.sqrt(np.array([seen.transverse, 1 - seen.transverse])) for seen in (one, other)
     ]
-    return _mac(*directions)
+    return modal_assurance(*directions)
 
 
 def _tells(part: FloatArray, shape: dict[Place, float]) -> bool:
     return float(part @ part) > _SEEN * sum(value**2 for value in shape.values())
-
-
-def _mac(one: FloatArray, other: FloatArray) -> float:
-    return float((one @ other) ** 2 / (one @ one) / (other @ other))

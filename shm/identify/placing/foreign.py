@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
+from shm.identify.finding.poles import modal_assurance
 from shm.values import FloatArray, ForeignMode
 
 MULTIPLES = (2, 3)
@@ -87,7 +88,7 @@ def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode
         for fold, base in product(MULTIPLES, modes)
         if _is_multiple(mode, fold, base)
         and not mode.acceleration_m_s2 > base.acceleration_m_s2
-        and _likeness(mode.shape, base.shape) >= _LIKE
+        and modal_assurance(mode.shape, base.shape) >= _LIKE
     ]
     return found[0] if found else None
 
@@ -97,11 +98,6 @@ def _is_multiple(mode: FoundMode, fold: int, base: FoundMode) -> bool:
     expected = fold * base.frequency_hz
     allowed = max(_MULTIPLE_TOLERANCE * expected, _STANDARD_DEVIATIONS * sd)
     return abs(mode.frequency_hz - expected) <= allowed
-
-
-def _likeness(one: FloatArray, other: FloatArray) -> float:
-    """Modal assurance criterion; 1 of shapes at a single point."""
-    return float((one @ other) ** 2 / ((one @ one) * (other @ other)))
 
 
 def _lies_at(mode: FoundMode, tone: Tone) -> bool:
