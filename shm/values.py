@@ -64,12 +64,33 @@ class Turnbuckle:
 
 
 @dataclass(frozen=True)
+class Scatter:
+    """Standard deviations, as fractions, by which a bar as made differs from its description."""
+
+    section: float = 0.005
+    density: float = 0.005
+    length: float = 0.005
+    modulus: float = 0.005
+
+
+@dataclass(frozen=True)
+class EffectPrior:
+    """The owner's range of one parameter of an effect of the gap diagnosis, in its unit."""
+
+    effect: str
+    parameter: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
 class Hanger:
     """One hanger as its owner describes it: geometry, material, nominal tension.
 
     `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of
     the solid section's bending stiffness that a strand has. `models` names the model classes that
-    the owner admits; empty: all that the settings name.
+    the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
+    catalogue of effects.
     """
 
     id: int
@@ -87,6 +108,8 @@ class Hanger:
     plate: EndPlate | None = None
     turnbuckles: tuple[Turnbuckle, ...] = ()
     models: tuple[str, ...] = ()
+    scatter: Scatter = field(default_factory=Scatter)
+    effect_priors: tuple[EffectPrior, ...] = ()
 
     @property
     def bending_stiffness_n_m2(self) -> float:
@@ -348,3 +371,165 @@ class Alert:
     time: datetime
     message: str
     drifts: tuple[Drift, ...]
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How far one measured frequency lies from the baseline's best prediction of it.
+
+    `residual_percent` is measured over predicted, less 1; `z` is in standard deviations of the
+    identification and of what the baseline leaves open; `share` is its part of the misfit.
+    `after_percent` is the same residual with the leading cause in the model, `held_out_percent`
+    with that cause fitted without this mode (NaN where it was not held out).
+    """
+
+    plane: Plane
+    order: int
+    test: str
+    measured_hz: float
+    predicted_hz: float
+    residual_percent: float
+    z: float
+    share: float
+    after_percent: float = NAN
+    held_out_before_percent: float = NAN
+    held_out_after_percent: float = NAN
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the gap grows with a condition: `temperature`, `amplitude`, `order`, `added mass`.
+
+    `slope_percent` is the change of the mean residual over the condition's range, with its
+    standard deviation; `share` is the part of the misfit that goes with the condition.
+    """
+
+    condition: str
+    slope_percent: float
+    slope_sd_percent: float
+    share: float
+
+
+@dataclass(frozen=True)
+class GapPlace:
+    """Where along the hanger a local cause of one `kind` would have to sit, and what it explains.
+
+    `x_m` is the likeliest place, `low_m` to `high_m` holds it with 90 % probability were it of this
+    kind; `share` is the part of the misfit that it explains. `profile` holds (x_m, density).
+    """
+
+    kind: str
+    x_m: float
+    low_m: float
+    high_m: float
+    share: float
+    profile: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class EffectEstimate:
+    """One parameter of a cause: posterior mean, standard deviation and 90 % interval, in `unit`."""
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect of the catalogue, or a pair, as an explanation of the gap.
+
+    `effect` is the name, or two joined by ` + `, and `at` where the likeliest variant acts.
+    `log_bayes_factor` compares it with the baseline, averaged over its variants; `log_fit` is what
+    the best fit gains in log likelihood and `log_occam` what its evidence pays for free parameters.
+    `group` is the index of the group of causes that the data cannot tell apart, None for none.
+    `method` is how far it was taken: `screened`, `normal` or `sampled`.
+    """
+
+    effect: str
+    at: str
+    probability: float
+    log_bayes_factor: float
+    log_fit: float
+    log_occam: float
+    parameters: tuple[EffectEstimate, ...]
+    method: Literal["screened", "normal", "sampled"]
+    group: int | None = None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects of the catalogue that it holds, one or two."""
+        return tuple(self.effect.split(" + "))
+
+
+@dataclass(frozen=True)
+class Shrinkage:
+    """Root mean square of the frequency residuals before and after, in and out of the fit."""
+
+    rms_before_percent: float
+    rms_after_percent: float
+    held_out_before_percent: float
+    held_out_after_percent: float
+
+
+@dataclass(frozen=True)
+class TensionEstimate:
+    """Posterior of the tension under one explanation: mean, sd and 90 % interval."""
+
+    mean: float
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """A measurement that would tell causes apart, and the log Bayes factor to expect of it."""
+
+    what: str
+    separates: tuple[str, str]
+    expected_log_bayes_factor: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Where a baseline and the measurements of a hanger differ, why, and what that changes.
+
+    `causes` holds every effect that these data could show, best first, and the pairs that were
+    tried; their probabilities, `no_gap_probability` and `unexplained_probability` add to 1.
+    `fit_p_value` is the posterior predictive p-value of the leading explanation. `invisible` names
+    the effects that these data cannot show, and why; `left_out` those that were taken out of the
+    catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
+    """
+
+    hanger: int | None
+    baseline: str
+    tests: tuple[str, ...]
+    where: tuple[Residual, ...]
+    trends: tuple[Trend, ...]
+    places: tuple[GapPlace, ...]
+    no_gap_probability: float
+    unexplained_probability: float
+    causes: tuple[Cause, ...]
+    groups: tuple[tuple[str, ...], ...]
+    invisible: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
+    fit_p_value: float
+    model_error_percent: float
+    shrinkage: Shrinkage
+    tension_before_n: TensionEstimate
+    tension_after_n: TensionEstimate
+    next_measurements: tuple[NextMeasurement, ...]
+    remarks: tuple[str, ...]
+    seed: int
+    seconds: float
+
+    @property
+    def leading(self) -> Cause | None:
+        """The likeliest cause; None where no gap or something unknown is likelier than each."""
+        best = max(self.causes, key=lambda cause: cause.probability, default=None)
+        rest = max(self.no_gap_probability, self.unexplained_probability)
+        return best if best is not None and best.probability > rest else None

@@ -1,0 +1,1 @@
+"""Where model and measurement differ, which effect causes it, how far the gap shrinks."""

@@ -1,0 +1,127 @@
+"""What the steps of a diagnosis hand to each other.
+
+All data of a hanger are one vector: first the logarithms of the measured frequencies, then the
+components of the measured shapes, each shape scaled to length 1 over its own components and turned
+to the sign of the measured one. So every residual is a plain difference and every covariance a
+matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shm.models.effects import Conditions, Survey, Variant
+from shm.values import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What is measured under which conditions, without its values.
+
+    Of the F frequencies `frequency_test`, `frequency_plane` and `frequency_order` (F,) say of which
+    test, plane (0, 1) and order (from 1) they are. Of the S components of shapes `shape_mode` (S,)
+    names the frequency they belong to, `shape_place` (S,) the index of `places_m` and
+    `shape_component` (S,) the axis (0 transverse, 1 longitudinal).
+    """
+
+    survey: Survey
+    conditions: tuple[Conditions, ...]
+    places_m: tuple[float, ...]
+    frequency_test: IntArray
+    frequency_plane: IntArray
+    frequency_order: IntArray
+    shape_mode: IntArray
+    shape_place: IntArray
+    shape_component: IntArray
+
+    @property
+    def frequencies(self) -> int:
+        return len(self.frequency_test)
+
+    @property
+    def size(self) -> int:
+        """How many data: F + S."""
+        return self.frequencies + len(self.shape_mode)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """The data vector of a design: `value` and `sd` (data,).
+
+    `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one.
+    """
+
+    design: Design
+    value: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Of the data about a prediction: `frequency` (F, F), and `shape` (S,), the variances.
+
+    Components of shapes err independently, frequencies do not: a model error is the same in all
+    tests.
+    """
+
+    frequency: FloatArray
+    shape: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseNode:
+    """One possibility of the unknown errors: its covariance and the log of its prior weight.
+
+    The weights of all nodes of a hypothesis add to 1. `model_error` is the fraction it stands for.
+    """
+
+    covariance: Covariance
+    log_weight: float
+    model_error: float
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """The baseline with no, one or two effects, each with where it acts.
+
+    `flexible` adds a deliberately flexible remainder that stands for what is not in the catalogue.
+    """
+
+    effects: tuple[tuple[str, Variant], ...] = ()
+    flexible: bool = False
+
+    @property
+    def name(self) -> str:
+        """The effects' names, joined by ` + `; empty for the baseline."""
+        return " + ".join(name for name, _ in self.effects)
+
+    @property
+    def at(self) -> str:
+        """Where the effects act, joined by ` + `."""
+        return " + ".join(variant.at for _, variant in self.effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A hypothesis given the observations, in coordinates z (d) with standard normal priors.
+
+    `z` is the most probable point, `covariance` (d, d) that of the posterior's normal
+    approximation; `predicted` (data,) and `slopes` (data, d) are the prediction there and its
+    derivatives by z. `noise` is the covariance of the data about the prediction: identification
+    and model error, the model error at its most probable size `model_error` (a fraction). `draws`
+    (n, d) are equal draws of the posterior. `log_fit` is the log likelihood at z, `log_evidence`
+    the log evidence. `method` is `screened`, `normal` or `sampled`.
+    """
+
+    hypothesis: Hypothesis
+    z: FloatArray
+    covariance: FloatArray
+    predicted: FloatArray
+    slopes: FloatArray
+    noise: Covariance
+    model_error: float
+    draws: FloatArray
+    log_fit: float
+    log_evidence: float
+    log_evidence_sd: float
+    method: str

@@ -1,0 +1,135 @@
+"""What an effect of the catalogue is: places where it may act, parameters, and a physical term."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from shm.models.hanger.physical import PhysicalHanger
+from shm.values import AddedMass, FloatArray, Hanger, Plane
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What one test was made under, as far as an effect may depend on it.
+
+    `temperature_shift_k` counts from the reference (the mean of the tests), 0 where unknown: the
+    diagnosis says so; `amplitude` is relative to the reference level, 1 where unknown.
+    """
+
+    test: str = ""
+    temperature_shift_k: float = 0.0
+    amplitude: float = 1.0
+    added_mass: AddedMass | None = None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the tests of a hanger measure and vary; each field sorted, without repeats or NaN."""
+
+    tests: tuple[str, ...]
+    planes: tuple[Plane, ...]
+    sensor_places_m: tuple[float, ...]
+    biaxial: bool
+    temperatures_c: tuple[float, ...]
+    amplitudes: tuple[float, ...]
+    added_masses: tuple[AddedMass, ...]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Where an effect acts: `ends` (deck 0, arch 1), `planes`, the index of a sensor, a test.
+
+    `at` says it in words; `key` in a word that may stand in the name of a model class.
+    """
+
+    at: str = "everywhere"
+    ends: tuple[int, ...] = ()
+    planes: tuple[int, ...] = (0, 1)
+    sensor: int | None = None
+    test: str = ""
+
+    @property
+    def key(self) -> str:
+        return self.at.replace(", ", ".").replace(" ", "_")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect with its prior, and why an engineer would defend it.
+
+    `spread` says in what the prior is uniform: the value or its logarithm; `signed` lets a
+    logarithmic one have either sign with equal chance. `zero` is the value at which the effect
+    vanishes, NaN for a parameter that only says where or how.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    zero: float
+    reason: str
+    spread: Literal["uniform", "logarithmic"] = "uniform"
+    signed: bool = False
+
+    def value(self, share: FloatArray) -> FloatArray:
+        """Values at shares (n,) of the prior, from 0 to 1."""
+        if self.signed:
+            sign = np.where(share < 0.5, -1.0, 1.0)
+            return np.asarray(sign * self._between(np.abs(2 * share - 1)))
+        return self._between(share)
+
+    def share(self, value: FloatArray) -> FloatArray:
+        """The inverse of `value`."""
+        if not self.signed:
+            return self._part(value)
+        return np.asarray(0.5 + np.sign(value) * self._part(np.abs(value)) / 2)
+
+    def _between(self, part: FloatArray) -> FloatArray:
+        if self.spread == "uniform":
+            return np.asarray(self.lower + (self.upper - self.lower) * part)
+        return np.asarray(self.lower * (self.upper / self.lower) ** part)
+
+    def _part(self, value: FloatArray) -> FloatArray:
+        if self.spread == "uniform":
+            return np.asarray((value - self.lower) / (self.upper - self.lower))
+        return np.asarray(np.log(value / self.lower) / np.log(self.upper / self.lower))
+
+
+class Effect:
+    """A member of the catalogue. It declares its names and overrides the verbs.
+
+    `source` is the literature it follows. The first parameter is the effect's size.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        """Why these data cannot show the effect, a sentence for people; empty where they can."""
+        return ""
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        """Where it may act, of what these data could show."""
+        return (Variant(),)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        """Its parameters with the catalogue's priors, the size first."""
+        raise TypeError(f"{type(self).__name__} declares no parameters.")
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        """The hangers (n) with this effect of `values` (n, parameters) in one test.
+
+        With the size at its `zero` they are the same.
+        """
+        raise TypeError(f"{type(self).__name__} does not say what it does to a hanger.")

@@ -1,0 +1,13 @@
+"""The general model of a hanger: any physical term that the catalogue of effects knows."""
+
+from __future__ import annotations
+
+from shm.models.hanger.physical import (
+    HangerModes,
+    LateralSpring,
+    PhysicalHanger,
+    PointMass,
+    Zone,
+)
+
+__all__ = ["HangerModes", "LateralSpring", "PhysicalHanger", "PointMass", "Zone"]
