@@ -1,0 +1,205 @@
+"""What is wrong with the tests of a diagnosis, in words, and what that does to the answer."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+
+from shm.errors import BadInput
+from shm.values import PLANES, Hanger, ModalTest, Mode
+
+_FEW_FREQUENCIES = 4
+_CONTRADICTION_SD = 6.0
+_SAME_TEMPERATURE_K = 2.0
+_SAME_LEVEL = 1.1
+
+
+@dataclass(frozen=True)
+class Usable:
+    """The tests that a diagnosis uses, and what was found on the way to them."""
+
+    tests: tuple[ModalTest, ...]
+    remarks: tuple[str, ...]
+
+
+def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
+    """Tests without the modes that cannot be what they are called, with a remark for each fault.
+
+    Raises BadInput where nothing is left, where two tests have one name, belong to another hanger
+    or have masses or sensors beyond its ends.
+    """
+    _refuse(tests, hanger)
+    kept, remarks = [], []
+    for test in tests:
+        doubtful = _doubtful(test)
+        remarks += [f"Test {test.id}: {reason}" for reason in doubtful.values()]
+        modes = tuple(mode for mode in test.modes if _name(mode) not in doubtful)
+        if modes:
+            kept.append(replace(test, modes=modes))
+    if not kept:
+        raise BadInput(
+            "no test holds a mode that can be used. " + " ".join(remarks),
+            remedy="Give tests with modes whose orders rise with their frequencies.",
+        )
+    return Usable(tuple(kept), (*remarks, *_said_of_all(kept)))
+
+
+def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
+    for name, times in Counter(test.id for test in tests).items():
+        if times > 1:
+            raise BadInput(f"test id {name} is given {times} times.", remedy="Give each its own.")
+    for test in tests:
+        if test.hanger is not None and test.hanger != hanger.id:
+            raise BadInput(
+                f"test {test.id} is of hanger {test.hanger}, not of {hanger.id}.",
+                remedy="Diagnose the hangers one by one.",
+            )
+        for what, x_m in _places(test):
+            if not 0 <= x_m <= hanger.length_m:
+                raise BadInput(
+                    f"test {test.id}: {what} at {x_m:g} m is beyond the ends of the hanger "
+                    f"(0 to {hanger.length_m:g} m).",
+                    remedy="Measure x_m from the deck end, in m.",
+                )
+
+
+def _places(test: ModalTest) -> Iterator[tuple[str, float]]:
+    if test.added_mass is not None:
+        yield "the added mass", test.added_mass.x_m
+    for mode in test.modes:
+        for point in mode.shape:
+            yield f"a sensor of {_name(mode)}", point.x_m
+
+
+def _name(mode: Mode) -> str:
+    return f"{mode.plane} {mode.order}"
+
+
+def _doubtful(test: ModalTest) -> dict[str, str]:
+    """The modes of a test whose order cannot be right, and why."""
+    found: dict[str, str] = {}
+    for plane in PLANES:
+        modes = sorted((m for m in test.modes if m.plane == plane), key=lambda m: m.order)
+        for one, other in pairwise(modes):
+            if one.order == other.order:
+                found[_name(one)] = (
+                    f"{_name(one)} is given twice ({one.frequency_hz:g} and "
+                    f"{other.frequency_hz:g} Hz); it is left out."
+                )
+            elif one.frequency_hz >= other.frequency_hz:
+                reason = (
+                    f"{_name(other)} ({other.frequency_hz:g} Hz) does not lie above {_name(one)} "
+                    f"({one.frequency_hz:g} Hz); both are left out, since a wrong order would look "
+                    f"like a large gap."
+                )
+                found[_name(one)] = found[_name(other)] = reason
+    return found
+
+
+def _said_of_all(tests: Sequence[ModalTest]) -> list[str]:
+    remarks = [
+        _few(tests),
+        _without_sd(tests),
+        _without_temperature(tests),
+        _without_shape_sd(tests),
+    ]
+    return [remark for remark in remarks if remark] + _contradictions(tests)
+
+
+def _few(tests: Sequence[ModalTest]) -> str:
+    names = {_name(mode) for test in tests for mode in test.modes}
+    if len(names) >= _FEW_FREQUENCIES:
+        return ""
+    only = "Only one mode is" if len(names) == 1 else f"Only {len(names)} modes are"
+    return (
+        f"{only} given ({', '.join(sorted(names))}): tension alone can follow so few frequencies, "
+        f"so that a gap can hardly show and its cause cannot; give at least {_FEW_FREQUENCIES}, "
+        f"better eight a plane."
+    )
+
+
+def _without_sd(tests: Sequence[ModalTest]) -> str:
+    modes = [mode for test in tests for mode in test.modes]
+    missing = sum(math.isnan(mode.frequency_sd_hz) for mode in modes)
+    if not missing:
+        return ""
+    which = (
+        "No frequency has"
+        if missing == len(modes)
+        else f"{missing} of {len(modes)} frequencies have no"
+    )
+    what = "a standard deviation" if missing == len(modes) else "standard deviation"
+    return (
+        f"{which} {what}: how exact they are is estimated together with the cause, from 0.01 to "
+        f"3 %. A gap can then pass for scatter, and the fit cannot be judged by itself; identify "
+        f"the recordings, which gives each frequency its standard deviation."
+    )
+
+
+def _without_temperature(tests: Sequence[ModalTest]) -> str:
+    missing = [test.id for test in tests if math.isnan(test.temperature_c)]
+    if not missing or len(missing) == len(tests):
+        return ""
+    return (
+        f"No temperature is known of {_listed(missing)}: taken as the mean of the others, which "
+        f"hides or imitates an effect of the temperature."
+    )
+
+
+def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
+    points = [point for test in tests for mode in test.modes for point in mode.shape]
+    missing = sum(math.isnan(point.sd) for point in points)
+    if not missing:
+        return ""
+    return (
+        f"{missing} of {len(points)} points of mode shapes have no standard deviation: their "
+        f"shapes are not used, and what only shapes show stays hidden."
+    )
+
+
+def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
+    """Pairs of tests under like conditions whose frequencies differ beyond their errors."""
+    found = []
+    for one, other in combinations(tests, 2):
+        worst = _worst_difference(one, other) if _alike(one, other) else None
+        if worst is not None and worst[1] > _CONTRADICTION_SD:
+            mode, ratio_sd, percent = worst
+            found.append(
+                f"Tests {one.id} and {other.id} contradict each other: made under the same "
+                f"conditions, {mode} differs by {percent:.2f} % ({ratio_sd:.0f} standard "
+                f"deviations). No steady effect can explain both, so that something unexplained "
+                f"becomes likely; if the hanger changed in between, diagnose them one by one."
+            )
+    return found
+
+
+def _alike(one: ModalTest, other: ModalTest) -> bool:
+    """Whether nothing is known to differ between the tests' conditions."""
+    if one.added_mass != other.added_mass:
+        return False
+    if abs(one.temperature_c - other.temperature_c) > _SAME_TEMPERATURE_K:
+        return False
+    levels = sorted([one.amplitude, other.amplitude])
+    return not levels[1] > _SAME_LEVEL * levels[0]
+
+
+def _worst_difference(one: ModalTest, other: ModalTest) -> tuple[str, float, float] | None:
+    """The mode that differs most, in standard deviations and in percent; None without these."""
+    theirs = {_name(mode): mode for mode in other.modes}
+    differences = []
+    for mode in one.modes:
+        match = theirs.get(_name(mode))
+        if match is None:
+            continue
+        sd = math.hypot(mode.frequency_sd_hz, match.frequency_sd_hz)
+        apart = abs(mode.frequency_hz - match.frequency_hz)
+        if sd > 0:
+            differences.append((_name(mode), apart / sd, 100 * apart / mode.frequency_hz))
+    return max(differences, key=lambda found: found[1], default=None)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"test {names[0]}" if len(names) == 1 else f"tests {', '.join(names)}"
