@@ -13,6 +13,7 @@ from pathlib import Path
 
 import rich_click as click
 
+from docs.effects_page import effects_page
 from shm.settings import TABLE, Setting
 from shm_cli.main import VERBS, cli
 from shm_cli.validate import compared, markdown
@@ -88,6 +89,7 @@ def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
+    (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)

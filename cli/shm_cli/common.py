@@ -152,14 +152,7 @@ def _say_if_another(test: ModalTest, hanger: Hanger) -> None:
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
     """A bar on stderr; it is told a label and the fraction done, and draws one line a label."""
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with _fraction_bar() as bar:
         tasks: dict[str, Any] = {}
 
         def tell(label: str, fraction: float) -> None:
@@ -168,6 +161,32 @@ def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
             bar.update(tasks[label], completed=fraction)
 
         yield tell
+
+
+@contextmanager
+def advancing_bar() -> Iterator[Callable[[str, float], None]]:
+    """One bar on stderr for a job of many steps; it is told the step and the fraction of all."""
+    with _fraction_bar() as bar:
+        task, done = bar.add_task("", total=1.0), 0.0
+
+        def tell(label: str, fraction: float) -> None:
+            nonlocal done
+            done = max(done, fraction)
+            bar.update(task, description=label.replace("_", " "), completed=done)
+
+        yield tell
+
+
+def _fraction_bar() -> Progress:
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
 
 
 def counting_bar() -> Progress:

@@ -37,6 +37,7 @@ VERBS: dict[str, Verb] = {
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
     "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
     "select": Verb("shm_cli.select", "Compare model classes by their evidence."),
+    "gap": Verb("shm_cli.gap", "Why model and measurement differ, and what that does to tension."),
     "report": Verb("shm_cli.report", "What an engineer files about a hanger."),
     "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
     "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),

@@ -17,7 +17,7 @@ from shm_cli.common import (
     hanger_option,
     json_option,
     method_option,
-    open_workspace,
+    opened_store,
     progress_bar,
     repeat_option,
     samples_option,
@@ -56,13 +56,14 @@ def command(
     """Compare model classes by their evidence.
 
     The classes are equally probable beforehand; those that do not apply to the hanger are left out
-    and say why. The tests come from MODES.json, or are the latest of a hanger of the workspace.
+    and say why. The tests come from MODES.json, or are the latest of a hanger of the workspace,
+    which brings the classes that it has adopted.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     """
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    names = _names(ctx, models, from_files=hanger_file is not None)
+    names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger) for name in competing_names(hanger, names)]
     options = UpdateOptions(samples, seed, repeat, method)
@@ -76,11 +77,15 @@ def command(
         click.echo(f"{name} does not apply: {reason}")
 
 
-def _names(ctx: click.Context, models: str | None, from_files: bool) -> tuple[str, ...]:
-    """The classes asked for, or those of the setting, which a workspace may give."""
+def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:
+    """The classes asked for, or those of the setting and, of a workspace's hanger, the adopted."""
     if models is not None:
         return load_settings({"models": models}, environment={}).model_names
-    return (load_settings() if from_files else open_workspace(ctx).settings).model_names
+    if hanger_id is None:
+        return load_settings().model_names
+    with opened_store(ctx) as (workspace, store):
+        adopted = [each.adoption.model for each in store.adoptions(hanger_id)]
+    return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 
 
 def show_selection(selection: Selection) -> None:

@@ -15,9 +15,11 @@ from shm.errors import UsageError
 from shm.read import FORMATS, write
 from shm.simulate import (
     DISTURBANCES,
+    PLANTED,
     AmbientPlan,
     HammerPlan,
     HangerState,
+    TestConditions,
     ambient_test,
     hammer_test,
     spread_places_m,
@@ -30,12 +32,14 @@ from shm_cli.common import (
     one_hanger,
     seed_option,
 )
+from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)
 _SPRING = "End spring in N m/rad; clamped if left out."
 _SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS)
 _WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 _HAMMER_SECONDS, _HAMMER_NOISE = 20.0, 0.02
+_SENSORS = 2
 
 
 class Chosen(TypedDict):
@@ -48,7 +52,7 @@ class Chosen(TypedDict):
     k4: float
     damping: float
     noise: float | None
-    sensors: int
+    sensors: int | None
     hits: int
     hammer_x: float
     seconds: float | None
@@ -56,6 +60,10 @@ class Chosen(TypedDict):
     ambient: bool
     disturbances: tuple[str, ...]
     temperature_c: float
+    effects: tuple[str, ...]
+    reference_c: float
+    amplitude: float
+    added_mass: str | None
 
 
 @click.command()
@@ -71,9 +79,7 @@ class Chosen(TypedDict):
 @click.option(
     "--sensors",
     type=click.IntRange(1, 8),
-    default=2,
-    show_default=True,
-    help="Places with a biaxial accelerometer each.",
+    help="Places with a biaxial accelerometer each; 2, or 4 (at most) in a campaign.",
 )
 @click.option("--hits", type=click.IntRange(1, 50), default=5, show_default=True)
 @click.option(
@@ -93,6 +99,44 @@ class Chosen(TypedDict):
     metavar="NAME",
     help=f"What goes wrong, may be repeated. {_WRONG}.",
 )
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME:AT:param=value,...",
+    help="What is planted beside the springs, may be repeated: where it acts and all its "
+    "parameters, as `shm gap` names them; 'point_mass:everywhere:mass_kg=12,x_m=3.4' or "
+    "'rotational_end_flexibility:deck end, transverse:log10_k1=6.8' for instance. Names: "
+    f"{', '.join(PLANTED)}.",
+)
+@click.option(
+    "--amplitude",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Level of the hits: effects follow it, and so does the force.",
+)
+@click.option(
+    "--reference-c",
+    type=float,
+    default=10.0,
+    show_default=True,
+    help="Temperature at which the tension is the planted one.",
+)
+@click.option("--added-mass", metavar="KG:X", help="A known mass, clamped on at X m.")
+@click.option(
+    "--campaign",
+    is_flag=True,
+    help="Modal tests instead of recordings: three temperatures, three levels, one with a known "
+    "mass, with noise and the scatter of manufacture; the truth beside them.",
+)
+@click.option(
+    "--lacking",
+    multiple=True,
+    type=click.Choice(list(LACKS)),
+    metavar="WHAT",
+    help=f"What a campaign does not measure, may be repeated: {', '.join(LACKS)}.",
+)
 @click.option("--tests", type=click.IntRange(1, 10_000), default=1, show_default=True)
 @click.option("--temperature-c", type=float, default=math.nan, help="Unknown if left out.")
 @click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
@@ -111,18 +155,28 @@ def command(
     form: str,
     out: Path,
     seed: int,
+    campaign: bool,
+    lacking: tuple[str, ...],
     **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
 
-    Beam finite elements are hit in the time domain; biaxial accelerometers record.
+    Beam finite elements are hit in the time domain; biaxial accelerometers record. Effects of the
+    gap diagnosis can be planted, in recordings or in a whole campaign of modal tests.
 
     \b
-    Example: shm simulate --hanger-file H.toml --tension-n 650e3 --k1 1e7 --k3 1e7 --out tests
+    Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
     """
+    _refuse_what_does_not_go_together(campaign, lacking, chosen)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     start = first.replace(tzinfo=UTC) if first else _FIRST
     out.mkdir(parents=True, exist_ok=True)
+    if campaign:
+        effects = [effect_of(text) for text in chosen["effects"]]
+        state = _state(hanger, chosen)
+        for path in write_campaign(hanger, state, effects, lacking, chosen["sensors"], seed, out):
+            click.echo(path)
+        return
     with counting_bar() as bar:
         for week in bar.track(range(tests), description="simulating"):
             time = start + timedelta(weeks=week)
@@ -131,6 +185,24 @@ def command(
             recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
             click.echo(out / name)
+
+
+def _refuse_what_does_not_go_together(
+    campaign: bool, lacking: tuple[str, ...], chosen: Chosen
+) -> None:
+    if lacking and not campaign:
+        raise UsageError("--lacking is of a campaign.", remedy="Add --campaign.")
+    of_recordings = {
+        "--ambient": chosen["ambient"],
+        "--disturbance": chosen["disturbances"],
+        "--added-mass": chosen["added_mass"],
+    }
+    for option, given in of_recordings.items():
+        if campaign and given:
+            raise UsageError(
+                f"{option} is of recordings, and a campaign makes none.",
+                remedy=f"Leave out {option} or --campaign.",
+            )
 
 
 def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Recording:
@@ -157,11 +229,29 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
         hits=chosen["hits"],
         seconds_per_hit=_HAMMER_SECONDS if seconds is None else seconds,
         sampling_rate_hz=chosen["rate"],
-        sensors_x_m=spread_places_m(hanger, chosen["sensors"]),
+        sensors_x_m=spread_places_m(hanger, chosen["sensors"] or _SENSORS),
         hammer_x_m=chosen["hammer_x"],
         acceleration_noise_m_s2=_HAMMER_NOISE if noise is None else noise,
     )
-    return hammer_test(hanger, state, plan, rng, disturbances=chosen["disturbances"])
+    plan = replace(plan, peak_force_n=plan.peak_force_n * chosen["amplitude"])
+    return hammer_test(
+        hanger,
+        state,
+        plan,
+        rng,
+        disturbances=chosen["disturbances"],
+        effects=[effect_of(text) for text in chosen["effects"]],
+        conditions=_conditions(chosen),
+    )
+
+
+def _conditions(chosen: Chosen) -> TestConditions:
+    return conditions_of(
+        chosen["temperature_c"],
+        chosen["reference_c"],
+        chosen["amplitude"],
+        mass_of(chosen["added_mass"]),
+    )
 
 
 def _listened(
@@ -171,11 +261,16 @@ def _listened(
         raise UsageError(
             "disturbances are those of a hammer test.", remedy="Leave out --disturbance."
         )
+    if chosen["effects"] or chosen["added_mass"]:
+        raise UsageError(
+            "effects and a known mass are planted in hammer tests and campaigns only.",
+            remedy="Leave out --ambient.",
+        )
     usual, seconds, noise = AmbientPlan(), chosen["seconds"], chosen["noise"]
     plan = AmbientPlan(
         seconds=usual.seconds if seconds is None else seconds,
         sampling_rate_hz=chosen["rate"],
-        sensors_x_m=spread_places_m(hanger, chosen["sensors"]),
+        sensors_x_m=spread_places_m(hanger, chosen["sensors"] or _SENSORS),
         acceleration_noise_m_s2=usual.acceleration_noise_m_s2 if noise is None else noise,
     )
     return ambient_test(hanger, state, plan, rng)

@@ -8,6 +8,7 @@ from typing import Any
 import rich_click as click
 
 from shm.models import applicable
+from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.store import DeliveryState, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
 
@@ -45,6 +46,22 @@ def command(ctx: click.Context, as_json: bool) -> None:
     show_table(made)
     for said, hangers in _competitions(document["hangers"]).items():
         click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
+    for row in document["hangers"]:
+        if row["gap"] is not None:
+            click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+
+
+def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
+    """How the gap has gone since an effect was adopted; None where none is."""
+    if watch is None:
+        return None
+    return {
+        "before_percent": watch.adopted.adoption.gap_before_percent,
+        "adopted_percent": watch.adopted.adoption.gap_percent,
+        "now_percent": watch.now_percent,
+        "has_grown": watch.has_grown,
+        "said": str(watch),
+    }
 
 
 def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
@@ -70,7 +87,8 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     hangers = []
     for hanger in workspace.bridge.hangers:
         tests, baseline = store.tests(hanger.id), store.baseline(hanger.id)
-        names, reasons = applicable(hanger, workspace.settings.model_names)
+        adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+        names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         hangers.append(
             {
                 "hanger": hanger.id,
@@ -80,6 +98,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
                 "competing": list(names),
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
+                "gap": _gap(gap_watch(store, hanger.id)),
             }
         )
     quarantined = workspace.quarantine.folder.glob("*.reason.json")

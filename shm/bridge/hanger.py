@@ -1,4 +1,4 @@
-"""A `[[hanger]]` table: section, plates, turnbuckles, admitted model classes, thresholds."""
+"""A `[[hanger]]` table: section, plates, turnbuckles, admitted model classes, thresholds, gap."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from shm.bridge.effects import effect_priors_of, scatter_of
 from shm.bridge.table import Table
 from shm.values import NAN, EndPlate, Hanger, Thresholds, Turnbuckle
 
@@ -14,7 +15,7 @@ _REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
 _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
-    "plate", "turnbuckle", "thresholds",
+    "plate", "turnbuckle", "thresholds", "scatter", "effects",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -44,6 +45,8 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         plate=_plate(table.table("plate"), length_m, diameter),
         turnbuckles=_turnbuckles(table.tables("turnbuckle"), length_m),
         models=_models(table),
+        scatter=scatter_of(table.table("scatter")),
+        effect_priors=effect_priors_of(table.table("effects")),
     )
 
 

@@ -9,9 +9,13 @@ matrix.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
+
+Method: TypeAlias = Literal["screened", "normal", "sampled"]
+"""How far a hypothesis was taken: linearised, by Laplace's method, by importance sampling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,20 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
+class Peak:
+    """A normal distribution about one of the most probable points of a posterior.
+
+    `signs` (d,) are -1 or 1 for parameters of either sign and 0 for others; `w` (d,) and
+    `covariance` (d, d) are in the coordinates of these signs (see `shm.gap.coordinates`).
+    """
+
+    signs: FloatArray
+    w: FloatArray
+    covariance: FloatArray
+    log_evidence: float
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A hypothesis given the observations, in coordinates z (d) with standard normal priors.
 
@@ -110,7 +128,8 @@ class Fit:
     derivatives by z. `noise` is the covariance of the data about the prediction: identification
     and model error, the model error at its most probable size `model_error` (a fraction). `draws`
     (n, d) are equal draws of the posterior. `log_fit` is the log likelihood at z, `log_evidence`
-    the log evidence. `method` is `screened`, `normal` or `sampled`.
+    the log evidence. `method` is `screened`, `normal` or `sampled`. `peaks` are the normal
+    distributions that its evidence was first taken from.
     """
 
     hypothesis: Hypothesis
@@ -124,4 +143,5 @@ class Fit:
     log_fit: float
     log_evidence: float
     log_evidence_sd: float
-    method: str
+    method: Method
+    peaks: tuple[Peak, ...] = ()

@@ -1,6 +1,7 @@
 """The model classes of a hanger: parameters to frequencies and shapes.
 
-A new class is one file and one line in `MODELS`.
+A new class is one file and one line in `MODELS`; a baseline with effects that a hanger's owner
+adopted is made from its name (see `shm.models.adopted_name`).
 """
 
 from __future__ import annotations
@@ -8,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.errors import UsageError
+from shm.models.adopted import Adopted
+from shm.models.adopted import unfit as adopted_unfit
+from shm.models.adopted_name import AdoptedName, is_adopted
 from shm.models.base import Model
-from shm.models.beam import Beam1, Beam2
-from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
+from shm.models.registry import MODELS
 from shm.values import Hanger
-
-MODELS: dict[str, type[Model]] = {
-    model.name: model for model in (Beam1, Beam2, S1, S2, Solid0, Solid1, Solid2)
-}
 
 
 def build(name: str, hanger: Hanger) -> Model:
@@ -31,7 +30,13 @@ def build(name: str, hanger: Hanger) -> Model:
             f"model class {name} does not apply to hanger {hanger.id}: {reason}",
             remedy=f"Classes that apply: {', '.join(fitting) or 'none'}.",
         )
-    return MODELS[name](hanger)
+    return described(name, hanger)
+
+
+def described(name: str, hanger: Hanger) -> Model:
+    """The model class `name` of `hanger`, be it admitted or not; UsageError for an unknown name."""
+    _refuse_unknown(name, hanger)
+    return Adopted(name, hanger) if is_adopted(name) else MODELS[name](hanger)
 
 
 def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
@@ -58,15 +63,29 @@ def competing_names(hanger: Hanger, names: Sequence[str]) -> tuple[str, ...]:
 
 def _why_not(name: str, hanger: Hanger) -> str:
     """A sentence from its predicate on; empty where the class applies."""
+    _refuse_unknown(name, hanger)
+    if hanger.models and not {name, name.partition("+")[0]} & set(hanger.models):
+        return f"the hanger's `models` admits {', '.join(hanger.models)} only."
+    return adopted_unfit(name, hanger) if is_adopted(name) else MODELS[name].unfit(hanger)
+
+
+def _refuse_unknown(name: str, hanger: Hanger) -> None:
     for each in (name, *hanger.models):
-        if each not in MODELS:
+        if not is_adopted(each) and each not in MODELS:
             where = "" if each == name else f" in `models` of hanger {hanger.id}"
             raise UsageError(
-                f"unknown model class {each!r}{where}.", remedy=f"Known: {', '.join(MODELS)}."
+                f"unknown model class {each!r}{where}.",
+                remedy=f"Known: {', '.join(MODELS)}; with an effect: beam1+point_mass@everywhere.",
             )
-    if hanger.models and name not in hanger.models:
-        return f"the hanger's `models` admits {', '.join(hanger.models)} only."
-    return MODELS[name].unfit(hanger)
 
 
-__all__ = ["MODELS", "Model", "applicable", "build", "competing_names"]
+__all__ = [
+    "MODELS",
+    "AdoptedName",
+    "Model",
+    "applicable",
+    "build",
+    "competing_names",
+    "described",
+    "is_adopted",
+]

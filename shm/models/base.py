@@ -9,6 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from shm.errors import BadInput, UsageError
+from shm.models.conditions import Conditions
+from shm.models.laden import laden_ratio
 from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
@@ -21,14 +23,17 @@ def silent(fraction: float) -> None:
 class Model:
     """A model class of one hanger. A member declares its parameters and overrides two verbs.
 
+    One whose frequencies depend on the conditions of a test overrides `conditions`,
+    `frequencies_at` and `refuse` too.
+
     `bounds` are the uniform priors of the parameters; `swaps` lists pairs of end springs (log10)
     that can be exchanged without changing any frequency, so that sampling may keep to one copy.
     `expensive` says that an evaluation costs much more than a beam's.
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    bounds: ClassVar[Mapping[str, tuple[float, float]]]
+    name: str
+    title: str
+    bounds: Mapping[str, tuple[float, float]]
     swaps: Sequence[Swap] = ()
     expensive: ClassVar[bool] = False
 
@@ -55,6 +60,28 @@ class Model:
         The second axis is the plane, transverse and longitudinal.
         """
         raise TypeError(f"{type(self).__name__} does not say how its frequencies follow.")
+
+    def conditions(self, test: ModalTest) -> Conditions:
+        """The conditions of `test` that this class takes notice of; others stay at the reference.
+
+        Tests whose conditions are equal share their frequencies.
+        """
+        return Conditions(added_mass=test.added_mass)
+
+    def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
+        """Frequencies (n, 2, modes) under the conditions of a test.
+
+        A known mass changes them as it changes those of the general model on the same ends.
+        """
+        found = self.frequencies_hz(theta, modes)
+        if conditions.added_mass is None:
+            return found
+        values = dict(zip(self.parameter_names, theta.T, strict=True))
+        length_m = values.get("theta_L", np.ones(len(theta))) * self.hanger.length_m
+        tension_n = values["theta_F"] * self.hanger.nominal_tension_n
+        springs = self.springs_n_m_rad(theta)
+        mass = conditions.added_mass
+        return found * laden_ratio(self.hanger, length_m, tension_n, springs, mass, modes)
 
     def reference_frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         """The same without any approximation made for speed, where the class makes one."""
@@ -87,11 +114,12 @@ class Model:
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput where this class cannot describe the conditions of `test`."""
-        if test.added_mass is not None:
+        mass, length_m = test.added_mass, self.hanger.length_m
+        if mass is not None and not 0 <= mass.x_m <= length_m:
             raise BadInput(
-                f"test {test.id} has a known mass of {test.added_mass.mass_kg:g} kg clamped on, "
-                f"which model class {self.name} does not describe.",
-                remedy="Leave this test out for this model class.",
+                f"test {test.id} has a known mass at {mass.x_m:g} m, beyond the ends of hanger "
+                f"{self.hanger.id} (0 to {length_m:g} m).",
+                remedy="Measure x_m from the deck end, in m.",
             )
 
     def pack(self, values: Mapping[str, float]) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from importlib import import_module
@@ -13,19 +13,17 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
-from shm.pipeline.terms import identify_lineage, seed_of
+from shm.pipeline.terms import identify_lineage, update_terms
 from shm.store import (
     Delivery,
     IdentifiedTest,
-    Lineage,
     Stage,
     Store,
     StoredRecording,
-    StoredTest,
     WaitingTest,
     Workspace,
 )
-from shm.values import Alert, Hanger, Posterior
+from shm.values import Alert, Hanger
 
 Clock = Callable[[], datetime]
 Notifier = Callable[[Hook, Alert], None]
@@ -133,7 +131,8 @@ class Jobs:
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.test(test.id) for test in first]
         names = competing_names(hanger, self.workspace.settings.model_names)
-        samples, seed, lineage = self._terms(hanger, names, tests)
+        settings = self.workspace.settings
+        samples, seed, lineage = update_terms(hanger, names, tests, settings)
         plain = [test.test for test in tests]
         run = partial(run_step, "select_model", plain, hanger, names, samples, seed)
         return Step(
@@ -141,18 +140,21 @@ class Jobs:
         )
 
     def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
-        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id)
+        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id, model)
         # Not the latest posterior: a result must not depend on which tests were computed before.
-        known = baseline.posterior if baseline and baseline.posterior.model == model else None
-        samples, seed, lineage = self._terms(hanger, [model], [test], known)
+        known = baseline.posterior if baseline else None
+        settings = self.workspace.settings
+        samples, seed, lineage = update_terms(hanger, [model], [test], settings, known)
         run = partial(run_step, "update_test", test.test, hanger, model, known, samples, seed)
         return Step(run, lambda found: self.store.updated(test, found, lineage, self.clock()))
 
     def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
-        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id)
+        test = self.store.test(waiting.id)
+        current = self.store.posterior_of(test)
+        # Of the test's own class: another may have been adopted, or dropped, since its update.
+        baseline = self.store.baseline(hanger.id, current.model)
         if baseline is None:
             raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
-        current = self.store.posterior_of(test)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
         run = partial(run_step, "watch_test", baseline, current, hanger, test.test.id, test.time)
         return Step(
@@ -166,22 +168,6 @@ class Jobs:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}
         run = partial(_notify, notifier, hooks.get(delivery.hook), delivery)
         return Step(run, lambda _: self.store.delivered(delivery, self.clock()))
-
-    def _terms(
-        self,
-        hanger: Hanger,
-        models: Sequence[str],
-        tests: Sequence[StoredTest],
-        known: Posterior | None = None,
-    ) -> tuple[int, int, Lineage]:
-        """Samples, seed and lineage of an update; the seed depends on what is updated alone."""
-        settings = self.workspace.settings
-        samples, seed = settings.samples, seed_of(settings.seed, [test.key for test in tests])
-        terms = {"models": list(models), "samples": samples, "seed": seed}
-        inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
-        if known is not None:
-            inputs.append(known.samples.tolist())
-        return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
 
 
 def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[WaitingTest]) -> Job:

@@ -8,6 +8,7 @@ from datetime import datetime
 import shm
 from shm.errors import NothingThere
 from shm.identify import identify
+from shm.pipeline.adopting import gap_watch
 from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage
 from shm.read import read_test
@@ -30,7 +31,8 @@ def hanger_report(
             remedy="Take recordings in with `shm ingest FILE`, or see `shm status`.",
         )
     latest, posterior = history[-1]
-    selection, baseline = store.selection(hanger_id), store.baseline(hanger_id)
+    selection, baseline = store.selection(hanger_id), store.baseline(hanger_id, posterior.model)
+    diagnosis, watch = store.latest_diagnosis(hanger_id), gap_watch(store, hanger_id)
     return HangerReport(
         bridge=workspace.bridge.name,
         hanger=hanger,
@@ -45,6 +47,8 @@ def hanger_report(
         alerts=tuple(stored.alert for stored in store.alerts(hanger_id)),
         frequency_response=store.frequency_response(latest),
         quality=latest.quality,
+        diagnosis=diagnosis.diagnosis if diagnosis else None,
+        gap_watch=str(watch) if watch else "",
         lineage={
             "input_sha256": latest.lineage.input_sha256,
             "settings_sha256": latest.lineage.settings_sha256,

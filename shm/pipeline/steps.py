@@ -20,7 +20,7 @@ from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
 from shm.update import UpdateOptions, refresh, select, update
 from shm.values import Alert, Drift, Hanger, ModalTest, Posterior, Selection
-from shm.watch import assess, decide
+from shm.watch import assess, decide, joined, watch_gap
 
 
 def identify_file(
@@ -120,7 +120,8 @@ def update_test(
 ) -> Posterior:
     """The posterior of one test in the selected class, from what is `known` where that helps."""
     model, options = build(name, hanger), UpdateOptions(samples=samples, seed=seed)
-    if known is None:
+    # Where the description has changed since, the class may have other parameters by now.
+    if known is None or known.names[:-1] != model.parameter_names:
         return update([test], model, options)
     return refresh([test], model, known, options)
 
@@ -130,6 +131,7 @@ def watch_test(
 ) -> tuple[tuple[Drift, ...], Alert | None]:
     """How far a test lies from the baseline, and the alert that this calls for."""
     drifts = assess(baseline.posterior, current, hanger, test=test, time=time)
-    alert = decide(drifts, hanger.thresholds)
+    gap = watch_gap(baseline.posterior, current, hanger, test=test, time=time)
+    alert = joined(decide(drifts, hanger.thresholds), gap)
     # A new baseline makes a standing condition a new one.
     return drifts, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")

@@ -15,8 +15,8 @@ from typing import Any
 from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
 from shm.settings import Settings
-from shm.store import Lineage, StoredRecording, Workspace
-from shm.values import Hanger
+from shm.store import Lineage, StoredRecording, StoredTest, Workspace
+from shm.values import Hanger, Posterior
 
 _IDENTIFY_SETTINGS = (
     "band_low_hz",
@@ -57,6 +57,30 @@ def identify_lineage(
         "disturbances": [asdict(each) for each in bridge.disturbances],
     }
     return Lineage.of(inputs, terms)
+
+
+def diagnosis_lineage(
+    tests: Sequence[StoredTest], hanger: Hanger, terms: Mapping[str, Any]
+) -> Lineage:
+    """What a diagnosis depends on: tests, description, options, version."""
+    inputs = [[test.key, asdict(test.lineage)] for test in tests]
+    return Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
+
+
+def update_terms(
+    hanger: Hanger,
+    models: Sequence[str],
+    tests: Sequence[StoredTest],
+    settings: Settings,
+    known: Posterior | None = None,
+) -> tuple[int, int, Lineage]:
+    """Samples, seed and lineage of an update; the seed depends on what is updated alone."""
+    samples, seed = settings.samples, seed_of(settings.seed, [test.key for test in tests])
+    terms = {"models": list(models), "samples": samples, "seed": seed}
+    inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
+    if known is not None:
+        inputs.append(known.samples.tolist())
+    return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

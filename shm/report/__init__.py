@@ -1,12 +1,18 @@
-"""Reports of a hanger, and sheets of one hammer test by which a person checks it, from values.
+"""Reports of a hanger, sheets of one hammer test by which a person checks it, gap diagnoses.
 
-Nothing here reads a store or writes a file: `HangerReport` or `TestSheet` in, terminal text, one
-HTML file, a JSON document or figures out. Only this room opens matplotlib and jinja2.
+Nothing here reads a store or writes a file: `HangerReport`, `TestSheet` or `DiagnosisSheet` in,
+terminal text, one HTML file, a JSON document or figures out. Only this room opens matplotlib and
+jinja2.
 """
 
 from __future__ import annotations
 
 from shm.report.content import HangerReport, Interval, TrendRow, trend_row
+from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.diagnosis.document import diagnosis_json
+from shm.report.diagnosis.figures import diagnosis_figures
+from shm.report.diagnosis.page import diagnosis_page
+from shm.report.diagnosis.text import diagnosis_text
 from shm.report.document import json
 from shm.report.figures import Illustration, illustrations
 from shm.report.page import html
@@ -21,6 +27,7 @@ from shm.report.table import Table
 from shm.report.text import text
 
 __all__ = [
+    "DiagnosisSheet",
     "HangerReport",
     "Illustration",
     "Interval",
@@ -29,6 +36,10 @@ __all__ = [
     "TestSheet",
     "TrendRow",
     "advice",
+    "diagnosis_figures",
+    "diagnosis_json",
+    "diagnosis_page",
+    "diagnosis_text",
     "html",
     "illustrations",
     "json",

@@ -12,6 +12,7 @@ import numpy as np
 from shm.values import (
     NAN,
     Alert,
+    Diagnosis,
     Drift,
     FloatArray,
     FrequencyResponse,
@@ -94,7 +95,8 @@ class HangerReport:
     `posterior` and `frequency_response` are those of the latest test, the last of `tests`, which
     stand oldest first like `trend`. `drifts` are those of the latest test, `alerts` all of the
     hanger. `lineage` names where the numbers come from: checksums, settings, files. `quality` is
-    that of the latest test, empty where it was not checked.
+    that of the latest test, empty where it was not checked; `diagnosis` the latest of its gap.
+    `gap_watch` says in a sentence how the gap has gone since an effect was adopted.
     """
 
     bridge: str
@@ -111,6 +113,8 @@ class HangerReport:
     frequency_response: FrequencyResponse | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
     quality: tuple[QualityCheck, ...] = ()
+    diagnosis: Diagnosis | None = None
+    gap_watch: str = ""
 
     @property
     def latest(self) -> ModalTest:

@@ -7,6 +7,8 @@ from typing import Any
 
 from shm import documents
 from shm.report.content import HangerReport
+from shm.report.diagnosis.document import diagnosis_json
+from shm.report.diagnosis.part import diagnosed
 from shm.report.summary import advice, status, summary
 from shm.values import FrequencyResponse
 
@@ -31,6 +33,8 @@ def json(data: HangerReport) -> dict[str, Any]:
         "alerts": [documents.alert_document(alert) for alert in data.alerts],
         "frequency_response": _response(data.frequency_response),
         "quality": [asdict(check) for check in data.quality],
+        "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
+        "gap_watch": data.gap_watch,
         "lineage": dict(data.lineage),
         "version": data.version,
         "generated_at": data.generated_at,

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from shm.report import words
 from shm.report.content import HangerReport
+from shm.report.diagnosis.page import section
+from shm.report.diagnosis.part import diagnosed, how_to_diagnose
 from shm.report.figures import illustrations
 from shm.report.summary import status, summary
 from shm.report.tables import tables
-
-ENVIRONMENT = Environment(
-    loader=PackageLoader("shm.report", "templates"),
-    autoescape=True,
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
+from shm.report.template import ENVIRONMENT
 
 
 def html(data: HangerReport) -> str:
@@ -31,6 +25,9 @@ def html(data: HangerReport) -> str:
         facts=_facts(data),
         illustrations=[(item, Markup(item.svg())) for item in illustrations(data)],  # noqa: S704
         tables=main,
+        gap_watch=data.gap_watch,
+        diagnosis=section(sheet) if (sheet := diagnosed(data)) else None,
+        how_to_diagnose=how_to_diagnose(data),
         origin=origin,
         made=f"{words.moment(data.generated_at)} by shm {data.version}",
     )

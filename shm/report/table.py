@@ -1,4 +1,4 @@
-"""A table of texts, and how it stands in a terminal."""
+"""A table of texts, and how it stands in a terminal; titles and paragraphs there."""
 
 from __future__ import annotations
 
@@ -24,6 +24,11 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     marks: tuple[str, ...] = ()
+
+
+def headed(title: str, paragraph: str) -> str:
+    """An underlined title and a paragraph."""
+    return f"{title}\n{'=' * len(title)}\n{textwrap.fill(paragraph, WIDTH)}\n"
 
 
 def laid_out(table: Table) -> str:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import replace
 
 from shm.report import words
 from shm.report.content import HangerReport
+from shm.report.diagnosis.part import diagnosis_part
 from shm.report.summary import status, summary
-from shm.report.table import WIDTH, Table, laid_out
+from shm.report.table import Table, headed, laid_out
 from shm.report.tables import tables
 
 _ROWS_SHOWN = 12
 
 
 def text(data: HangerReport) -> str:
-    """The report of one hanger: the summary, then the tables."""
-    return "\n".join((_head(data), *(_table(table) for table in tables(data))))
-
-
-def headed(title: str, paragraph: str) -> str:
-    """An underlined title and a paragraph."""
-    return f"{title}\n{'=' * len(title)}\n{textwrap.fill(paragraph, WIDTH)}\n"
+    """The report of one hanger: the summary, the tables, the gap diagnosis."""
+    numbers = [_table(table) for table in tables(data)]
+    return "\n".join((_head(data), *numbers, *diagnosis_part(data)))
 
 
 def _head(data: HangerReport) -> str:

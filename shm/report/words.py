@@ -31,6 +31,10 @@ _MEANINGS = {
     "theta_F": "tension over nominal tension",
     "theta_L": "effective over given length",
     "sigma": "model error, as a fraction of a frequency",
+    "section": "area as made over the description's, less 1",
+    "density": "density as made over the description's, less 1",
+    "length": "length as made over the description's, less 1",
+    "modulus": "elastic modulus as made over the description's, less 1",
 }
 
 
@@ -114,13 +118,16 @@ def quantity(name: str) -> str:
 
 
 def meaning(name: str, model: str) -> str:
-    """What a parameter is, with its unit: beams have rotational springs, solids springs a node."""
-    if not name.startswith("log10_k"):
-        return _MEANINGS.get(name, name)
+    """What a parameter is, with its unit: beams have rotational springs, solids springs a node.
+
+    A parameter of an adopted effect has the name that the catalogue gives it, with its unit.
+    """
     spring = name.removeprefix("log10_")
-    if model.startswith("beam"):
+    if model.startswith("beam") and spring in _ROTATIONAL_SPRINGS:
         return f"log10 of end stiffness {spring} ({_ROTATIONAL_SPRINGS[spring]}) in N m/rad"
-    return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"
+    if spring in _FACE_SPRINGS:
+        return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"
+    return _MEANINGS.get(name, name.replace("log10_", "log10 of ").replace("_", " "))
 
 
 def place(name: str, plane: str | None, x_m: float) -> str:

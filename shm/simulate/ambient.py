@@ -87,7 +87,8 @@ def _moved(
     highest_hz = _HIGHEST * plan.sampling_rate_hz
     modes = plane_modes(hanger, state, PLANES[plane], modes_below(hanger, state, highest_hz))
     seen = modes.at(np.array(plan.sensor_places_m(hanger)))
-    poles = poles_of(modes.angular_frequency_rad_s, state.damping_ratio)
+    ratio = state.damping_ratio + modes.added_damping_ratio
+    poles = poles_of(modes.angular_frequency_rad_s, ratio)
     out = np.zeros((len(seen), plan.samples))
     for mode in np.flatnonzero(np.abs(poles) < 2 * math.pi * highest_hz):
         pole = complex(poles[mode])

@@ -38,13 +38,16 @@ class PlaneModes:
     """Modes of one plane, mass-normalised.
 
     `angular_frequency_rad_s` (modes,); `nodes_m` (nodes,); `deflection` and `slope` (nodes, modes)
-    in kg^-1/2 and kg^-1/2/m.
+    in kg^-1/2 and kg^-1/2/m; `added_damping_ratio` (modes,) comes on top of the hanger's. `other`
+    is how these modes move in the other plane, None where they do not.
     """
 
     angular_frequency_rad_s: FloatArray
     nodes_m: FloatArray
     deflection: FloatArray
     slope: FloatArray
+    added_damping_ratio: FloatArray
+    other: PlaneModes | None = None
 
     def at(self, x_m: FloatArray) -> FloatArray:
         """Mode shapes at `x_m` (points,): shape (points, modes)."""
@@ -92,7 +95,7 @@ def plane_modes(
     squares, vectors = _lowest(stiffness[free][:, free], mass[free][:, free], modes)
     full = np.zeros((2 * len(nodes), modes))
     full[free] = vectors
-    return PlaneModes(np.sqrt(squares), nodes, full[0::2], full[1::2])
+    return PlaneModes(np.sqrt(squares), nodes, full[0::2], full[1::2], np.zeros(modes))
 
 
 def modes_below(hanger: Hanger, state: HangerState, frequency_hz: float) -> int:

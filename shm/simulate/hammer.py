@@ -13,8 +13,15 @@ import numpy as np
 from shm.errors import UsageError
 from shm.simulate.disturbances import DISTURBANCES, Channels, Disturbance, Lines, Motion, Planted
 from shm.simulate.disturbances.base import Scene, T, Verb
-from shm.simulate.elements import modes_below, plane_modes
+from shm.simulate.effects import PlantedEffect, TestConditions
+from shm.simulate.elements import PlaneModes, modes_below, plane_modes
 from shm.simulate.logger import Line, logged
+from shm.simulate.planted_motion import (
+    by_logger,
+    planted_bar,
+    planted_plane_modes,
+    seen_by_turned,
+)
 from shm.simulate.pulse import force_of, pulse_of
 from shm.simulate.response import accelerations
 from shm.simulate.state import HammerPlan, HangerState, check
@@ -41,6 +48,8 @@ def hammer_test(
     temperature_c: float = NAN,
     source: str = "simulated",
     disturbances: Sequence[str] = (),
+    effects: Sequence[PlantedEffect] = (),
+    conditions: TestConditions | None = None,
 ) -> Recording:
     """One continuous recording of all hits: `force`, then `acc_1` (transverse), `acc_2`
     (longitudinal) of the first sensor, `acc_3`, `acc_4` of the second, and so on.
@@ -50,9 +59,19 @@ def hammer_test(
     up to twice the sampling rate take part; those above half of it are not excited and only add
     their quasi-static share. The hanger is at rest before the first hit. `disturbances` are names
     of `DISTURBANCES`. The same generator state gives the same recording, and a disturbance leaves
-    hits and noise as they are without it. Raises UsageError for a state or plan that cannot be.
+    hits and noise as they are without it. `effects` are planted under the `conditions` of the test,
+    a level that stands for itself: the peak force is the plan's. Raises UsageError for a state,
+    plan or effect that cannot be.
     """
-    made = simulated_test(hanger, state, plan, rng, disturbances=disturbances)
+    made = simulated_test(
+        hanger,
+        state,
+        plan,
+        rng,
+        disturbances=disturbances,
+        effects=effects,
+        conditions=conditions,
+    )
     return replace(made.recording, source=source, time=time, temperature_c=temperature_c)
 
 
@@ -63,11 +82,15 @@ def simulated_test(
     rng: np.random.Generator,
     *,
     disturbances: Sequence[str] = (),
+    effects: Sequence[PlantedEffect] = (),
+    conditions: TestConditions | None = None,
 ) -> SimulatedTest:
     """The same with what was planted where."""
     check(hanger, state, plan)
     stages = _Stages(disturbances, rng)
-    scene = Scene(hanger, state, plan, draw_schedule(hanger, plan, rng))
+    bar = planted_bar(hanger, state, plan, effects, conditions or TestConditions())
+    plan = by_logger(plan, bar)
+    scene = Scene(hanger, state, plan, draw_schedule(hanger, plan, rng), bar)
     scene = replace(scene, schedule=stages.run("schedule", scene.schedule, scene))
     motion = stages.run("motion", _motion(scene), scene)
     lines = stages.run("lines", _lines(motion, scene), scene)
@@ -118,8 +141,7 @@ def _refuse_unless_hit(names: Sequence[str]) -> None:
 def _motion(scene: Scene) -> Motion:
     """Modes, pulses and noise-free accelerations."""
     plan, state = scene.plan, scene.state
-    count = modes_below(scene.hanger, state, 2 * scene.rate_hz)
-    modes = tuple(plane_modes(scene.hanger, state, plane, count) for plane in PLANES)
+    modes = _modes(scene)
     pulses = tuple(
         pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.blows
     )
@@ -128,7 +150,15 @@ def _motion(scene: Scene) -> Motion:
         accelerations(own, plane, state.damping_ratio, pulses, places, scene.rate_hz, plan.samples)
         for own, plane in zip(modes, PLANES, strict=True)
     ]
-    return Motion(modes, pulses, np.array(moved))
+    return Motion(modes, pulses, seen_by_turned(scene.bar, np.array(moved), places))
+
+
+def _modes(scene: Scene) -> tuple[PlaneModes, ...]:
+    hanger, state, highest_hz = scene.hanger, scene.state, 2 * scene.rate_hz
+    if scene.bar is not None:
+        return planted_plane_modes(scene.bar, hanger, state, scene.plan, highest_hz)
+    count = modes_below(hanger, state, highest_hz)
+    return tuple(plane_modes(hanger, state, plane, count) for plane in PLANES)
 
 
 def _lines(motion: Motion, scene: Scene) -> Lines:
@@ -154,7 +184,8 @@ def _kept(channels: Channels, scene: Scene, planted: tuple[Planted, ...]) -> Sim
     first = math.ceil(schedule.begin_s * scene.rate_hz)
     part = slice(first, round(schedule.end_s * scene.rate_hz))
     cut = tuple(replace(channel, values=channel.values[part]) for channel in channels)
-    recording = Recording("simulated", cut, scene.rate_hz, scene.hanger.id)
+    fast = 1.0 if scene.bar is None else scene.bar.clock_factor
+    recording = Recording("simulated", cut, scene.rate_hz * fast, scene.hanger.id)
     shift_s = first / scene.rate_hz
-    strikes = tuple(replace(s, start_s=s.start_s - shift_s) for s in schedule.strikes)
+    strikes = tuple(replace(s, start_s=(s.start_s - shift_s) / fast) for s in schedule.strikes)
     return SimulatedTest(recording, planted, strikes)

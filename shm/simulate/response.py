@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from shm.simulate.elements import PlaneModes
 from shm.simulate.pulse import Pulse, samples_of
-from shm.values import ComplexArray, FloatArray, Plane
+from shm.values import PLANES, ComplexArray, FloatArray, Plane
 
 _MODES_AT_ONCE = 16
 
@@ -54,7 +54,8 @@ def accelerations(
     out = np.zeros((len(seen), samples))
     carried = np.zeros(len(modes.angular_frequency_rad_s), complex)
     for stretch in stretches(pulses, damping_ratio, samples):
-        poles = poles_of(modes.angular_frequency_rad_s, stretch.damping_ratio)
+        ratio = stretch.damping_ratio + modes.added_damping_ratio
+        poles = poles_of(modes.angular_frequency_rad_s, ratio)
         driven = [driven_states(poles, modes, plane, p, sampling_rate_hz) for p in stretch.pulses]
         for first in range(0, len(poles), _MODES_AT_ONCE):
             block = np.arange(first, min(first + _MODES_AT_ONCE, len(poles)))
@@ -87,7 +88,7 @@ def stretches(pulses: Sequence[Pulse], damping_ratio: float, samples: int) -> Se
     return [stretch for stretch in found if stretch.end > stretch.begin]
 
 
-def poles_of(angular_frequency: FloatArray, damping_ratio: float) -> ComplexArray:
+def poles_of(angular_frequency: FloatArray, damping_ratio: float | FloatArray) -> ComplexArray:
     """Poles in rad/s, (modes,)."""
     return np.asarray(
         angular_frequency * (-damping_ratio + 1j * np.sqrt(1 - damping_ratio**2)), complex
@@ -135,4 +136,7 @@ def state_of(
 def _pushed(modes: PlaneModes, plane: Plane, pulse: Pulse) -> FloatArray:
     """Each mode's deflection where a pulse acts, times its share of the force, (modes,)."""
     at_hammer = modes.at(np.array([pulse.strike.x_m]))[0]
-    return np.asarray(at_hammer * pulse.strike.share(plane))
+    pushed = np.asarray(at_hammer * pulse.strike.share(plane))
+    if modes.other is None:
+        return pushed
+    return pushed + _pushed(modes.other, PLANES[1 - PLANES.index(plane)], pulse)

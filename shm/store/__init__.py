@@ -4,6 +4,7 @@ from shm.store.archive import Archive, Quarantine
 from shm.store.export import samples_npz, samples_table
 from shm.store.queries import WaitingTest
 from shm.store.rows import (
+    Adoption,
     Baseline,
     Delivery,
     DeliveryState,
@@ -14,7 +15,9 @@ from shm.store.rows import (
     Receipt,
     ReceivedFile,
     Stage,
+    StoredAdoption,
     StoredAlert,
+    StoredDiagnosis,
     StoredPosterior,
     StoredRecording,
     StoredSelection,
@@ -24,6 +27,7 @@ from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
+    "Adoption",
     "Archive",
     "Baseline",
     "Delivery",
@@ -37,7 +41,9 @@ __all__ = [
     "ReceivedFile",
     "Stage",
     "Store",
+    "StoredAdoption",
     "StoredAlert",
+    "StoredDiagnosis",
     "StoredPosterior",
     "StoredRecording",
     "StoredSelection",

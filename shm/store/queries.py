@@ -26,6 +26,7 @@ from shm.store.rows import (
     StoredTest,
 )
 from shm.store.tables import (
+    adoptions,
     baselines,
     posterior_tests,
     posteriors,
@@ -37,7 +38,14 @@ from shm.store.tables import (
 from shm.values import FrequencyResponse, Posterior, Selection
 
 _tests = sa.select(tests, recordings.c.sha256).join(recordings)
-_losers = sa.select(selection_entries.c.posterior_id).where(selection_entries.c.rank > 0)
+_undone = adoptions.c.undone_at.is_not(None)
+_undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
+_undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
+# Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
+# holds, or it was adopted and that was undone.
+_hidden = sa.select(selection_entries.c.posterior_id).where(
+    (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
+)
 
 
 @dataclass(frozen=True)
@@ -90,7 +98,7 @@ class Queries(Database):
     def posteriors(self, hanger: int) -> tuple[StoredPosterior, ...]:
         """The posteriors of a hanger in its selected class, by time."""
         query = sa.select(posteriors).where(
-            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_losers)
+            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden)
         )
         with self.reading() as connection:
             rows = connection.execute(query.order_by(posteriors.c.time, posteriors.c.id)).all()
@@ -99,7 +107,7 @@ class Queries(Database):
     def posterior(self, hanger: int, test: str | None = None) -> Posterior:
         """The latest posterior of a hanger, or that of one test; raises NothingThere."""
         query = sa.select(posteriors).where(
-            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_losers)
+            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden)
         )
         if test is not None:
             query = query.where(posteriors.c.id.in_(_of_test(test)))
@@ -119,7 +127,7 @@ class Queries(Database):
         """Each test of a hanger that has a posterior, with it, by time."""
         newest = (
             sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
-            .where(posterior_tests.c.posterior_id.not_in(_losers))
+            .where(posterior_tests.c.posterior_id.not_in(_hidden))
             .group_by(posterior_tests.c.test_id)
         )
         stored = {row.id: row.posterior for row in self.posteriors(hanger)}
@@ -133,32 +141,32 @@ class Queries(Database):
 
     def selection(self, hanger: int) -> StoredSelection | None:
         """The selection in force."""
-        query = sa.select(selections).where(selections.c.hanger == hanger)
         with self.reading() as connection:
-            row = connection.execute(query.order_by(selections.c.id.desc()).limit(1)).one_or_none()
+            row = connection.execute(selection_in_force(hanger)).one_or_none()
             if row is None:
                 return None
             entries = (
                 sa.select(posteriors, selection_entries.c.probability)
                 .join(selection_entries)
                 .where(selection_entries.c.selection_id == row.id)
-                .order_by(selection_entries.c.rank)
+                .order_by(selection_entries.c.probability.desc(), selection_entries.c.rank)
             )
             ranked = connection.execute(entries).all()
         selection = Selection(
             tuple(_posterior(entry) for entry in ranked),
             tuple(entry.probability for entry in ranked),
         )
-        return StoredSelection(row.id, selection, row.selected_at)
+        return StoredSelection(row.id, selection, row.selected_at, row.model)
 
     def selected_models(self) -> dict[int, str]:
-        """The name of the selected class of each hanger that has one."""
+        """The name of the selected or adopted class of each hanger that has one."""
         query = sa.select(selections.c.hanger, selections.c.model).order_by(selections.c.id)
+        in_force = query.where(selections.c.id.not_in(_undone_selections))
         with self.reading() as connection:
-            return {row.hanger: row.model for row in connection.execute(query)}
+            return {row.hanger: row.model for row in connection.execute(in_force)}
 
-    def baseline(self, hanger: int) -> Baseline | None:
-        """The baseline in force, with its posterior."""
+    def baseline(self, hanger: int, model: str | None = None) -> Baseline | None:
+        """The baseline in force, or the last that was in force of one class, with its posterior."""
         query = (
             sa.select(posteriors, *(baselines.c[name].label(f"b_{name}") for name in _BASELINE))
             .join(baselines)
@@ -166,6 +174,10 @@ class Queries(Database):
             .order_by(baselines.c.id.desc())
             .limit(1)
         )
+        if model is None:
+            query = query.where(baselines.c.id.not_in(_undone_baselines))
+        else:
+            query = query.where(posteriors.c.model == model)
         with self.reading() as connection:
             row = connection.execute(query).one_or_none()
         if row is None:
@@ -178,6 +190,14 @@ class Queries(Database):
 
 
 _BASELINE = ("id", "set_at", "who", "why")
+
+
+def selection_in_force(hanger: int) -> sa.Select[Any]:
+    """The newest selection of a hanger that did not come with an adoption since undone."""
+    query = sa.select(selections).where(
+        selections.c.hanger == hanger, selections.c.id.not_in(_undone_selections)
+    )
+    return query.order_by(selections.c.id.desc()).limit(1)
 
 
 def _of_test(name: str) -> sa.Select[Any]:

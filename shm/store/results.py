@@ -67,16 +67,13 @@ class Results(Database):
             if not all_at(connection, chosen, Stage.IDENTIFIED) or _has(connection, hanger):
                 return
             ids = [
-                _insert_posterior(connection, hanger, posterior, chosen, lineage, at)
+                insert_posterior(connection, hanger, posterior, chosen, lineage, at)
                 for posterior in selection.posteriors
             ]
-            _insert_selection(connection, hanger, selection, ids, at)
-            why = {"who": "shm", "why": f"the first {len(chosen)} test(s)"}
-            insert(
-                connection,
-                baselines,
-                {"hanger": hanger, "posterior_id": ids[0], "set_at": at, **why},
-            )
+            probable = list(zip(ids, selection.probabilities, strict=True))
+            insert_selection(connection, hanger, selection.selected.model, probable, at)
+            why = f"the first {len(chosen)} test(s)"
+            insert_baseline(connection, hanger, ids[0], "shm", why, at)
             move(connection, chosen, Stage.WATCHED)
 
     def updated(
@@ -85,7 +82,7 @@ class Results(Database):
         """Keeps the posterior of one test; does nothing where another process was first."""
         with self.writing() as connection:
             if all_at(connection, [test], Stage.IDENTIFIED):
-                _insert_posterior(connection, test.hanger, posterior, [test], lineage, at)
+                insert_posterior(connection, test.hanger, posterior, [test], lineage, at)
                 move(connection, [test], Stage.UPDATED)
 
 
@@ -158,7 +155,7 @@ def _has(connection: Connection, hanger: int) -> bool:
     return connection.execute(query).first() is not None
 
 
-def _insert_posterior(
+def insert_posterior(
     connection: Connection,
     hanger: int,
     posterior: Posterior,
@@ -166,6 +163,7 @@ def _insert_posterior(
     lineage: Lineage,
     at: datetime,
 ) -> int:
+    """Keeps a posterior of tests; its number."""
     values: Mapping[str, Any] = {
         **vars(lineage),
         "hanger": hanger,
@@ -184,14 +182,30 @@ def _insert_posterior(
     return posterior_id
 
 
-def _insert_selection(
-    connection: Connection, hanger: int, selection: Selection, ids: Sequence[int], at: datetime
-) -> None:
-    model = selection.selected.model
+def insert_selection(
+    connection: Connection,
+    hanger: int,
+    model: str,
+    probable: Sequence[tuple[int, float]],
+    at: datetime,
+) -> int:
+    """Keeps which class is in force and, that one first, what competed; its number.
+
+    `probable` holds the numbers of the posteriors with their probabilities.
+    """
     row = {"hanger": hanger, "model": model, "selected_at": at}
     selection_id = insert(connection, selections, row)
     entries = [
         {"selection_id": selection_id, "posterior_id": id_, "rank": rank, "probability": p}
-        for rank, (id_, p) in enumerate(zip(ids, selection.probabilities, strict=True))
+        for rank, (id_, p) in enumerate(probable)
     ]
     connection.execute(sa.insert(selection_entries), entries)
+    return selection_id
+
+
+def insert_baseline(
+    connection: Connection, hanger: int, posterior_id: int, who: str, why: str, at: datetime
+) -> int:
+    """Keeps what later tests are compared with; its number."""
+    row = {"hanger": hanger, "posterior_id": posterior_id, "set_at": at, "who": who, "why": why}
+    return insert(connection, baselines, row)

@@ -12,7 +12,9 @@ from typing import Any
 import shm
 from shm.documents import dump
 from shm.values import (
+    NAN,
     Alert,
+    Diagnosis,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
@@ -149,11 +151,15 @@ class StoredPosterior:
 
 @dataclass(frozen=True, eq=False)
 class StoredSelection:
-    """A comparison of model classes and when it was made."""
+    """A comparison of model classes, when it was made, and the class in force since.
+
+    `model` is the most probable one, or one that was adopted.
+    """
 
     id: int
     selection: Selection
     selected_at: datetime
+    model: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +172,50 @@ class Baseline:
     set_at: datetime
     who: str
     why: str
+
+
+@dataclass(frozen=True, eq=False)
+class StoredDiagnosis:
+    """A diagnosis of a hanger's gap, when it was made, and where it comes from."""
+
+    id: int
+    hanger: int
+    diagnosis: Diagnosis
+    diagnosed_at: datetime
+    lineage: Lineage
+
+
+@dataclass(frozen=True)
+class Adoption:
+    """Effects that become part of a hanger's model class: `model` is that class's name.
+
+    `effect` and `at` are those of a `Cause`. The gaps are the root mean square by which predicted
+    frequencies lie off the measured ones on the baseline's tests: in the class before, and in this
+    one. `diagnosis_id` is None where no diagnosis called for it.
+    """
+
+    hanger: int
+    model: str
+    baseline_model: str
+    effect: str
+    at: str
+    why: str
+    who: str
+    gap_before_percent: float = NAN
+    gap_percent: float = NAN
+    diagnosis_id: int | None = None
+
+
+@dataclass(frozen=True)
+class StoredAdoption:
+    """An adoption and when it was made; where it was undone, when, why and by whom."""
+
+    id: int
+    adoption: Adoption
+    adopted_at: datetime
+    undone_at: datetime | None = None
+    undone_why: str = ""
+    undone_who: str = ""
 
 
 @dataclass(frozen=True)

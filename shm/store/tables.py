@@ -6,7 +6,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0002"
+SCHEMA = "0003"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -32,6 +32,11 @@ def _lineage() -> tuple[sa.Column[str], ...]:
         sa.Column("settings_sha256", sa.String(64), nullable=False),
         sa.Column("version", sa.String(32), nullable=False),
     )
+
+
+def _model() -> sa.Column[str]:
+    # An adopted class is named after its effects, where they act and their ranges.
+    return sa.Column("model", sa.String(512), nullable=False)
 
 
 # A raw file that was received. `arrival` marks the spool entry it came as, so that a receipt cut
@@ -80,7 +85,7 @@ posteriors = sa.Table(
     metadata,
     _id(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    sa.Column("model", sa.String(64), nullable=False),
+    _model(),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
     sa.Column("samples", sa.LargeBinary, nullable=False),
@@ -99,13 +104,14 @@ posterior_tests = sa.Table(
     sa.Index(None, "test_id"),
 )
 
-# The model classes that competed for a hanger; the newest row of a hanger holds.
+# The model classes that competed for a hanger; the newest row of a hanger holds, unless it came
+# with an adoption that was undone. `model` has rank 0: the most probable, or the adopted one.
 selections = sa.Table(
     "selections",
     metadata,
     _id(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    sa.Column("model", sa.String(64), nullable=False),
+    _model(),
     sa.Column("selected_at", UtcTime, nullable=False),
 )
 
@@ -118,7 +124,8 @@ selection_entries = sa.Table(
     sa.Column("probability", Number),
 )
 
-# What later tests of a hanger are compared with; the newest row of a hanger holds.
+# What later tests of a hanger are compared with; the newest row of a hanger holds, unless it came
+# with an adoption that was undone.
 baselines = sa.Table(
     "baselines",
     metadata,
@@ -174,6 +181,42 @@ deliveries = sa.Table(
     sa.Column("ended_at", UtcTime),
     sa.UniqueConstraint("alert_id", "hook"),
     sa.Index(None, "state", "next_attempt_at"),
+)
+
+# Why a hanger's frequencies differ from a model class's; the newest row of a hanger holds.
+diagnoses = sa.Table(
+    "diagnoses",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("diagnosed_at", UtcTime, nullable=False),
+    sa.Column("tests", Document, nullable=False),
+    sa.Column("document", Document, nullable=False),
+    *_lineage(),
+)
+
+# A baseline with effects, made a model class of a hanger: who, when, why, and its undoing. The gaps
+# are those of the class before and of this one, on the tests of the baseline that came with it.
+adoptions = sa.Table(
+    "adoptions",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    _model(),
+    sa.Column("baseline_model", sa.String(64), nullable=False),
+    sa.Column("effect", sa.Text, nullable=False),
+    sa.Column("at", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("gap_before_percent", Number),
+    sa.Column("gap_percent", Number),
+    sa.Column("adopted_at", UtcTime, nullable=False),
+    sa.Column("diagnosis_id", sa.ForeignKey("diagnoses.id")),
+    _to("selections"),
+    _to("baselines"),
+    sa.Column("undone_at", UtcTime),
+    sa.Column("undone_why", sa.Text),
+    sa.Column("undone_who", sa.Text),
 )
 
 # Things noticed on the way that change no result: the same file twice, a refused file tried again.

@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 
 from shm.errors import BadInput
 from shm.models import Model
+from shm.models.conditions import Conditions
 from shm.values import PLANES, FloatArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2
@@ -41,6 +42,7 @@ class Likelihood:
                 "no measured frequency to update with.", remedy="Give a test with modes."
             )
         self.modes = modes
+        self.tests = tuple(tests)
         self.repeat = repeat
         self.frequency_hz: FloatArray = np.array([mode.frequency_hz for mode in modes])
         sd_hz: FloatArray = np.array([mode.frequency_sd_hz for mode in modes])
@@ -56,9 +58,26 @@ class Likelihood:
         return int(self._order.max()) + 1
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequency for each measurement, shape (n, measurements)."""
-        frequencies = model.frequencies_hz(theta, self.highest_order)
-        return frequencies[:, self._plane, self._order]
+        """The model's frequency for each measurement, shape (n, measurements).
+
+        Tests that the model sees under equal conditions are one evaluation.
+        """
+        # One measurement after the other, as indexing lays them: sums round alike, to the last bit.
+        predicted = np.empty((len(self.modes), len(theta))).T
+        for conditions, rows in self._by_conditions(model).items():
+            found = model.frequencies_at(theta, self.highest_order, conditions)
+            predicted[:, rows] = found[:, self._plane[rows], self._order[rows]]
+        return predicted
+
+    def _by_conditions(self, model: Model) -> dict[Conditions, list[int]]:
+        """The measurements made under each of the conditions that the model takes notice of."""
+        rows: dict[Conditions, list[int]] = {}
+        first = 0
+        for test in self.tests:
+            measured = range(first, first + len(test.modes))
+            rows.setdefault(model.conditions(test), []).extend(measured)
+            first = measured.stop
+        return rows
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Fractional differences (n, measurements) of predictions from the measurements."""

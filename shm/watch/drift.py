@@ -12,7 +12,7 @@ from datetime import datetime
 
 import numpy as np
 
-from shm.models import MODELS
+from shm.models import described
 from shm.values import PLANES, Alert, Drift, FloatArray, Hanger, Posterior, Thresholds
 
 TENSION = "tension"
@@ -76,7 +76,7 @@ def _comparisons(baseline: Posterior, current: Posterior, hanger: Hanger) -> lis
 
 def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]:
     """log10 of the two ends' common stiffness in N m/rad (samples,), for planes with springs."""
-    model = MODELS[posterior.model](hanger)
+    model = described(posterior.model, hanger)
     theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
     deck, arch = model.springs_n_m_rad(theta)
     flexibility = 1 / deck + 1 / arch

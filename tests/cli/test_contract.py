@@ -19,7 +19,10 @@ from shm_cli import main as command_line
 from shm_cli.main import VERBS, cli, run
 from tests.cli.conftest import Shm
 
-READING = ("ingest", "identify", "predict", "update", "select", "report", "drift", "alerts")
+READING = (
+    "ingest", "identify", "predict", "update", "select", "report", "drift", "alerts",
+    "gap diagnose", "gap adopted",
+)  # fmt: skip
 PROGRAM = [sys.executable, "-c", "from shm_cli.main import main; main()"]
 
 

@@ -414,9 +414,11 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
     assert set(stages(workspace).values()) == {Stage.REFUSED}
 
 
-def test_a_test_that_no_class_describes_is_refused_with_its_file(workspace: Workspace) -> None:
+def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
+    workspace: Workspace,
+) -> None:
     test = write_test(workspace.spool / "x.modes.json", workspace)
-    heavy = replace(test, id="heavy", added_mass=AddedMass(25.0, 3.6))
+    heavy = replace(test, id="heavy", added_mass=AddedMass(25.0, 13.6))
     put(workspace.spool / "x.modes.json", dump(modes_document([test, heavy])))
     spool(workspace, "good")
     ingest(workspace)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from shm.documents import load_modes
 from shm.read import FORMATS, read
-from shm.values import Recording
+from shm.values import ModalTest, Recording
 from shm_cli.main import run
 
 HANGER = """
@@ -76,3 +80,85 @@ def test_the_help_tells_every_disturbance(capsys: pytest.CaptureFixture[str]) ->
     said = capsys.readouterr().out
     assert "double_hit" in said
     assert "outlier_hit" in said
+
+
+def test_an_effect_is_planted_in_a_recording(tmp_path: Path) -> None:
+    usual = simulated(tmp_path / "a")
+    clamp = "point_mass:everywhere:mass_kg=60,x_m=3.4"
+    heavier = simulated(tmp_path / "b", "--effect", clamp)
+    known = simulated(tmp_path / "c", "--added-mass", "60:3.4")
+    own, other, same = (each.accelerations[0].values for each in (usual, heavier, known))
+    assert not np.array_equal(own, other)
+    np.testing.assert_array_equal(other, same)
+
+
+def test_effects_follow_temperature_and_level(tmp_path: Path) -> None:
+    warmth = "temperature_tension:everywhere:tension_per_kelvin_n_k=-3000"
+    usual = simulated(tmp_path / "a", "--effect", warmth, "--temperature-c", "10")
+    warm = simulated(tmp_path / "b", "--effect", warmth, "--temperature-c", "30")
+    plain = simulated(tmp_path / "c", "--temperature-c", "30")
+    same = simulated(tmp_path / "d", "--effect", warmth, "--reference-c", "30",
+                     "--temperature-c", "30")  # fmt: skip
+    values = [each.accelerations[0].values for each in (usual, warm, plain, same)]
+    assert not np.array_equal(values[0], values[1])
+    np.testing.assert_array_equal(values[0], values[3])
+    hard = simulated(tmp_path / "e", "--amplitude", "2")
+    assert hard.force is not None
+    assert plain.force is not None
+    assert hard.force.values.max() == pytest.approx(2 * plain.force.values.max(), rel=1e-2)
+
+
+def campaign(tmp_path: Path, *more: str) -> tuple[tuple[ModalTest, ...], dict[str, Any]]:
+    (tmp_path / "H.toml").write_text(HANGER)
+    out = tmp_path / "out"
+    call = ["simulate", "--hanger-file", str(tmp_path / "H.toml"), "--campaign"]
+    assert run([*call, *more, "--out", str(out)]) == 0
+    truth = json.loads((out / "hanger3.truth.json").read_text())
+    return load_modes(out / "hanger3.modes.json"), truth
+
+
+def test_a_campaign_is_written_with_its_truth_beside_it(tmp_path: Path) -> None:
+    springs = "rotational_end_flexibility:deck end, transverse:log10_k1=6.8"
+    tests, truth = campaign(tmp_path, "--effect", springs, "--tension-n", "650e3", "--seed", "3")
+    assert len(tests) == 6
+    assert len(tests[0].modes) == 16
+    assert truth["effects"] == [
+        {
+            "effect": "rotational_end_flexibility",
+            "at": "deck end, transverse",
+            "parameters": {"log10_k1": 6.8},
+        }
+    ]
+    assert truth["seed"] == 3
+    assert 450e3 < truth["tension_n"] < 900e3
+    assert set(truth["deviations"]) == {"section", "density", "length", "modulus"}
+
+
+def test_a_campaign_may_lack_measurements(tmp_path: Path) -> None:
+    lacking = [word for what in ("shapes", "levels", "mass") for word in ("--lacking", what)]
+    tests, _ = campaign(tmp_path, *lacking, "--lacking", "longitudinal")
+    assert len(tests) == 3
+    assert all(mode.plane == "transverse" and not mode.shape for mode in tests[0].modes)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--effect", "point_mass:everywhere"), "NAME:AT:param=value"),
+        (("--effect", "point_mass:everywhere:mass_kg=x,x_m=1"), "NAME:AT:param=value"),
+        (("--effect", "point_mass:everywhere:mass_kg=1"), "x_m"),
+        (("--effect", "ghost:everywhere:x=1"), "no effect"),
+        (("--added-mass", "25"), "KG:X"),
+        (("--lacking", "mass"), "--campaign"),
+        (("--campaign", "--ambient"), "--ambient"),
+        (("--campaign", "--sensors", "6"), "usual places"),
+        (("--ambient", "--effect", "point_mass:everywhere:mass_kg=1,x_m=1"), "--ambient"),
+    ],
+)
+def test_what_cannot_be_planted_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "H.toml").write_text(HANGER)
+    call = ["simulate", "--hanger-file", str(tmp_path / "H.toml"), "--out", str(tmp_path)]
+    assert run([*call, *more]) == 2
+    assert said in capsys.readouterr().err

@@ -11,9 +11,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.store import IdentifiedTest, Lineage, Store
+from shm.store import Adoption, IdentifiedTest, Lineage, Store
 from shm.store.tables import SCHEMA
 from shm.values import Selection
+from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import (
     NOW,
     a_check,
@@ -27,10 +28,11 @@ from tests.helpers.nouns import (
 )
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+ADOPTED = "beam1+point_mass@everywhere"
 
 
 def fill(store: Store) -> None:
-    """Two tests with results, one refused file, one dropped twice, one alert."""
+    """Two tests with results, one refused file, one twice, an alert, a dropped adoption."""
     for number in (1, 2, 3):
         store.receive(a_file(number), NOW)
     store.receive(a_file(1, arrival="again"), NOW)
@@ -51,6 +53,14 @@ def fill(store: Store) -> None:
     baseline = store.baseline(3)
     assert baseline is not None
     store.watched(second, baseline, [a_drift()], an_alert(), ["mail"], NOW)
+    store.add_diagnosis(3, a_diagnosis(), LINEAGE, NOW)
+    before = store.selection(3)
+    assert before is not None
+    adoption = Adoption(3, ADOPTED, "beam1", "point_mass", "everywhere", "a lamp", "engineer")
+    probabilities = {"beam1": 0.5, "beam2": 0.1, ADOPTED: 0.4}
+    posterior = a_posterior(ADOPTED)
+    made = store.adopt(adoption, posterior, probabilities, (before, [first]), LINEAGE, NOW)
+    store.drop_adoption(made.id, "the lamp is gone", "engineer", NOW)
 
 
 def main() -> None:

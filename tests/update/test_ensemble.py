@@ -244,8 +244,8 @@ def test_a_posterior_of_another_class_is_refused(
 ) -> None:
     with pytest.raises(UsageError, match=r"beam1 says nothing about beam2"):
         refresh([later], build("beam2", HANGER_3), known)
-    with pytest.raises(BadInput, match="known mass"):
-        refresh([replace(later, added_mass=AddedMass(25.0, 3.6))], beam1, known)
+    with pytest.raises(BadInput, match="beyond the ends"):
+        refresh([replace(later, added_mass=AddedMass(25.0, 13.6))], beam1, known)
 
 
 def test_progress_is_heard_from_start_to_end(

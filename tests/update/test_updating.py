@@ -225,8 +225,8 @@ def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:
     model = build("beam1", HANGER_3)
     with pytest.raises(BadInput, match="no measured frequency"):
         update([ModalTest("t1", ())], model)
-    with pytest.raises(BadInput, match="known mass"):
-        update([replace(modal_test(TABLE_1_1), added_mass=AddedMass(25.0, 3.6))], model)
+    with pytest.raises(BadInput, match="beyond the ends"):
+        update([replace(modal_test(TABLE_1_1), added_mass=AddedMass(25.0, 13.6))], model)
     with pytest.raises(UsageError, match="no model class"):
         select([modal_test(TABLE_1_1)], [])
 

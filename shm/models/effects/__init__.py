@@ -2,6 +2,18 @@
 
 from __future__ import annotations
 
-from shm.models.effects.base import Conditions, Effect, Parameter, Survey, Variant
+from shm.models.conditions import Conditions
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.catalogue import EFFECTS
+from shm.models.effects.owner import check_effect_priors, parameters_of
 
-__all__ = ["Conditions", "Effect", "Parameter", "Survey", "Variant"]
+__all__ = [
+    "EFFECTS",
+    "Conditions",
+    "Effect",
+    "Parameter",
+    "Survey",
+    "Variant",
+    "check_effect_priors",
+    "parameters_of",
+]

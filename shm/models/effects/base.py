@@ -7,22 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from shm.models.conditions import Conditions
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import AddedMass, FloatArray, Hanger, Plane
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What one test was made under, as far as an effect may depend on it.
-
-    `temperature_shift_k` counts from the reference (the mean of the tests), 0 where unknown: the
-    diagnosis says so; `amplitude` is relative to the reference level, 1 where unknown.
-    """
-
-    test: str = ""
-    temperature_shift_k: float = 0.0
-    amplitude: float = 1.0
-    added_mass: AddedMass | None = None
 
 
 @dataclass(frozen=True)
@@ -42,7 +29,8 @@ class Survey:
 class Variant:
     """Where an effect acts: `ends` (deck 0, arch 1), `planes`, the index of a sensor, a test.
 
-    `at` says it in words; `key` in a word that may stand in the name of a model class.
+    `at` says it in words; `key` in a word that may stand in the name of a model class. `places_m`
+    are those of the sensors where the effect acts at each of them.
     """
 
     at: str = "everywhere"
@@ -50,6 +38,7 @@ class Variant:
     planes: tuple[int, ...] = (0, 1)
     sensor: int | None = None
     test: str = ""
+    places_m: tuple[float, ...] = ()
 
     @property
     def key(self) -> str:
@@ -62,7 +51,9 @@ class Parameter:
 
     `spread` says in what the prior is uniform: the value or its logarithm; `signed` lets a
     logarithmic one have either sign with equal chance. `zero` is the value at which the effect
-    vanishes, NaN for a parameter that only says where or how.
+    vanishes, NaN for a parameter that only says where or how. `least` and `most` are what physics
+    allows an owner's range to hold. `unit` is that of the quantity itself where the parameter is
+    its log10.
     """
 
     name: str
@@ -73,6 +64,8 @@ class Parameter:
     reason: str
     spread: Literal["uniform", "logarithmic"] = "uniform"
     signed: bool = False
+    least: float = -np.inf
+    most: float = np.inf
 
     def value(self, share: FloatArray) -> FloatArray:
         """Values at shares (n,) of the prior, from 0 to 1."""
@@ -101,12 +94,20 @@ class Parameter:
 class Effect:
     """A member of the catalogue. It declares its names and overrides the verbs.
 
-    `source` is the literature it follows. The first parameter is the effect's size.
+    Its docstring says what it is, in words for the manual. `source` is the literature it follows;
+    `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
+    for. The first parameter is the effect's size. `follows` are the conditions of a test that it
+    depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
+    would not have.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     source: ClassVar[str]
+    seen_by: ClassVar[tuple[str, ...]]
+    imitated_by: ClassVar[tuple[str, ...]]
+    follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
+    of_the_hanger: ClassVar[bool] = True
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         """Why these data cannot show the effect, a sentence for people; empty where they can."""

@@ -9,5 +9,6 @@ from shm.models.hanger.physical import (
     PointMass,
     Zone,
 )
+from shm.models.hanger.solution import solve
 
-__all__ = ["HangerModes", "LateralSpring", "PhysicalHanger", "PointMass", "Zone"]
+__all__ = ["HangerModes", "LateralSpring", "PhysicalHanger", "PointMass", "Zone", "solve"]

@@ -13,9 +13,10 @@ DECK, ARCH = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """A stretch of the bar whose bending stiffness and mass are multiplied; all fields (n,).
+    """A stretch of the bar whose bending stiffness and mass are multiplied; fields are (n,).
 
-    Overlapping zones multiply. A zone may reach beyond the hanger's ends.
+    `stiffness_factor` is (n, planes) where the planes differ. Overlapping zones multiply. A zone
+    may reach beyond the hanger's ends.
     """
 
     start_m: FloatArray

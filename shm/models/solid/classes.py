@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from shm.errors import BadInput
 from shm.models.base import Model, silent
 from shm.models.solid.basis import Description, transverse_basis
 from shm.models.solid.geometry import Fineness, Geometry
@@ -20,7 +21,7 @@ from shm.models.solid.support import (
     Support,
     face_springs_n_m_rad,
 )
-from shm.values import PLANES, FloatArray, Hanger, Plane
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
 _SPRING_BOUNDS = (5.0, 12.0)
 _BLOCK = 500
@@ -155,7 +156,7 @@ class S1(SolidModel):
 
     name = "s1"
     title = "Solid s1: plain rod of the whole length, fixed ends"
-    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+    bounds: Mapping[str, tuple[float, float]] = {"theta_F": (0.2, 2.0)}
     with_plates = False
 
     @classmethod
@@ -168,8 +169,16 @@ class S2(SolidModel):
 
     name = "s2"
     title = "Solid s2: plain rod between the end plates, fixed ends"
-    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+    bounds: Mapping[str, tuple[float, float]] = {"theta_F": (0.2, 2.0)}
     with_plates = False
+
+    def refuse(self, test: ModalTest) -> None:
+        """Raises BadInput for a known mass: its place counts along the whole hanger."""
+        if test.added_mass is not None:
+            raise BadInput(
+                f"test {test.id} has a known mass clamped on, which model class s2 does not have.",
+                remedy="Leave this test out for this model class.",
+            )
 
     def _ends_m(self) -> tuple[float, float]:
         plate_m = self.hanger.plate.length_m if self.hanger.plate else 0.0
@@ -181,7 +190,7 @@ class Solid0(SolidModel):
 
     name = "solid0"
     title = "Solid 0: with end plates, faces fixed"
-    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"theta_F": (0.2, 2.0)}
+    bounds: Mapping[str, tuple[float, float]] = {"theta_F": (0.2, 2.0)}
 
 
 class Solid1(SolidModel):
@@ -189,7 +198,7 @@ class Solid1(SolidModel):
 
     name = "solid1"
     title = "Solid 1: with end plates, springs in x, y and z"
-    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
+    bounds: Mapping[str, tuple[float, float]] = {
         "theta_F": (0.5, 5.0),
         **dict.fromkeys(
             (*AXIAL, "log10_klx", "log10_kly", "log10_krx", "log10_kry"),
@@ -204,7 +213,7 @@ class Solid2(SolidModel):
 
     name = "solid2"
     title = "Solid 2: with end plates, springs in z"
-    bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
+    bounds: Mapping[str, tuple[float, float]] = {
         "theta_F": (0.5, 5.0),
         **dict.fromkeys(AXIAL, _SPRING_BOUNDS),
     }

@@ -6,11 +6,11 @@ from markupsafe import Markup
 
 from shm.report import words
 from shm.report.figures.member import drawn
-from shm.report.page import ENVIRONMENT
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures import MEMBERS
 from shm.report.sheet.summary import HEADLINES, name, summary
 from shm.report.sheet.tables import details, results
+from shm.report.template import ENVIRONMENT
 from shm.report.verdicts import overall
 from shm.values import Verdict
 

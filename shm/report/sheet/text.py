@@ -7,8 +7,7 @@ import textwrap
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.summary import headline, summary
 from shm.report.sheet.tables import dropped, modes, set_aside
-from shm.report.table import WIDTH, laid_out
-from shm.report.text import headed
+from shm.report.table import WIDTH, headed, laid_out
 from shm.report.verdicts import SYMBOLS, label, quantity
 from shm.values import QualityCheck
 

@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from shm.simulate.bar import Bar
 from shm.simulate.elements import PlaneModes
 from shm.simulate.logger import Line
 from shm.simulate.pulse import Pulse
@@ -37,12 +38,16 @@ class Planted:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The test that a disturbance strikes; `schedule` as the stages so far have left it."""
+    """The test that a disturbance strikes; `schedule` as the stages so far have left it.
+
+    `bar` is the hanger with planted effects, None where none are; `plan` is in true seconds.
+    """
 
     hanger: Hanger
     state: HangerState
     plan: HammerPlan
     schedule: Schedule
+    bar: Bar | None = None
 
     @property
     def strikes(self) -> Sequence[Strike]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.simulate.disturbances.base import Motion, Planted, Scene
+from shm.simulate.elements import PlaneModes
 from shm.simulate.response import Stretch, driven_states, driven_unit_states, poles_of, state_of
 from shm.values import NAN, PLANES, ComplexArray, FloatArray
 
@@ -63,8 +64,12 @@ def _farthest(made: Motion, scene: Scene, below_hz: float) -> tuple[int, int, co
         if omega < 2 * math.pi * below_hz
     ]
     _, plane, mode = max(candidates)
-    omega = made.modes[plane].angular_frequency_rad_s[mode : mode + 1]
-    return plane, mode, complex(poles_of(omega, scene.state.damping_ratio)[0])
+    return plane, mode, complex(_poles(made.modes[plane], scene)[mode])
+
+
+def _poles(modes: PlaneModes, scene: Scene) -> ComplexArray:
+    ratio = scene.state.damping_ratio + modes.added_damping_ratio
+    return poles_of(modes.angular_frequency_rad_s, ratio)
 
 
 def _loudest(made: Motion, scene: Scene) -> float:
@@ -77,7 +82,7 @@ def _levels(made: Motion, scene: Scene, plane: int) -> FloatArray:
     """Angular frequency and acceleration at the best sensor of each mode, (modes, 2)."""
     modes, pulse = made.modes[plane], made.pulses[0]
     omega = modes.angular_frequency_rad_s
-    poles = poles_of(omega, scene.state.damping_ratio)
+    poles = _poles(modes, scene)
     driven = driven_states(poles, modes, PLANES[plane], pulse, scene.rate_hz)
     elapsed = np.arange(len(driven))[:, None] / scene.rate_hz
     impulse = np.abs(np.sum(driven * np.exp(-poles * elapsed), axis=0))

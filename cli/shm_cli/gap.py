@@ -1,0 +1,167 @@
+"""`shm gap`: why model and measurement differ, and what that does to the tension."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import rich_click as click
+
+from shm.errors import NothingThere
+from shm.gap import GapOptions
+from shm.gap import diagnose as diagnosed
+from shm.pipeline import utc_now
+from shm.pipeline.terms import diagnosis_lineage
+from shm.report import (
+    DiagnosisSheet,
+    diagnosis_figures,
+    diagnosis_json,
+    diagnosis_page,
+    diagnosis_text,
+)
+from shm.values import Diagnosis, Hanger, ModalTest
+from shm_cli.adopt import adopt, adopted, drop
+from shm_cli.common import (
+    advancing_bar,
+    hanger_file_option,
+    hanger_option,
+    json_option,
+    one_hanger,
+    opened_store,
+    seed_option,
+    show,
+    tests_and_hanger,
+)
+from shm_cli.update import modes_argument
+
+_DEFAULT = GapOptions()
+
+
+@click.group()
+def command() -> None:
+    """Why model and measurement differ, and what that does to tension.
+
+    \b
+    Example: shm gap diagnose hanger3.modes.json
+    """
+
+
+@command.command()
+@modes_argument
+@hanger_option()
+@hanger_file_option
+@click.option(
+    "--baseline",
+    metavar="NAME",
+    default=_DEFAULT.baseline,
+    show_default=True,
+    help="The model class whose gap is diagnosed.",
+)
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    help="Take an effect out of the catalogue; may be given again.",
+)
+@click.option(
+    "--hold-out",
+    multiple=True,
+    metavar="TEST|ORDER",
+    show_default="every order and every test in turn",
+    help="Leave a test or an order of modes out of the fit and predict it; may be given again.",
+)
+@click.option(
+    "--tests",
+    "count",
+    type=click.IntRange(1, 100),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="How many of the latest tests of a hanger of the workspace.",
+)
+@seed_option
+@click.option(
+    "--html",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write a page with all figures here.",
+)
+@click.option(
+    "--figures",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Write each figure as a PNG here.",
+)
+@json_option
+@click.pass_context
+def diagnose(
+    ctx: click.Context,
+    modes_file: Path | None,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    baseline: str,
+    without: tuple[str, ...],
+    hold_out: tuple[str, ...],
+    count: int,
+    seed: int,
+    html: Path | None,
+    figures: Path | None,
+    as_json: bool,
+) -> None:
+    """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
+
+    Of MODES.json with --hanger-file, or of the latest tests of a hanger of the workspace, which
+    keeps the diagnosis for its report and for `shm gap adopt`. The answer gives every effect of
+    the catalogue its probability, also no gap at all and something that the catalogue lacks.
+
+    \b
+    Example: shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html
+    """
+    options = GapOptions(baseline, without, hold_out, seed=seed)
+    if modes_file is None:
+        sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
+    else:
+        tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+        sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
+    _write(sheet, html, figures)
+    if as_json:
+        show(diagnosis_json(sheet))
+    else:
+        click.echo(diagnosis_text(sheet).rstrip())
+
+
+command.add_command(adopt)
+command.add_command(adopted)
+command.add_command(drop)
+
+
+def _of_workspace(
+    ctx: click.Context, hanger: Hanger, count: int, options: GapOptions
+) -> DiagnosisSheet:
+    """The diagnosis of the latest tests, which the store keeps."""
+    with opened_store(ctx) as (workspace, store):
+        stored = store.tests(hanger.id)[-count:]
+        if not stored:
+            raise NothingThere(
+                f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
+            )
+        found = _diagnosis([each.test for each in stored], hanger, options)
+        store.add_diagnosis(
+            hanger.id, found, diagnosis_lineage(stored, hanger, asdict(options)), utc_now()
+        )
+    return DiagnosisSheet(found, hanger, workspace.bridge.name)
+
+
+def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
+    with advancing_bar() as progress:
+        return diagnosed(tests, hanger, options, progress)
+
+
+def _write(sheet: DiagnosisSheet, html: Path | None, figures: Path | None) -> None:
+    if html is not None:
+        html.write_text(diagnosis_page(sheet), encoding="utf-8")
+    if figures is not None:
+        figures.mkdir(parents=True, exist_ok=True)
+        for illustration in diagnosis_figures(sheet):
+            (figures / f"{illustration.name}.png").write_bytes(illustration.png())

@@ -1,0 +1,163 @@
+"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.gap.chances import Family, Tried, families, probabilities
+from shm.gap.contract import Fit
+from shm.gap.groups import grouped
+from shm.gap.options import GapOptions, Progress, silent
+from shm.gap.problem import GapProblem
+from shm.gap.search import SUPPORTED, Search
+
+WITHIN_REACH = 7.0
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """An effect or a pair as an explanation of the gap; of its variants `best` is the likeliest.
+
+    `log_bayes_factor` is that of the evidence averaged over the variants to the baseline's,
+    `log_fit` what the best fit gains in log likelihood, `log_occam` what is paid for freedom.
+    `group` is an index of `Attribution.groups`, None for none.
+    """
+
+    best: Tried
+    variants: tuple[Tried, ...]
+    probability: float
+    log_bayes_factor: float
+    log_fit: float
+    group: int | None = None
+
+    @property
+    def effect(self) -> str:
+        return self.best.hypothesis.name
+
+    @property
+    def log_occam(self) -> float:
+        return self.log_bayes_factor - self.log_fit
+
+
+@dataclass(frozen=True, eq=False)
+class Attribution:
+    """What the evidence says of a gap. All probabilities add to 1.
+
+    `explanations` are the effects that were tried and the pairs that called for it, best first;
+    `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior
+    predictive p-value of the leading explanation that has no remainder. `invisible` names the
+    effects that these data cannot show, and why.
+    """
+
+    baseline: Fit
+    no_gap_probability: float
+    unexplained_probability: float
+    unexplained: Fit
+    explanations: tuple[Explanation, ...]
+    groups: tuple[tuple[str, ...], ...]
+    invisible: tuple[tuple[str, str], ...]
+    p_value: float
+
+    @property
+    def leading(self) -> Explanation | None:
+        """The likeliest explanation, were its group counted as one; None for no gap or unknown."""
+        if not self.explanations:
+            return None
+        best = self.explanations[0]
+        rest = max(self.no_gap_probability, self.unexplained_probability)
+        return best if self.claimed(best) > rest else None
+
+    def claimed(self, explanation: Explanation) -> float:
+        """The probability of its group, or its own where it has none."""
+        if explanation.group is None:
+            return explanation.probability
+        members = [each for each in self.explanations if each.group == explanation.group]
+        return sum(each.probability for each in members)
+
+
+def attributed(
+    problem: GapProblem,
+    options: GapOptions,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Attribution:
+    """The causes of the gap between the baseline and the measurements, with probabilities.
+
+    Sizes that these data cannot show are cut from the priors (`problem.smallest`). Raises
+    UsageError for an unknown effect in `options.without`.
+    """
+    search = Search(problem, options, rng, progress)
+    tried = search.with_unknown(search.singles())
+    if search.calls_for_pairs(tried):
+        tried = search.with_pairs(tried)
+    kinds = families(search.with_sampled(tried), search.variants)
+    progress("weighing", 1.0)
+    return _attribution(search, kinds, [float(chance) for chance in probabilities(kinds)])
+
+
+def _attribution(search: Search, kinds: Sequence[Family], chances: Sequence[float]) -> Attribution:
+    none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
+    flexible = [kind for kind in kinds if kind.flexible]
+    causes, groups = _with_groups(_explanations(kinds, chances, none))
+    return Attribution(
+        baseline=_fit([none]),
+        no_gap_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k is none),
+        unexplained_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k.flexible),
+        unexplained=_fit(flexible),
+        explanations=causes,
+        groups=groups,
+        invisible=search.invisible,
+        p_value=search.p_value(_fit([kind for kind in kinds if not kind.flexible])),
+    )
+
+
+def _explanations(
+    kinds: Sequence[Family], chances: Sequence[float], none: Family
+) -> tuple[Explanation, ...]:
+    """Every effect and pair that was tried, the likeliest first."""
+    return tuple(
+        Explanation(
+            best=kind.best,
+            variants=kind.tried,
+            probability=chance,
+            log_bayes_factor=kind.log_evidence - none.log_evidence,
+            log_fit=kind.best.log_fit - none.best.log_fit,
+        )
+        for kind, chance in zip(kinds, chances, strict=True)
+        if kind.effects and not kind.flexible
+    )
+
+
+def _fit(kinds: Sequence[Family]) -> Fit:
+    """The likeliest fit; there always is one without and one with a remainder."""
+    return next(kind.best.fit for kind in kinds if kind.best.fit is not None)
+
+
+def _with_groups(
+    causes: tuple[Explanation, ...],
+) -> tuple[tuple[Explanation, ...], tuple[tuple[str, ...], ...]]:
+    """The causes with the indices of their groups, and the groups' names."""
+    top = max((each.log_bayes_factor for each in causes), default=0.0)
+    alone = {each.effect: each.log_bayes_factor for each in causes}
+    able = [
+        (index, each.best.fit)
+        for index, each in enumerate(causes)
+        if each.best.fit is not None
+        and each.log_bayes_factor > max(0.0, top - WITHIN_REACH)
+        and not _idle(each, alone)
+    ]
+    found = grouped([fit for _, fit in able])
+    members = [tuple(able[i][0] for i in group) for group in found]
+    names = tuple(tuple(causes[i].effect for i in group) for group in members)
+    index = {i: number for number, group in enumerate(members) for i in group}
+    return tuple(replace(each, group=index.get(i)) for i, each in enumerate(causes)), names
+
+
+def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:
+    """Whether one effect of a pair explains about as much without the other."""
+    names = [name for name, _ in pair.best.hypothesis.effects]
+    singles = [alone[name] for name in names if len(names) > 1]
+    return any(single > pair.log_bayes_factor - SUPPORTED for single in singles)

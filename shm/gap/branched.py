@@ -1,0 +1,139 @@
+"""Proposals on all choices of signs: t distributions on each, with a share of the prior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.gap.contract import Peak
+from shm.gap.coordinates import Branch
+from shm.gap.landscape import log_normal
+from shm.update.mixture import Normal, TMixture
+from shm.update.tmcmc import normalised
+from shm.values import FloatArray, IntArray
+
+_FROM_PRIOR = 0.1
+_INFLATION = 1.3
+_FEWEST_TO_FIT = 8
+_LEAST_SHARE = 0.02
+_HEAVY = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points w (n, p), each on the branch of index `branch` (n,)."""
+
+    branch: IntArray
+    w: FloatArray
+
+    def joined(self, other: Points) -> Points:
+        """Both sets of points."""
+        return Points(np.append(self.branch, other.branch), np.vstack([self.w, other.w]))
+
+
+class Proposal:
+    """A mixture of branches: `shares` (branches,), the t distributions of each or None."""
+
+    def __init__(self, shares: FloatArray, mixtures: Sequence[TMixture | None], dimension: int):
+        shares = np.maximum(shares, _LEAST_SHARE)
+        self._shares: FloatArray = shares / shares.sum()
+        self._mixtures = tuple(mixtures)
+        self._dimension = dimension
+
+    @classmethod
+    def about(
+        cls, peaks: Sequence[Peak], branches: Sequence[Branch], columns: IntArray
+    ) -> Proposal:
+        """About the peaks of a fit, of whose parameters those of `columns` are drawn."""
+        mixtures, log_shares = [], []
+        for branch in branches:
+            own = [each for each in peaks if np.array_equal(each.signs[columns], branch.signs)]
+            log = np.array([each.log_evidence for each in own])
+            log_shares.append(logsumexp(log) if own else -np.inf)
+            parts = [Normal(p.w[columns], p.covariance[np.ix_(columns, columns)]) for p in own]
+            mixtures.append(TMixture(parts, normalised(log)) if own else None)
+        return cls(normalised(np.array(log_shares)), mixtures, len(columns))
+
+    def draw(self, count: int, rng: np.random.Generator) -> Points:
+        """Points from this proposal."""
+        branch = rng.choice(len(self._shares), count, p=self._shares)
+        w = rng.standard_normal((count, self._dimension))
+        own = rng.random(count) >= _FROM_PRIOR
+        for k, mixture in enumerate(self._mixtures):
+            rows = np.flatnonzero((branch == k) & own)
+            if mixture is not None and len(rows):
+                w[rows] = mixture.draw(len(rows), rng)
+        return Points(branch, w)
+
+    def log_density(self, points: Points) -> FloatArray:
+        """Log density (n,) by branch and w."""
+        prior = log_normal(points.w)
+        density = prior.copy()
+        for k, mixture in enumerate(self._mixtures):
+            rows = np.flatnonzero(points.branch == k)
+            if mixture is not None and len(rows):
+                own = np.log(1 - _FROM_PRIOR) + mixture.log_density(points.w[rows])
+                density[rows] = np.logaddexp(own, np.log(_FROM_PRIOR) + prior[rows])
+        return np.asarray(np.log(self._shares)[points.branch] + density)
+
+    def refitted(self, points: Points, log_weight: FloatArray) -> Proposal:
+        """Moved towards weighted points."""
+        tempered = _tempered(log_weight, _FEWEST_TO_FIT * self._dimension)
+        shares, mixtures = [], []
+        for k, mixture in enumerate(self._mixtures):
+            rows = np.flatnonzero(points.branch == k)
+            shares.append(float(np.exp(_total(log_weight[rows]) - _total(log_weight))))
+            mixtures.append(_refitted(mixture, points.w[rows], tempered[rows]))
+        return Proposal(np.array(shares), mixtures, self._dimension)
+
+
+def _total(log_weight: FloatArray) -> float:
+    return float(logsumexp(log_weight)) if len(log_weight) else -np.inf
+
+
+def _refitted(mixture: TMixture | None, w: FloatArray, weights: FloatArray) -> TMixture | None:
+    """One step of expectation maximisation towards weighted points."""
+    if weights.sum() <= 0:
+        return mixture
+    if mixture is None:
+        mixture = TMixture([Normal(np.zeros(w.shape[1]), np.eye(w.shape[1]))], np.ones(1))
+    log = [
+        np.log(share) + TMixture([part], np.ones(1)).log_density(w)
+        for part, share in zip(mixture.parts, mixture.shares, strict=True)
+    ]
+    owned = weights * np.exp(log - logsumexp(log, axis=0))
+    kept = owned.sum(axis=1) > _LEAST_SHARE * weights.sum()
+    parts = [_moved(part, w, own) for part, own in zip(mixture.parts, owned, strict=True)]
+    chosen = [part for part, keep in zip(parts, kept, strict=True) if keep] or parts
+    shares = owned.sum(axis=1)[kept] if kept.any() else owned.sum(axis=1)
+    # A point that weighs much stands for a peak that no part covers.
+    heavy = [
+        Normal(w[row], mixture.parts[0].covariance) for row in np.flatnonzero(weights > _HEAVY)
+    ]
+    return TMixture([*chosen, *heavy], np.append(shares, weights[weights > _HEAVY]))
+
+
+def _moved(part: Normal, w: FloatArray, owned: FloatArray) -> Normal:
+    """A part moved to its points; where they are few, it keeps much of what it was."""
+    total = owned.sum()
+    if total <= 0:
+        return part
+    mean = owned @ w / total
+    effective = total**2 / (owned**2).sum()
+    kept = (w.shape[1] + 2) / (effective + w.shape[1] + 2)
+    own = (owned[:, None] * (w - mean)).T @ (w - mean) / total
+    centre = (1 - kept) * mean + kept * part.mean
+    return Normal(centre, _INFLATION * ((1 - kept) * own + kept * part.covariance))
+
+
+def _tempered(log_weight: FloatArray, fewest: float) -> FloatArray:
+    """Weights to fit to, raised to a power below 1 where too few points carry them."""
+    power, weights = 1.0, normalised(log_weight)
+    fewest = min(fewest, len(weights) / 2)
+    while 1 / np.sum(weights**2) < fewest:
+        power *= 0.8
+        weights = normalised(power * log_weight)
+    return weights

@@ -1,0 +1,113 @@
+"""From evidences to probabilities: priors over families of effects, evidence averaged over places.
+
+A family (one effect, wherever it may act) has the same prior however many variants it has, so that
+an effect does not become likelier by being tried in more places (Scott and Berger, Ann. Stat. 38,
+2010).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.gap.contract import Fit, Hypothesis, Method
+from shm.values import FloatArray
+
+NO_GAP = 0.25
+SINGLE = 0.5
+PAIR = 0.125
+UNKNOWN = 0.125
+"""Before any data: half of the hangers have one effect, a quarter none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A hypothesis with its evidence; `fit` is None where screening was enough.
+
+    `log_fit` is the log likelihood at its best, less what the baseline's own parameters and the
+    bar's deviations pay there for lying off their priors: a baseline that fits by an unlikely bar
+    fits less well.
+    """
+
+    hypothesis: Hypothesis
+    log_evidence: float
+    log_fit: float
+    fit: Fit | None = None
+
+    @property
+    def method(self) -> Method:
+        return self.fit.method if self.fit is not None else "screened"
+
+    @classmethod
+    def fitted(cls, fit: Fit, common: int) -> Tried:
+        """Of a fit whose first `common` parameters are those of the baseline and the bar."""
+        unlikely = float(np.sum(fit.z[:common] ** 2)) / 2
+        return cls(fit.hypothesis, fit.log_evidence, fit.log_fit - unlikely, fit)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """What was tried of one effect, or one pair, wherever it may act, the best first."""
+
+    name: str
+    tried: tuple[Tried, ...]
+    log_evidence: float
+    log_prior: float
+
+    @property
+    def best(self) -> Tried:
+        return self.tried[0]
+
+    @property
+    def flexible(self) -> bool:
+        return self.best.hypothesis.flexible
+
+    @property
+    def effects(self) -> int:
+        return len(self.best.hypothesis.effects)
+
+
+def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, ...]:
+    """The families of what was tried, each with its prior, the likeliest first.
+
+    `variants` says how many variants each effect has; those of a pair that were not tried count as
+    if they had no evidence, and so does a pair that was not tried at all.
+    """
+    kinds: dict[tuple[str, bool], list[Tried]] = {}
+    for each in tried:
+        kinds.setdefault((each.hypothesis.name, each.hypothesis.flexible), []).append(each)
+    made = [_family(members, variants) for members in kinds.values()]
+    return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
+
+
+def probabilities(candidates: Sequence[Family]) -> FloatArray:
+    """Of each family, (families,); they add to 1."""
+    log = np.array([each.log_evidence + each.log_prior for each in candidates])
+    return np.asarray(np.exp(log - logsumexp(log)))
+
+
+def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:
+    """Of a hypothesis with its variant: its family's, shared evenly by the family's variants."""
+    shared = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
+    return float(np.log(_prior(hypothesis, len(variants)) / shared))
+
+
+def _family(members: Sequence[Tried], variants: dict[str, int]) -> Family:
+    ordered = tuple(sorted(members, key=lambda each: -each.log_evidence))
+    hypothesis = ordered[0].hypothesis
+    possible = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
+    log_evidence = logsumexp([each.log_evidence for each in ordered]) - np.log(possible)
+    log_prior = float(np.log(_prior(hypothesis, len(variants))))
+    return Family(hypothesis.name, ordered, float(log_evidence), log_prior)
+
+
+def _prior(hypothesis: Hypothesis, effects: int) -> float:
+    count = len(hypothesis.effects)
+    if hypothesis.flexible:
+        return UNKNOWN / 2 / (effects if count else 1)
+    if count == 2:
+        return PAIR / max(1, effects * (effects - 1) // 2)
+    return SINGLE / effects if count else NO_GAP

@@ -1,0 +1,162 @@
+"""The whole diagnosis of one hanger: where, which effect, how far, what to measure next."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.gap.attribution import Attribution, Explanation, attributed
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.next_measurement import ranked
+from shm.gap.observations import observed
+from shm.gap.options import GapOptions, Progress, silent
+from shm.gap.places import places
+from shm.gap.problem import GapProblem
+from shm.gap.remarks import usable
+from shm.gap.shrinkage import held_out, shrinkage
+from shm.gap.trends import trends
+from shm.gap.where import residuals
+from shm.models import build
+from shm.models.effects import check_effect_priors
+from shm.values import (
+    Cause,
+    Diagnosis,
+    EffectEstimate,
+    FloatArray,
+    Hanger,
+    ModalTest,
+    TensionEstimate,
+)
+
+_ATTRIBUTION = 0.85
+"""The part of a diagnosis's time that goes into finding the cause."""
+
+
+def diagnose(
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    options: GapOptions | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+
+    The same tests, options and seed give the same answer. Raises BadInput where the tests cannot
+    be used (what can be used in spite of a fault is used, and `Diagnosis.remarks` says so),
+    UsageError for a model class, effect, test or order that is not there.
+
+    Example:
+        >>> diagnosis = shm.diagnose(tests, hanger, GapOptions(baseline="beam1"))
+        >>> diagnosis.leading.effect
+        'point_mass'
+    """
+    options = options or GapOptions()
+    started = time.perf_counter()
+    check_effect_priors(hanger)
+    build(options.baseline, hanger)
+    found = usable(tests, hanger)
+    problem = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
+    rng = np.random.default_rng(options.seed)
+    attribution = attributed(
+        problem, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
+    )
+    progress("shrinkage", _ATTRIBUTION)
+    before, leading = attribution.baseline, attribution.leading
+    after = leading.best.fit if leading else None
+    held = held_out(problem, before, after, options.hold_out, rng)
+    progress("next measurement", (1 + _ATTRIBUTION) / 2)
+    following = ranked(problem, _contenders(attribution))
+    progress("next measurement", 1.0)
+    return Diagnosis(
+        hanger=hanger.id,
+        baseline=options.baseline,
+        tests=tuple(test.id for test in found.tests),
+        where=residuals(problem, before, after, held),
+        trends=trends(problem, before),
+        places=places(problem, before),
+        no_gap_probability=attribution.no_gap_probability,
+        unexplained_probability=attribution.unexplained_probability,
+        causes=tuple(_cause(problem, each) for each in attribution.explanations),
+        groups=attribution.groups,
+        invisible=attribution.invisible,
+        left_out=options.without,
+        fit_p_value=attribution.p_value,
+        model_error_percent=100 * _answer(attribution)[0][1].model_error,
+        shrinkage=shrinkage(problem, before, after, held),
+        tension_before_n=_tension(problem, [(1.0, before)], rng),
+        tension_after_n=_tension(problem, _answer(attribution), rng),
+        next_measurements=following,
+        remarks=found.remarks,
+        seed=options.seed,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
+    best = explanation.best
+    return Cause(
+        effect=explanation.effect,
+        at=best.hypothesis.at,
+        probability=explanation.probability,
+        log_bayes_factor=explanation.log_bayes_factor,
+        log_fit=explanation.log_fit,
+        log_occam=explanation.log_occam,
+        parameters=_estimates(problem, best.fit) if best.fit else (),
+        method=best.method,
+        group=explanation.group,
+    )
+
+
+def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
+    """The effects' own parameters, which stand behind those of the hanger."""
+    own = len(problem.names(Hypothesis()))
+    samples = problem.theta(fit.hypothesis, fit.draws)[:, own:]
+    parameters = problem.coordinates(fit.hypothesis).parameters[own:]
+    return tuple(
+        EffectEstimate(each.name, each.unit, *_summary(values))
+        for each, values in zip(parameters, samples.T, strict=True)
+    )
+
+
+def _answer(attribution: Attribution) -> list[tuple[float, Fit]]:
+    """The fits, with their probabilities, of what the diagnosis claims.
+
+    All members of the leading group: which of them it is, the data cannot tell.
+    """
+    leading = attribution.leading
+    if leading is None:
+        no_gap = attribution.no_gap_probability >= attribution.unexplained_probability
+        return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
+    group = [
+        each
+        for each in attribution.explanations
+        if each is leading or (each.group is not None and each.group == leading.group)
+    ]
+    return [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+
+
+def _contenders(attribution: Attribution) -> list[Fit]:
+    """The fits that further measurements should tell apart, the likeliest first."""
+    weighed = [(attribution.no_gap_probability, attribution.baseline)]
+    weighed += [
+        (each.probability, each.best.fit) for each in attribution.explanations if each.best.fit
+    ]
+    return [fit for _, fit in sorted(weighed, key=lambda pair: -pair[0])]
+
+
+def _tension(
+    problem: GapProblem, answer: Sequence[tuple[float, Fit]], rng: np.random.Generator
+) -> TensionEstimate:
+    """The tension over all fits of an answer, each with its weight."""
+    weight = np.array([weight for weight, _ in answer])
+    draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in answer]
+    counts = rng.multinomial(len(draws[0]), weight / weight.sum())
+    mixed = [rng.choice(each, count) for each, count in zip(draws, counts, strict=True)]
+    return TensionEstimate(*_summary(np.concatenate(mixed)))
+
+
+def _summary(samples: FloatArray) -> tuple[float, float, float, float]:
+    """Mean, standard deviation, 5 and 95 % quantiles."""
+    low, high = np.quantile(samples, [0.05, 0.95])
+    return float(samples.mean()), float(samples.std(ddof=1)), float(low), float(high)

@@ -1,0 +1,102 @@
+"""A hypothesis fitted to the observations, with its evidence by Laplace's method.
+
+Laplace's method (Tierney and Kadane 1986) puts a normal distribution on each of the most probable
+points; the evidence is the sum of their integrals. Mirror images count as what they are: two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.errors import BadInput
+from shm.gap.contract import Fit, Hypothesis, Peak
+from shm.gap.descent import Optimum, optima
+from shm.gap.landscape import Landscape
+from shm.gap.problem import GapProblem
+from shm.gap.sensitivity import scan
+from shm.values import FloatArray
+
+_DRAWS = 256
+_STARTS = 3
+_BASELINE_STARTS = (-2.0, -1.0, 0.0, 1.0)
+BASELINE = Hypothesis()
+
+
+def fitted(
+    problem: GapProblem,
+    hypothesis: Hypothesis,
+    rng: np.random.Generator,
+    starts: FloatArray | None = None,
+) -> Fit:
+    """The fit of `hypothesis` from `starts` z (n, d), or from where a scan of its effects leads.
+
+    The scan stands on the baseline's own fit, which the problem keeps. `draws` are those of the
+    normal approximation. Raises BadInput where no start can be predicted.
+    """
+    landscape = Landscape(problem, hypothesis)
+    z = _starts(problem, hypothesis, rng) if starts is None else starts
+    found = optima(landscape, z)
+    if not found:
+        raise BadInput(
+            f"the model cannot be solved anywhere for {hypothesis.name or problem.baseline}.",
+            remedy="Check the description of the hanger.",
+        )
+    return _fit(landscape, found, rng)
+
+
+def baseline_fit(problem: GapProblem, rng: np.random.Generator) -> Fit:
+    """The fit of the baseline without effects, made once."""
+    if BASELINE not in problem.fits:
+        problem.fits[BASELINE] = fitted(problem, BASELINE, rng)
+    return problem.fits[BASELINE]
+
+
+def _starts(problem: GapProblem, hypothesis: Hypothesis, rng: np.random.Generator) -> FloatArray:
+    coordinates = problem.coordinates(hypothesis)
+    if hypothesis.effects:
+        found = scan(problem, baseline_fit(problem, rng), Hypothesis(hypothesis.effects))
+        return found.starts(coordinates, _STARTS)
+    starts = np.zeros((len(_BASELINE_STARTS), coordinates.dimension))
+    starts[:, 0] = _BASELINE_STARTS
+    return starts
+
+
+def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -> Fit:
+    found = sorted(found, key=lambda each: -each.log_evidence)
+    log = np.array([each.log_evidence for each in found])
+    best = max(found, key=lambda each: each.log_posterior)
+    stretch = best.branch.stretch(best.w)
+    node = int(landscape.likelihood.by_node(best.residual[None])[0].argmax())
+    chosen = landscape.likelihood.nodes[node]
+    return Fit(
+        hypothesis=landscape.hypothesis,
+        z=best.branch.z(best.w[None])[0],
+        covariance=best.covariance * np.outer(stretch, stretch),
+        predicted=landscape.problem.observations.value - best.residual,
+        slopes=best.slopes / stretch,
+        noise=chosen.covariance,
+        model_error=chosen.model_error,
+        draws=_draws(found, rng),
+        log_fit=float(landscape.likelihood.log(best.residual[None])[0]),
+        log_evidence=float(logsumexp(log)),
+        log_evidence_sd=0.0,
+        method="normal",
+        peaks=tuple(
+            Peak(each.branch.signs, each.w, each.covariance, each.log_evidence) for each in found
+        ),
+    )
+
+
+def _draws(found: list[Optimum], rng: np.random.Generator) -> FloatArray:
+    """Equal draws z (n, d) of the normal distributions on all optima."""
+    log = np.array([each.log_evidence for each in found])
+    counts = rng.multinomial(_DRAWS, np.exp(log - logsumexp(log)))
+    return np.vstack(
+        [
+            each.branch.z(
+                rng.multivariate_normal(each.w, each.covariance, count, method="cholesky")
+            )
+            for each, count in zip(found, counts, strict=True)
+        ]
+    )

@@ -1,0 +1,148 @@
+"""How likely residuals are when the size of the errors is one of several possibilities.
+
+The frequencies' covariances fall apart into blocks (as a rule one mode in all tests), which are
+factored once each. Possibilities that share a covariance share the work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.special import logsumexp
+
+from shm.gap.contract import NoiseNode
+from shm.values import FloatArray, IntArray
+
+_LOG_2_PI = float(np.log(2 * np.pi))
+
+
+class _Blocks:
+    """All blocks of one length: `rows` (blocks, length) of covariances (nodes, F, F)."""
+
+    def __init__(self, rows: IntArray, covariances: FloatArray):
+        self._rows = rows
+        own = covariances[:, rows[:, :, None], rows[:, None, :]]
+        factors = np.linalg.cholesky(own)
+        self.log_volume = np.log(np.einsum("kbii->kbi", factors)).sum(axis=(1, 2))
+        self._whitening: FloatArray = np.linalg.inv(factors)
+
+    def whitened(self, residual: FloatArray) -> FloatArray:
+        """Residuals (n, F) of these blocks, uncorrelated: (nodes, blocks, length, n)."""
+        return np.asarray(self._whitening @ residual.T[self._rows])
+
+    def add_weighed(self, columns: FloatArray, total: FloatArray) -> None:
+        """Adds C^-1 X of columns X (data, c) to `total` (nodes, F, c)."""
+        white = self._whitening @ columns[self._rows]
+        total[:, self._rows] += np.swapaxes(self._whitening, 2, 3) @ white
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """C^-1 X of columns X, by distinct covariance: (distinct, F, c) and (distinct, S, c)."""
+
+    frequency: FloatArray
+    shape: FloatArray
+    frequency_of: IntArray
+    shape_of: IntArray
+
+    def products(self, residual: FloatArray) -> FloatArray:
+        """R C^-1 X (nodes, n, c) of residuals R (n, data)."""
+        split = self.frequency.shape[1]
+        frequency = residual[:, :split] @ self.frequency
+        shape = residual[:, split:] @ self.shape
+        return np.asarray(frequency[self.frequency_of] + shape[self.shape_of])
+
+
+class Likelihood:
+    """The normal likelihood of residuals (n, data), with the nodes integrated out.
+
+    `log_height` (nodes,) is the log likelihood and log weight of each node at no residual.
+    """
+
+    def __init__(self, nodes: Sequence[NoiseNode]):
+        self.nodes = tuple(nodes)
+        self.log_weight = np.array([node.log_weight for node in nodes])
+        unique, self._frequency_of = _distinct([node.covariance.frequency for node in nodes])
+        shapes, self._shape_of = _distinct([node.covariance.shape for node in nodes])
+        self._covariances: FloatArray = np.array(unique)
+        self._shape_precision: FloatArray = 1 / np.array(shapes)
+        self.frequencies = self._covariances.shape[1]
+        self._blocks = [_Blocks(rows, self._covariances) for rows in _rows(self._covariances)]
+        volume = np.sum([each.log_volume for each in self._blocks], axis=0)[self._frequency_of]
+        volume = volume + np.log(np.array(shapes)).sum(axis=1)[self._shape_of] / 2
+        data = self.frequencies + self._shape_precision.shape[1]
+        self.log_height: FloatArray = self.log_weight - volume - data * _LOG_2_PI / 2
+
+    def by_node(self, residual: FloatArray) -> FloatArray:
+        """Log likelihood and log weight of each node, (n, nodes); -inf where it is not finite."""
+        finite = np.asarray(np.isfinite(residual).all(axis=1))
+        squares = self._squares(np.where(finite[:, None], residual, 0.0))
+        return np.where(finite[:, None], self.log_height - squares / 2, -np.inf)
+
+    def log(self, residual: FloatArray) -> FloatArray:
+        """Log likelihood (n,)."""
+        return np.asarray(logsumexp(self.by_node(residual), axis=1))
+
+    def gram(self, columns: FloatArray) -> FloatArray:
+        """X' C^-1 X (n, nodes, c, c) of columns X (n, data, c)."""
+        frequency = self._frequency_gram(columns[:, : self.frequencies])[:, self._frequency_of]
+        shape = self._shape_gram(columns[:, self.frequencies :])[:, self._shape_of]
+        return np.asarray(frequency + shape)
+
+    def weighed(self, columns: FloatArray) -> Weighed:
+        """C^-1 X of columns X (data, c), to take products with many residuals."""
+        frequency = np.zeros((len(self._covariances), self.frequencies, columns.shape[1]))
+        for block in self._blocks:
+            block.add_weighed(columns, frequency)
+        shape = self._shape_precision[:, :, None] * columns[self.frequencies :]
+        return Weighed(frequency, shape, self._frequency_of, self._shape_of)
+
+    def _squares(self, residual: FloatArray) -> FloatArray:
+        """Squared whitened residuals (n, nodes)."""
+        frequency = np.zeros((len(residual), len(self._covariances)))
+        for block in self._blocks:
+            white = block.whitened(residual[:, : self.frequencies])
+            frequency += np.einsum("kbln,kbln->nk", white, white)
+        shape = residual[:, self.frequencies :] ** 2 @ self._shape_precision.T
+        return np.asarray(frequency[:, self._frequency_of] + shape[:, self._shape_of])
+
+    def _frequency_gram(self, columns: FloatArray) -> FloatArray:
+        """(n, distinct covariances, c, c) of columns (n, F, c)."""
+        n, _, width = columns.shape
+        flat = np.swapaxes(columns, 1, 2).reshape(n * width, self.frequencies)
+        total = np.zeros((len(self._covariances), n, width, width))
+        for block in self._blocks:
+            white = block.whitened(flat).reshape(len(total), -1, n, width)
+            white = white.transpose(0, 2, 3, 1)
+            total += white @ np.swapaxes(white, 2, 3)
+        return np.swapaxes(total, 0, 1)
+
+    def _shape_gram(self, columns: FloatArray) -> FloatArray:
+        """(n, distinct variances, c, c) of columns (n, S, c)."""
+        weighted = columns[:, None] * self._shape_precision[:, :, None]
+        return np.asarray(np.swapaxes(weighted, 2, 3) @ columns[:, None])
+
+
+def _rows(covariances: FloatArray) -> list[IntArray]:
+    """Rows of the blocks that no covariance connects, those of one length together."""
+    linked = csr_array((covariances != 0).any(axis=0))
+    count, label = connected_components(linked, directed=False)
+    members = [np.flatnonzero(label == k) for k in range(count)]
+    lengths = sorted({len(rows) for rows in members})
+    return [np.array([m for m in members if len(m) == length]) for length in lengths]
+
+
+def _distinct(arrays: Sequence[FloatArray]) -> tuple[list[FloatArray], IntArray]:
+    """The arrays that differ and, for each of all, which of them it is."""
+    found: dict[bytes, int] = {}
+    kept: list[FloatArray] = []
+    index = np.empty(len(arrays), dtype=np.int64)
+    for k, each in enumerate(arrays):
+        index[k] = found.setdefault(each.tobytes(), len(found))
+        if index[k] == len(kept):
+            kept.append(each)
+    return kept, index

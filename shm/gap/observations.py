@@ -1,0 +1,178 @@
+"""The data vector of a hanger's tests: logarithms of frequencies, then components of mode shapes.
+
+A shape is scaled to unit length over its own components. Where they are not equally certain, the
+length is the one weighted by 1/sd^2 (to a mean weight of 1), lest the error of an uncertain
+component spread over the certain ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.gap.contract import Design, Observations
+from shm.models.effects import Conditions, Survey
+from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
+
+_SAME_PLACE_M = 1e-3
+_FEWEST_FREQUENCIES = 2
+
+
+@dataclass(frozen=True)
+class _Component:
+    """One measured component of the shape of frequency `mode`."""
+
+    mode: int
+    x_m: float
+    axis: int
+    value: float
+    sd: float
+
+
+def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
+    """All usable data of `tests`; shapes without standard deviations are not usable.
+
+    Raises BadInput where there are no tests, fewer than two frequencies, a frequency or a sensor's
+    place that cannot be, or one mode twice in a test.
+    """
+    modes = [(t, mode) for t, test in enumerate(tests) for mode in test.modes]
+    _refuse_nonsense(tests, hanger)
+    frequency = np.array([mode.frequency_hz for _, mode in modes])
+    sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
+    components, lengths = _scaled([_components(k, mode) for k, (_, mode) in enumerate(modes)])
+    survey = survey_of(tests)
+    design = Design(
+        survey=survey,
+        conditions=_conditions(tests),
+        places_m=survey.sensor_places_m,
+        frequency_test=np.array([t for t, _ in modes]),
+        frequency_plane=np.array([PLANES.index(mode.plane) for _, mode in modes]),
+        frequency_order=np.array([mode.order for _, mode in modes]),
+        shape_mode=_integers([each.mode for each in components]),
+        shape_place=_nearest([each.x_m for each in components], survey.sensor_places_m),
+        shape_component=_integers([each.axis for each in components]),
+    )
+    shape = np.array([each.value for each in components]) / lengths
+    shape_sd = np.array([each.sd for each in components]) / lengths
+    return Observations(
+        design,
+        np.concatenate([np.log(frequency), shape]),
+        np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
+    )
+
+
+def survey_of(tests: Sequence[ModalTest]) -> Survey:
+    """What `tests` measure and vary; sensors count only where their shapes can be used."""
+    components = [c for test in tests for mode in test.modes for c in _components(0, mode)]
+    modes = [mode for test in tests for mode in test.modes]
+    axes = {(PLANES.index(mode.plane), c.axis) for mode in modes for c in _components(0, mode)}
+    masses = {test.added_mass for test in tests if test.added_mass is not None}
+    return Survey(
+        tests=tuple(test.id for test in tests),
+        planes=tuple(plane for plane in PLANES if any(mode.plane == plane for mode in modes)),
+        sensor_places_m=_merged([each.x_m for each in components]),
+        biaxial=any(plane != axis for plane, axis in axes),
+        temperatures_c=_distinct([test.temperature_c for test in tests]),
+        amplitudes=_distinct([test.amplitude for test in tests]),
+        added_masses=tuple(sorted(masses, key=lambda mass: (mass.x_m, mass.mass_kg))),
+    )
+
+
+def _conditions(tests: Sequence[ModalTest]) -> tuple[Conditions, ...]:
+    temperature = np.array([test.temperature_c for test in tests], dtype=float)
+    known = np.isfinite(temperature)
+    reference = temperature[known].mean() if known.any() else 0.0
+    shift = np.where(known, temperature - reference, 0.0)
+    amplitude = [test.amplitude if np.isfinite(test.amplitude) else 1.0 for test in tests]
+    return tuple(
+        Conditions(test.id, float(shift[t]), float(amplitude[t]), test.added_mass)
+        for t, test in enumerate(tests)
+    )
+
+
+def _components(index: int, mode: Mode) -> list[_Component]:
+    """The usable components of a mode's shape; none where fewer than two are left."""
+    plane = PLANES.index(mode.plane)
+    both = [
+        _Component(index, point.x_m, axis, value, point.sd)
+        for point in mode.shape
+        for axis, value in ((plane, point.value), (1 - plane, point.cross))
+    ]
+    usable = [each for each in both if np.isfinite([each.value, each.sd]).all() and each.sd > 0]
+    return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
+
+
+def _scaled(shapes: Sequence[list[_Component]]) -> tuple[list[_Component], FloatArray]:
+    """All components in a row and, for each, the length of its shape."""
+    lengths = []
+    for shape in shapes:
+        value, sd = (np.array([getattr(each, name) for each in shape]) for name in ("value", "sd"))
+        lengths += [weighted_length(value, sd)] * len(shape)
+    return [each for shape in shapes for each in shape], np.array(lengths)
+
+
+def weighted_length(value: FloatArray, sd: FloatArray) -> float:
+    """The length of a shape of components `value`, weighted by 1/sd^2; both (components,)."""
+    if len(value) == 0:
+        return 1.0
+    weight = 1 / sd**2
+    return float(np.sqrt(weight @ value**2 / weight.mean()))
+
+
+def _refuse_nonsense(tests: Sequence[ModalTest], hanger: Hanger) -> None:
+    for test in tests:
+        for mode in test.modes:
+            _refuse_mode(test, mode, hanger)
+        named = [(mode.plane, mode.order) for mode in test.modes]
+        twice = next((each for each in named if named.count(each) > 1), None)
+        if twice is not None:
+            raise BadInput(
+                f"test {test.id} holds the {twice[0]} mode {twice[1]} twice.",
+                remedy="Give each mode of a plane its own order, counted from 1.",
+            )
+    if sum(len(test.modes) for test in tests) < _FEWEST_FREQUENCIES:
+        raise BadInput(
+            "a gap cannot be diagnosed from fewer than two frequencies: the tension alone can "
+            "follow any one of them.",
+            remedy="Identify more modes, or give more tests.",
+        )
+
+
+def _refuse_mode(test: ModalTest, mode: Mode, hanger: Hanger) -> None:
+    where = f"test {test.id}, {mode.plane} mode {mode.order}"
+    if not (np.isfinite(mode.frequency_hz) and mode.frequency_hz > 0):
+        raise BadInput(f"{where}: {mode.frequency_hz} Hz is no frequency.", remedy="Leave it out.")
+    if mode.order < 1:
+        raise BadInput(f"{where}: orders count from 1.", remedy="Number the modes of each plane.")
+    outside = [p.x_m for p in mode.shape if not 0 <= p.x_m <= hanger.length_m]
+    if outside:
+        raise BadInput(
+            f"{where}: a sensor at {outside[0]:g} m is not on this hanger, which is "
+            f"{hanger.length_m:g} m long.",
+            remedy="Give places in metres from the deck end.",
+        )
+
+
+def _merged(places_m: Sequence[float]) -> tuple[float, ...]:
+    """The distinct places, sorted; those within a millimetre count as one."""
+    merged: list[float] = []
+    for x_m in sorted(places_m):
+        if not merged or x_m - merged[-1] > _SAME_PLACE_M:
+            merged.append(x_m)
+    return tuple(merged)
+
+
+def _distinct(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(sorted({value for value in values if np.isfinite(value)}))
+
+
+def _nearest(x_m: Sequence[float], places_m: Sequence[float]) -> IntArray:
+    away = np.abs(np.subtract.outer(np.array(x_m), np.array(places_m)))
+    return away.argmin(axis=1) if len(x_m) else _integers([])
+
+
+def _integers(values: Sequence[int]) -> IntArray:
+    return np.array(values, dtype=np.int64)

@@ -1,0 +1,168 @@
+"""What a hypothesis predicts of a hanger's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from shm.gap.contract import Design, Fit, Hypothesis, Observations
+from shm.gap.coordinates import DEVIATIONS, Coordinates, cut
+from shm.gap.flexible import flexible_nodes
+from shm.gap.likelihood import Likelihood
+from shm.gap.noise import nodes
+from shm.gap.shapes import ShapeScaling
+from shm.models.composed import Baseline, ComposedHanger
+from shm.models.effects import Variant, parameters_of
+from shm.models.hanger import HangerModes
+from shm.values import BoolArray, FloatArray, Hanger, IntArray
+
+Effects = tuple[tuple[str, Variant], ...]
+
+
+class GapProblem:
+    """The measurements of one hanger, and what hypotheses about it predict of them.
+
+    `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
+    be seen in these data and that their priors therefore leave out (see `shm.gap.sensitivity`).
+    `fits` keeps the fits that others start from; `evaluations` counts the hangers solved, each
+    under one set of conditions.
+    """
+
+    def __init__(self, hanger: Hanger, baseline: str, observations: Observations):
+        self.hanger = hanger
+        self.baseline = baseline
+        self.observations = observations
+        self.smallest: dict[tuple[str, Variant], float] = {}
+        self.fits: dict[Hypothesis, Fit] = {}
+        self.evaluations = 0
+        self._baseline = Baseline(baseline, hanger)
+        self._composed: dict[Effects, ComposedHanger] = {}
+        self._likelihoods: dict[bool, Likelihood] = {}
+        self._scaling = ShapeScaling.measured(observations)
+
+    def names(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """The parameters' names: the baseline's, the four deviations of the bar, the effects'."""
+        return self.coordinates(hypothesis).names
+
+    def theta(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
+        """Parameters (n, d) in their units at z (n, d)."""
+        return self.coordinates(hypothesis).theta(z)
+
+    def coordinates(self, hypothesis: Hypothesis, whole: bool = False) -> Coordinates:
+        """The coordinates of a hypothesis, with the priors `whole` or as `smallest` cuts them."""
+        parameters = list(self._hanger_with(hypothesis.effects).parameters)
+        baseline = len(self._baseline.names)
+        first = baseline + DEVIATIONS
+        for effect in hypothesis.effects if not whole else ():
+            last = first + len(parameters_of(effect[0], self.hanger, effect[1]))
+            share = self.smallest.get(effect, 0.0)
+            parameters[first:last] = [cut(each, share) for each in parameters[first:last]]
+            first = last
+        return Coordinates(parameters, baseline, self.hanger.scatter)
+
+    def predict(
+        self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
+    ) -> FloatArray:
+        """The data (n, data) that z (n, d) predict, of the tests made or of another design.
+
+        Shapes have the scale and sign of those measured; in another design unit length, and the
+        sign of the sine that a string would show. The places of another design begin with those
+        of the survey.
+        """
+        theta = self.theta(hypothesis, z)
+        if design is None:
+            return self.predict_at(hypothesis, theta)
+        return self._predicted(
+            hypothesis.effects, theta, design, ShapeScaling.of(design, self.hanger.length_m)
+        )
+
+    def predict_at(self, hypothesis: Hypothesis, theta: FloatArray) -> FloatArray:
+        """The data (n, data) that parameters theta (n, d) predict of the tests made."""
+        return self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+
+    def tension_n(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
+        """The tension (n,) that z (n, d) stand for."""
+        theta = self.theta(hypothesis, z)[:, : len(self._baseline.names)]
+        return np.asarray(self._baseline.physical(theta, 0).tension_n)
+
+    def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
+        """The likelihood of residuals, with a flexible remainder where the hypothesis has one."""
+        flexible = hypothesis.flexible
+        if flexible not in self._likelihoods:
+            make = flexible_nodes if flexible else nodes
+            self._likelihoods[flexible] = Likelihood(make(self.observations))
+        return self._likelihoods[flexible]
+
+    def part(self, rows: BoolArray | IntArray) -> GapProblem:
+        """The same problem on some of the frequencies; a mode's shape goes with its frequency.
+
+        `rows` are theirs, as indices or as a choice (F,). Priors are those of the whole.
+        """
+        part = GapProblem(self.hanger, self.baseline, _part(self.observations, rows))
+        part.smallest = self.smallest
+        part._composed = self._composed
+        return part
+
+    @property
+    def design(self) -> Design:
+        return self.observations.design
+
+    def _hanger_with(self, effects: Effects) -> ComposedHanger:
+        if effects not in self._composed:
+            self._composed[effects] = ComposedHanger(
+                self.hanger, self.baseline, effects, self.design.places_m
+            )
+        return self._composed[effects]
+
+    def _predicted(
+        self, effects: Effects, theta: FloatArray, design: Design, scaling: ShapeScaling
+    ) -> FloatArray:
+        plane, order = design.frequency_plane, design.frequency_order - 1
+        mode, place, component = design.shape_mode, design.shape_place, design.shape_component
+        frequency = np.empty((len(theta), design.frequencies))
+        shape = np.empty((len(theta), len(mode)))
+        for test, modes in self._modes(effects, theta, design):
+            rows = np.flatnonzero(design.frequency_test == test)
+            parts = np.flatnonzero(design.frequency_test[mode] == test)
+            frequency[:, rows] = np.log(modes.frequency_hz[:, plane[rows], order[rows]])
+            if len(parts):
+                of = mode[parts]
+                shape[:, parts] = modes.shape[
+                    :, plane[of], order[of], place[parts], component[parts]
+                ]
+        return np.concatenate([frequency, scaling.scaled(shape)], axis=1)
+
+    def _modes(
+        self, effects: Effects, theta: FloatArray, design: Design
+    ) -> Iterator[tuple[int, HangerModes]]:
+        """Each test that holds data with the modes of theta (n, d) in it."""
+        if design.places_m == self.design.places_m:
+            composed = self._hanger_with(effects)
+        else:
+            composed = ComposedHanger(self.hanger, self.baseline, effects, design.places_m)
+        tests = [int(test) for test in np.unique(design.frequency_test)]
+        conditions = [design.conditions[test] for test in tests]
+        orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0
+        answers = composed.modes_of_tests(theta, conditions, orders, shapes)
+        self.evaluations += len(theta) * len({id(modes) for modes in answers})
+        return zip(tests, answers, strict=True)
+
+
+def _part(observations: Observations, rows: BoolArray | IntArray) -> Observations:
+    """The observations of some frequencies and of their shapes."""
+    design = observations.design
+    kept = np.arange(design.frequencies)[rows]
+    shapes = np.flatnonzero(np.isin(design.shape_mode, kept))
+    data = np.concatenate([kept, design.frequencies + shapes])
+    part = replace(
+        design,
+        frequency_test=design.frequency_test[kept],
+        frequency_plane=design.frequency_plane[kept],
+        frequency_order=design.frequency_order[kept],
+        shape_mode=np.searchsorted(kept, design.shape_mode[shapes]),
+        shape_place=design.shape_place[shapes],
+        shape_component=design.shape_component[shapes],
+    )
+    return Observations(part, observations.value[data], observations.sd[data])

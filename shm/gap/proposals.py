@@ -1,0 +1,187 @@
+"""Measurements that one could still make on a hanger, as designs of one further test each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.gap.contract import Design
+from shm.models.effects import Conditions
+from shm.values import PLANES, AddedMass, Hanger, IntArray
+
+NEW_TEST = "the next test"
+_WARMER_K = 20.0
+_LEVELS = (0.3, 3.0)
+_MASS_SHARE = 0.02
+_MASS_STEP_KG = 5.0
+_MASS_PLACES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)
+_HIGHEST_ORDER = 16
+_MORE_MODES = 2
+_ENOUGH_SENSORS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A measurement: its kind, what to do in words, and the test that it would give."""
+
+    kind: str
+    what: str
+    design: Design
+
+
+def measured_already(design: Design) -> tuple[str, ...]:
+    """The kinds of measurement that the present tests hold; they are not proposed again.
+
+    Of `other plane`, `sensors`, `temperature`, `level`, `known mass`.
+    """
+    survey = design.survey
+    temperatures, amplitudes = survey.temperatures_c, survey.amplitudes
+    there = {
+        "other plane": len(survey.planes) == len(PLANES),
+        "sensors": survey.biaxial and len(survey.sensor_places_m) >= _ENOUGH_SENSORS,
+        "temperature": bool(temperatures) and np.ptp(temperatures) >= _WARMER_K,
+        "level": bool(amplitudes) and max(amplitudes) >= _LEVELS[1] * min(amplitudes),
+        "known mass": bool(survey.added_masses),
+    }
+    return tuple(kind for kind, done in there.items() if done)
+
+
+def proposals(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
+    """The present test once more, then everything that was not yet done, but for new sensors."""
+    every = [
+        Proposal("repeat", "the same test once more", like_the_present(design)),
+        *_other_plane(design),
+        *_more_modes(design),
+        *_other_temperatures(design),
+        *_other_levels(design),
+        *_known_masses(design, hanger),
+    ]
+    done = measured_already(design)
+    return tuple(proposal for proposal in every if proposal.kind not in done)
+
+
+def sensors_wanted(design: Design) -> bool:
+    """Whether further sensors are worth a thought."""
+    return "sensors" not in measured_already(design)
+
+
+def with_sensors(design: Design, places_m: tuple[float, ...]) -> Proposal:
+    """The present test once more with two-axis sensors at further places (m)."""
+    modes = _modes(design)
+    first = len(design.places_m)
+    components = [(place, axis) for place in range(len(places_m)) for axis in range(len(PLANES))]
+    rows = [(mode, first + place, axis) for mode in range(len(modes)) for place, axis in components]
+    named = " and ".join(f"{x_m:g} m" for x_m in places_m)
+    new = _test(design, modes, np.array(rows), places_m=places_m)
+    return Proposal("sensors", f"two-axis sensors at {named}", new)
+
+
+def like_the_present(design: Design, conditions: Conditions | None = None) -> Design:
+    """A test with all modes and sensors of the present ones, under middling conditions."""
+    modes = _modes(design)
+    return _test(design, modes, _present_shapes(design, modes), conditions)
+
+
+def _other_plane(design: Design) -> Iterator[Proposal]:
+    planes = np.unique(design.frequency_plane)
+    if len(planes) == len(PLANES):
+        return
+    modes, shapes = _modes(design), _present_shapes(design, _modes(design))
+    modes = np.column_stack([1 - modes[:, 0], modes[:, 1]])
+    shapes = np.column_stack([shapes[:, :2], 1 - shapes[:, 2]])
+    what = f"the {PLANES[1 - planes[0]]} plane, {_orders(modes[:, 1])}"
+    yield Proposal("other plane", what, _test(design, modes, shapes))
+
+
+def _more_modes(design: Design) -> Iterator[Proposal]:
+    highest = int(design.frequency_order.max())
+    orders = np.arange(highest + 1, min(highest + _MORE_MODES, _HIGHEST_ORDER) + 1)
+    if not len(orders):
+        return
+    planes = np.unique(design.frequency_plane)
+    modes = np.array([(plane, order) for plane in planes for order in orders])
+    none = np.zeros((0, 3), dtype=np.int64)
+    where = " in each plane" if len(planes) > 1 else ""
+    yield Proposal("more modes", f"{_orders(orders)}{where}", _test(design, modes, none))
+
+
+def _other_temperatures(design: Design) -> Iterator[Proposal]:
+    for shift_k, word in ((-_WARMER_K, "colder"), (_WARMER_K, "warmer")):
+        yield Proposal(
+            "temperature",
+            f"a test on a day {_WARMER_K:g} K {word}",
+            like_the_present(design, replace(_usual(design), temperature_shift_k=shift_k)),
+        )
+
+
+def _other_levels(design: Design) -> Iterator[Proposal]:
+    usual = _usual(design)
+    for factor, word in zip(_LEVELS, ("softer", "harder"), strict=True):
+        yield Proposal(
+            "level",
+            f"a {word} hit, {factor:g} times the usual level",
+            like_the_present(design, replace(usual, amplitude=factor * usual.amplitude)),
+        )
+
+
+def _known_masses(design: Design, hanger: Hanger) -> Iterator[Proposal]:
+    own_kg = hanger.mass_per_length_kg_m * hanger.length_m
+    wanted_kg = _MASS_SHARE * own_kg
+    step_kg = min(_MASS_STEP_KG, float(10.0 ** np.floor(np.log10(wanted_kg))))
+    mass_kg = step_kg * round(wanted_kg / step_kg)
+    for share in _MASS_PLACES:
+        mass = AddedMass(mass_kg, round(share * hanger.length_m, 1))
+        yield Proposal(
+            "known mass",
+            f"known mass of {mass.mass_kg:g} kg at {mass.x_m:g} m",
+            like_the_present(design, replace(_usual(design), added_mass=mass)),
+        )
+
+
+def _test(
+    design: Design,
+    modes: IntArray,
+    shapes: IntArray,
+    conditions: Conditions | None = None,
+    places_m: tuple[float, ...] = (),
+) -> Design:
+    """One test of `modes` (F, [plane, order]) and `shapes` (S, [mode, place, axis])."""
+    return Design(
+        survey=design.survey,
+        conditions=(conditions or _usual(design),),
+        places_m=(*design.places_m, *places_m),
+        frequency_test=np.zeros(len(modes), dtype=np.int64),
+        frequency_plane=modes[:, 0],
+        frequency_order=modes[:, 1],
+        shape_mode=shapes[:, 0],
+        shape_place=shapes[:, 1],
+        shape_component=shapes[:, 2],
+    )
+
+
+def _modes(design: Design) -> IntArray:
+    """The distinct (plane, order) of the present tests."""
+    return np.unique(np.column_stack([design.frequency_plane, design.frequency_order]), axis=0)
+
+
+def _present_shapes(design: Design, modes: IntArray) -> IntArray:
+    """The distinct (index of the mode, place, axis) of the present tests."""
+    own = np.column_stack([design.frequency_plane, design.frequency_order])[design.shape_mode]
+    mode = np.argmax((own[:, None] == modes).all(axis=2), axis=1) if len(own) else own[:, 0]
+    return np.unique(
+        np.column_stack([mode, design.shape_place, design.shape_component]), axis=0
+    ).astype(np.int64)
+
+
+def _usual(design: Design) -> Conditions:
+    level = np.median([each.amplitude for each in design.conditions])
+    return Conditions(test=NEW_TEST, amplitude=float(level))
+
+
+def _orders(orders: IntArray) -> str:
+    named = np.unique(orders)
+    if len(named) == 1:
+        return f"mode {named[0]}"
+    return f"modes {named[0]} {'and' if len(named) == 2 else 'to'} {named[-1]}"

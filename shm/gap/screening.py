@@ -1,0 +1,80 @@
+"""Which effects are worth a full fit: each is tried linearised, on top of a fit without it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shm.gap.chances import Tried
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.marginal import marginal
+from shm.gap.options import Progress
+from shm.gap.problem import GapProblem
+from shm.gap.sensitivity import Scan, scan, superposed, truncate
+
+HOPELESS = 7.0
+HOPELESS_SHARE = 0.3
+STARTS = 3
+NOTHING_SEEN = 1.0
+
+
+def screened(
+    problem: GapProblem, baseline: Fit, singles: Sequence[Hypothesis], progress: Progress
+) -> dict[Hypothesis, Scan]:
+    """The single effects that these data can show, scanned, their priors cut to visible sizes."""
+    scans: dict[Hypothesis, Scan] = {}
+    for count, hypothesis in enumerate(singles):
+        progress(f"screening {hypothesis.name}", count / len(singles))
+        found = scan(problem, baseline, hypothesis)
+        if found.smallest < NOTHING_SEEN:
+            truncate(problem, found)
+            scans[hypothesis] = found
+    return scans
+
+
+def paired(
+    problem: GapProblem, leader: Fit, scans: Mapping[Hypothesis, Scan]
+) -> dict[Hypothesis, Scan]:
+    """The leader with every other effect: what each does alone is added to the leader's fit."""
+    first = leader.hypothesis
+    pairs = {
+        Hypothesis((*first.effects, *single.effects)): found
+        for single, found in scans.items()
+        if single.name != first.name
+    }
+    return {pair: superposed(problem, leader, found, pair) for pair, found in pairs.items()}
+
+
+def tried_by_screening(
+    problem: GapProblem, baseline: Fit, scans: Mapping[Hypothesis, Scan]
+) -> tuple[Tried, ...]:
+    """What the scans say, the best first: gains on the baseline, so that they stand beside fits."""
+    nothing = marginal(problem, Hypothesis(), baseline, np.zeros((1, len(baseline.predicted))))
+    best = Tried.fitted(baseline, len(baseline.z))
+    level = float(nothing.log_likelihood[0])
+    tried = [
+        Tried(
+            hypothesis,
+            baseline.log_evidence + found.log_evidence - level,
+            best.log_fit + float(found.marginal.log_peak.max()) - level,
+        )
+        for hypothesis, found in scans.items()
+    ]
+    return tuple(sorted(tried, key=lambda each: -each.log_evidence))
+
+
+def hopeful(
+    tried: Sequence[Tried], priors: Sequence[float], rival: float, gap: float, most: int
+) -> tuple[Tried, ...]:
+    """Those that may come near the likeliest, the best first, at most `most`.
+
+    `priors` are the logarithms of theirs, `rival` the log of prior times evidence of the best so
+    far. The larger the gap (what the best gains in log evidence), the more a scan, which takes it
+    as linear, may be wrong.
+    """
+    weighed = [each.log_evidence + prior for each, prior in zip(tried, priors, strict=True)]
+    order = np.argsort(-np.array(weighed), kind="stable")[:most]
+    best = max([rival, *weighed])
+    reach = max(HOPELESS, HOPELESS_SHARE * gap)
+    return tuple(tried[i] for i in order if weighed[i] > best - reach)

@@ -1,0 +1,172 @@
+"""The search through hypotheses: single effects, something unknown, pairs where they are needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shm.gap.chances import Family, Tried, families, log_prior
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.fit import baseline_fit, fitted
+from shm.gap.hypotheses import hypotheses, invisible
+from shm.gap.options import GapOptions, Progress
+from shm.gap.predictive import predictive_p_value
+from shm.gap.problem import GapProblem
+from shm.gap.sampled import sampled
+from shm.gap.screening import STARTS, hopeful, paired, screened, tried_by_screening
+from shm.gap.sensitivity import Scan
+
+SAMPLED_WITHIN = 4.0
+MOST_FITS = 30
+MOST_SAMPLED = 5
+LEADERS = 3
+MOST_PAIRS = 8
+POOR_FIT = 0.05
+SUPPORTED = 2.0
+DROWNED = "Even at its largest it would drown in the errors of these data."
+
+
+class Search:
+    """Goes through the hypotheses; what it tries grows from step to step."""
+
+    def __init__(
+        self,
+        problem: GapProblem,
+        options: GapOptions,
+        rng: np.random.Generator,
+        progress: Progress,
+    ):
+        self.problem, self.options, self.rng, self.progress = problem, options, rng, progress
+        progress("baseline", 0.0)
+        self.baseline = baseline_fit(problem, rng)
+        self.hypotheses = hypotheses(problem, options.without)
+        self.variants: dict[str, int] = {}
+        self.scans: dict[Hypothesis, Scan] = {}
+        self._reached = 0.0
+
+    def singles(self) -> list[Tried]:
+        """No gap and every single effect, those that stand a chance fitted."""
+        self.scans = screened(
+            self.problem,
+            self.baseline,
+            self.hypotheses,
+            lambda label, fraction: self._tell(label, 0.4 * fraction),
+        )
+        self.variants = _counts(tuple(self.scans))
+        rival = self.baseline.log_evidence + log_prior(Hypothesis(), self.variants)
+        fits = self._fitted(self.scans, rival, MOST_FITS, 0.4, 0.6)
+        rest = [t for t in self._rough(self.scans) if t.hypothesis not in fits]
+        return [self._tried(self.baseline), *map(self._tried, fits.values()), *rest]
+
+    def with_unknown(self, tried: list[Tried]) -> list[Tried]:
+        """Adds the remainder of something unknown to no gap and to the leading effects."""
+        fits = [self.baseline, *(each.best.fit for each in self.leaders(tried))]
+        return [*tried, *(self._flexible(fit) for fit in fits if fit is not None)]
+
+    def calls_for_pairs(self, tried: Sequence[Tried]) -> bool:
+        """Whether the best single effect explains something, and not everything."""
+        leaders = self.leaders(tried)
+        if not leaders or leaders[0].best.fit is None:
+            return False
+        leader = leaders[0].best.fit
+        rest = [each.log_evidence for each in tried if each.hypothesis.flexible]
+        helped = leader.log_evidence > self.baseline.log_evidence + SUPPORTED
+        poor = max(rest) > leader.log_evidence - SUPPORTED
+        return helped and (poor or self.p_value(leader) < POOR_FIT)
+
+    def with_pairs(self, tried: list[Tried]) -> list[Tried]:
+        """Adds the best pairs of a leading effect with another one, all fitted."""
+        scans: dict[Hypothesis, Scan] = {}
+        for family in self.leaders(tried):
+            if family.best.fit is not None:
+                scans |= _new(paired(self.problem, family.best.fit, self.scans), scans)
+        best = families(tried, self.variants)[0]
+        rival = best.log_evidence + best.log_prior
+        fits = list(self._fitted(scans, rival, MOST_PAIRS, 0.7, 0.85).values())
+        first = sorted(fits, key=lambda fit: -fit.log_evidence)[:1]
+        return [*tried, *map(self._tried, fits), *map(self._flexible, first)]
+
+    def with_sampled(self, tried: list[Tried]) -> list[Tried]:
+        """The likeliest explanations, by variant, sampled instead of taken as normal."""
+        able = {e.hypothesis: e for e in tried if e.fit is not None and not e.hypothesis.flexible}
+        weight = {h: e.log_evidence + log_prior(h, self.variants) for h, e in able.items()}
+        first = max(weight.values())
+        near = [h for h in weight if weight[h] > first - SAMPLED_WITHIN]
+        chosen = sorted(near, key=lambda h: -weight[h])[:MOST_SAMPLED]
+        better = {h: able[h].fit for h in chosen}
+        return [self._sampled(each, better.get(each.hypothesis)) for each in tried]
+
+    @property
+    def invisible(self) -> tuple[tuple[str, str], ...]:
+        """The effects that these data cannot show, and why."""
+        seen = {hypothesis.name for hypothesis in self.scans}
+        drowned = {each.name: DROWNED for each in self.hypotheses if each.name not in seen}
+        return tuple((invisible(self.problem) | drowned).items())
+
+    def p_value(self, fit: Fit) -> float:
+        """Of the absolute fit, with the errors as they are expected to be."""
+        return predictive_p_value(self.problem.observations, fit, fit.noise)
+
+    def leaders(self, tried: Sequence[Tried]) -> list[Family]:
+        """The likeliest families of one effect."""
+        singles = [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
+        return singles[:LEADERS]
+
+    def _fitted(
+        self,
+        scans: Mapping[Hypothesis, Scan],
+        rival: float,
+        most: int,
+        begin: float,
+        end: float,
+    ) -> dict[Hypothesis, Fit]:
+        """Fits, from the scans' best points, of what stands a chance."""
+        if not scans:
+            return {}
+        rough = self._rough(scans)
+        priors = [log_prior(each.hypothesis, self.variants) for each in rough]
+        best = max(each.log_evidence for each in rough)
+        chosen = hopeful(rough, priors, rival, best - self.baseline.log_evidence, most)
+        found: dict[Hypothesis, Fit] = {}
+        for hypothesis in (each.hypothesis for each in chosen):
+            fraction = begin + (end - begin) * len(found) / len(chosen)
+            self._tell(f"fitting {hypothesis.name}", fraction)
+            starts = scans[hypothesis].starts(self.problem.coordinates(hypothesis), STARTS)
+            found[hypothesis] = fitted(self.problem, hypothesis, self.rng, starts)
+        return found
+
+    def _tell(self, label: str, fraction: float) -> None:
+        """Progress never goes back."""
+        self._reached = max(self._reached, fraction)
+        self.progress(label, self._reached)
+
+    def _rough(self, scans: Mapping[Hypothesis, Scan]) -> tuple[Tried, ...]:
+        return tried_by_screening(self.problem, self.baseline, scans)
+
+    def _flexible(self, base: Fit) -> Tried:
+        self._tell("something unknown", 0.65)
+        hypothesis = replace(base.hypothesis, flexible=True)
+        return self._tried(fitted(self.problem, hypothesis, self.rng, base.z[None]))
+
+    def _tried(self, fit: Fit) -> Tried:
+        return Tried.fitted(fit, len(self.baseline.z))
+
+    def _sampled(self, tried: Tried, fit: Fit | None) -> Tried:
+        if fit is None:
+            return tried
+        self._tell(f"sampling {tried.hypothesis.name}", 0.9)
+        return self._tried(sampled(self.problem, fit, self.rng, self.options.draws))
+
+
+def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
+    names = [each.name for each in singles]
+    return {name: names.count(name) for name in names}
+
+
+def _new(pairs: dict[Hypothesis, Scan], known: dict[Hypothesis, Scan]) -> dict[Hypothesis, Scan]:
+    """Pairs that are not known in the other order of their effects."""
+    return {
+        pair: found for pair, found in pairs.items() if Hypothesis(pair.effects[::-1]) not in known
+    }

@@ -1,0 +1,221 @@
+"""What effects of all sizes would do to these data, and how far the baseline could follow.
+
+The prediction is taken as linear in the parameters that were there before the effect, and these
+are integrated out. What an effect moves the data by beyond that is what can be seen of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import qmc
+
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.coordinates import Coordinates, is_place
+from shm.gap.marginal import Marginal, marginal
+from shm.gap.problem import GapProblem
+from shm.values import BoolArray, FloatArray, IntArray
+
+VISIBLE = 1.5
+"""Standard deviations, of all data together, from which on an effect counts as one."""
+
+_POINTS = {1: 32, 2: 64}
+_MOST_POINTS = 128
+_HALVES, _CLOSER_POINTS = (0.12, 0.04), 32
+_ORDINARY = 6.0
+_BINS = 8
+_LONGEST_STEP, _FARTHEST = 2.5, 4.0
+_APART = 0.12
+_HOPELESS, _HOPELESS_SHARE = 8.0, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Effects tried at `g` points of their prior, on top of a fit without them.
+
+    `effect` (g, p) are the tried effect's parameters, `share` (g, p) their shares of the whole
+    ranges, `weight` (g,) is the part of the prior that a point stands for, 0 where others do in its
+    place; `magnitude` (g,) is the share that its size has of its range. `shift` (g, data) is what
+    it does to the prediction, `marginal` what the data say to that. `theta` (g, d) are all
+    parameters, those of the fit moved to where they go best and sizes scaled to what fits best.
+    """
+
+    hypothesis: Hypothesis
+    effect: FloatArray
+    share: FloatArray
+    weight: FloatArray
+    magnitude: FloatArray
+    shift: FloatArray
+    marginal: Marginal
+    theta: FloatArray
+
+    @property
+    def visible(self) -> FloatArray:
+        """By how many standard deviations the effect moves the data, (g,)."""
+        return self.marginal.visible
+
+    @property
+    def smallest(self) -> float:
+        """The share of the size's range that cannot be seen; 1 where nothing of it can.
+
+        That is where half of the places and directions show it.
+        """
+        first = _first_points(self.share.shape[1])
+        order = np.argsort(self.magnitude[:first], kind="stable")
+        bins = [each for each in np.array_split(order, _BINS) if len(each)]
+        middle = np.array([np.median(self.magnitude[each]) for each in bins])
+        seen = np.array([np.median(np.log(self.visible[each] + 1e-12)) for each in bins])
+        above = np.flatnonzero(seen >= np.log(VISIBLE))
+        if not len(above):
+            return 1.0
+        lowest = int(above[0])
+        if lowest == 0 or np.ptp(self.magnitude) == 0:
+            return 0.0
+        pair = slice(lowest - 1, lowest + 1)
+        return float(np.interp(np.log(VISIBLE), seen[pair], middle[pair]))
+
+    @property
+    def log_evidence(self) -> float:
+        """Of the visible sizes, with shifts taken as linear in the size: rough."""
+        weight = np.where(self._counted, self.weight, 0.0)
+        return float(logsumexp(self.marginal.log_mean, b=weight / weight.sum()))
+
+    @property
+    def _counted(self) -> BoolArray:
+        return np.asarray(self.magnitude >= min(self.smallest, self.magnitude.max()))
+
+    def starts(self, coordinates: Coordinates, most: int) -> FloatArray:
+        """Up to `most` good and different points z (m, d) for each choice of signs.
+
+        Two more for each further parameter of the effect.
+        """
+        most += 2 * (self.share.shape[1] - 1)
+        z = coordinates.z(self.theta)
+        chosen: list[int] = []
+        peak = np.where(self._counted, self.marginal.log_peak, -np.inf)
+        good = peak > peak.max() - max(_HOPELESS, _HOPELESS_SHARE * np.ptp(peak[self._counted]))
+        for branch in coordinates.branches:
+            rows = np.flatnonzero(branch.holds(z) & good)
+            chosen += _different(rows, self.share, self.marginal.log_peak, most)
+        return np.vstack([z[chosen], *self._mirrored(z, coordinates)])
+
+    def _mirrored(self, z: FloatArray, coordinates: Coordinates) -> list[FloatArray]:
+        """The best point seen from the other end, if the effect has a place."""
+        peak = np.where(self._counted, self.marginal.log_peak, -np.inf)
+        own = range(z.shape[1] - self.share.shape[1], z.shape[1])
+        places = [k for k in own if is_place(coordinates.parameters[k])]
+        mirrored = z[[peak.argmax()]]
+        mirrored[:, places] *= -1
+        return [mirrored] if places else []
+
+
+def scan(problem: GapProblem, before: Fit, hypothesis: Hypothesis) -> Scan:
+    """`hypothesis` has the effects of `before` first and then those that are tried.
+
+    The points spread evenly over the whole prior (Sobol 1967), whatever of it can be seen. Those of
+    an effect of several parameters spread again, closer, about the best of them, where that is
+    much better than the fit before or much worse, which nothing nested in it need be.
+    """
+    parameters = problem.coordinates(hypothesis, whole=True).dimension - len(before.z)
+    share = _spread(parameters, _first_points(parameters))
+    shift = _shift(problem, before, hypothesis, share)
+    weight = np.full(len(share), 1 / len(share))
+    found = _scan(problem, before, hypothesis, share, weight, shift)
+    for half in _HALVES if parameters > 1 else ():
+        peak = found.marginal.log_peak
+        if abs(peak.max() - before.log_evidence) < _ORDINARY:
+            break
+        best = share[peak.argmax()]
+        low, high = (best - half).clip(0, 1), (best + half).clip(0, 1)
+        closer = low + (high - low) * _spread(parameters, _CLOSER_POINTS)
+        volume = float(np.prod(high - low))
+        inside = np.asarray(((share >= low) & (share <= high)).all(axis=1))
+        kept = np.where(inside, 0.0, weight)
+        kept *= (1 - volume) / max(kept.sum(), volume)
+        weight = np.append(kept, np.full(len(closer), volume / len(closer)))
+        share = np.vstack([share, closer])
+        shift = np.vstack([shift, _shift(problem, before, hypothesis, closer)])
+        found = _scan(problem, before, hypothesis, share, weight, shift)
+    return found
+
+
+def _shift(
+    problem: GapProblem, before: Fit, hypothesis: Hypothesis, share: FloatArray
+) -> FloatArray:
+    """What effects at shares (g, p) do to the prediction of `before`; NaN where unsolvable."""
+    kept = np.repeat(problem.theta(before.hypothesis, before.z[None]), len(share), axis=0)
+    theta = np.column_stack([kept, _effect(problem, before, hypothesis, share)])
+    return np.asarray(problem.predict_at(hypothesis, theta) - before.predicted)
+
+
+def _effect(
+    problem: GapProblem, before: Fit, hypothesis: Hypothesis, share: FloatArray
+) -> FloatArray:
+    """The tried effects' parameters (g, p) at shares of their whole ranges."""
+    tried = problem.coordinates(hypothesis, whole=True).parameters[len(before.z) :]
+    return np.stack([each.value(column) for each, column in zip(tried, share.T, strict=True)], 1)
+
+
+def superposed(problem: GapProblem, before: Fit, tried: Scan, hypothesis: Hypothesis) -> Scan:
+    """A scan of a single effect taken over to a fit that has another one, without solving anew.
+
+    The shifts of both are added. `hypothesis` has the effects of `before` first.
+    """
+    return _scan(problem, before, hypothesis, tried.share, tried.weight, tried.shift)
+
+
+def _scan(
+    problem: GapProblem,
+    before: Fit,
+    hypothesis: Hypothesis,
+    share: FloatArray,
+    weight: FloatArray,
+    shift: FloatArray,
+) -> Scan:
+    whole, count = problem.coordinates(hypothesis, whole=True), len(before.z)
+    effect = _effect(problem, before, hypothesis, share)
+    solved = np.asarray(np.isfinite(shift).all(axis=1))
+    seen = marginal(problem, hypothesis, before, np.where(solved[:, None], shift, 0.0))
+    moved = before.z + seen.step.clip(-_LONGEST_STEP, _LONGEST_STEP)
+    linear = problem.theta(before.hypothesis, moved.clip(-_FARTHEST, _FARTHEST))
+    theta = np.column_stack([linear, effect])
+    return Scan(
+        hypothesis,
+        effect,
+        share,
+        np.where(solved, weight, 0.0),
+        whole.magnitude(theta, count),
+        shift,
+        seen,
+        whole.grown(theta, count, seen.scale),
+    )
+
+
+def truncate(problem: GapProblem, found: Scan) -> None:
+    """Cuts the prior of a single effect's size where the effect cannot be seen any more."""
+    (effect,) = found.hypothesis.effects
+    problem.smallest[effect] = found.smallest
+
+
+def _first_points(parameters: int) -> int:
+    return _POINTS.get(parameters, _MOST_POINTS)
+
+
+def _spread(parameters: int, count: int) -> FloatArray:
+    """Shares (count, parameters) evenly over the unit cube."""
+    if parameters == 1:
+        return ((np.arange(count) + 0.5) / count)[:, None]
+    points = qmc.Sobol(parameters, scramble=False).random(count)
+    return np.asarray(points + 0.5 / count)
+
+
+def _different(rows: IntArray, share: FloatArray, log_peak: FloatArray, most: int) -> list[int]:
+    """The best of `rows`, none near a better one, at most `most`."""
+    chosen: list[int] = []
+    for row in rows[np.argsort(-log_peak[rows], kind="stable")]:
+        away = np.abs(share[chosen] - share[row]).max(axis=1) if chosen else np.ones(1)
+        if len(chosen) < most and away.min() > _APART:
+            chosen.append(int(row))
+    return chosen

@@ -1,0 +1,169 @@
+"""How far the gap shrinks, in the fit and on modes and tests that were held out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.errors import UsageError
+from shm.gap.contract import Design, Fit
+from shm.gap.problem import GapProblem
+from shm.gap.refit import refitted
+from shm.models.effects import Conditions
+from shm.values import NAN, BoolArray, FloatArray, Shrinkage
+
+_FEWEST = 4
+_ORDER_FOLDS = 3
+_TEST_FOLDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Residuals of held-out frequencies, of their logarithms: `before`, `after` (folds, F).
+
+    NaN where a fold keeps the frequency in the fit; `after` is NaN where there is no cause.
+    """
+
+    before: FloatArray
+    after: FloatArray
+
+    @property
+    def before_percent(self) -> FloatArray:
+        """(F,), of the first fold that holds the frequency out; NaN where none does."""
+        return _first(self.before)
+
+    @property
+    def after_percent(self) -> FloatArray:
+        """(F,), of the first fold that holds the frequency out; NaN where none does."""
+        return _first(self.after)
+
+
+def held_out(
+    problem: GapProblem,
+    before: Fit,
+    after: Fit | None,
+    hold_out: tuple[str, ...],
+    rng: np.random.Generator,
+) -> HeldOut:
+    """The baseline and the cause fitted without the held-out data, and what they then predict.
+
+    `hold_out` names tests or orders that are left out together; empty: the orders
+    between the lowest and the highest in three folds, then tests in turn. A held-out frequency
+    takes its shape with it. Tests are held out as long as the others still vary every condition
+    that they all vary, and unless the cause acts in that test alone: else its size would be asked
+    of data that cannot know it. `rng` says which tests go together where there are many. With three
+    frequencies or fewer nothing can be held out, and all is NaN. The sizes of unknown errors are
+    those of the full fits.
+
+    Raises UsageError for names that are neither, or that leave too little to fit.
+    """
+    design = problem.observations.design
+    folds = _named(design, hold_out) if hold_out else _in_turn(design, after, rng)
+    none = np.full((len(folds), design.frequencies), NAN)
+    if len(folds) == 0:
+        return HeldOut(none, none)
+    return HeldOut(
+        _residuals(problem, before, folds),
+        none if after is None else _residuals(problem, after, folds),
+    )
+
+
+def shrinkage(
+    problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut | None
+) -> Shrinkage:
+    """Root mean squares in percent; NaN for what there is not."""
+    frequencies = problem.observations.design.frequencies
+    value = problem.observations.value[:frequencies]
+    return Shrinkage(
+        _rms_percent(value - before.predicted[:frequencies]),
+        NAN if after is None else _rms_percent(value - after.predicted[:frequencies]),
+        NAN if held is None else _rms_percent(held.before),
+        NAN if held is None else _rms_percent(held.after),
+    )
+
+
+def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
+    frequencies = problem.observations.design.frequencies
+    predicted = refitted(problem, fit, ~folds)[:, :frequencies]
+    return np.where(folds, problem.observations.value[:frequencies] - predicted, NAN)
+
+
+def _named(design: Design, names: tuple[str, ...]) -> BoolArray:
+    """One fold (1, F) that holds out everything that is named."""
+    tests = np.array([each.test for each in design.conditions])[design.frequency_test]
+    orders = np.array([str(order) for order in design.frequency_order])
+    unknown = [name for name in names if name not in tests and name not in orders]
+    if unknown:
+        raise UsageError(
+            f"{unknown[0]} is neither a test nor an order of these data.",
+            remedy=f"Name tests ({', '.join(dict.fromkeys(tests))}) or orders "
+            f"({', '.join(map(str, np.unique(design.frequency_order)))}).",
+        )
+    held = np.any([tests == name if name in tests else orders == name for name in names], axis=0)
+    if np.sum(~held) < _FEWEST - 1:
+        raise UsageError(
+            f"without {', '.join(names)} only {np.sum(~held)} frequencies are left to fit.",
+            remedy="Hold out fewer tests or orders.",
+        )
+    return np.asarray(held[None], dtype=bool)
+
+
+def _in_turn(design: Design, after: Fit | None, rng: np.random.Generator) -> BoolArray:
+    """Folds (folds, F) over the orders and over the tests; those that leave too little are out."""
+    folds = np.array([*_over_orders(design), *_over_tests(design, after, rng)], dtype=bool)
+    folds = folds.reshape(-1, design.frequencies)
+    kept = np.sum(~folds, axis=1)
+    enough = kept >= (_FEWEST - 1 if design.frequencies >= _FEWEST else design.frequencies + 1)
+    return np.asarray(folds[enough & folds.any(axis=1)])
+
+
+def _over_orders(design: Design) -> list[BoolArray]:
+    """Orders between the lowest and the highest, which only stand in where there are no others.
+
+    What acts on the lowest order alone, as sag does, cannot be known without it.
+    """
+    orders = np.unique(design.frequency_order)
+    inner = orders[1:-1] if len(orders) > 2 else orders
+    folds = [inner[fold::_ORDER_FOLDS] for fold in range(min(_ORDER_FOLDS, len(inner)))]
+    return [np.asarray(np.isin(design.frequency_order, fold)) for fold in folds]
+
+
+def _over_tests(design: Design, after: Fit | None, rng: np.random.Generator) -> list[BoolArray]:
+    """A test, or where there are many a few, in each fold."""
+    conditions = design.conditions
+    bound = set() if after is None else {v.test for _, v in after.hypothesis.effects}
+    candidates = [t for t, each in enumerate(conditions) if each.test not in bound]
+    candidates = [t for t in candidates if _still_varied(conditions, (t,))]
+    if len(set(map(_circumstances, conditions))) == 1:
+        return []
+    shuffled = rng.permutation(candidates).astype(int)
+    groups = [shuffled[i::_TEST_FOLDS] for i in range(min(_TEST_FOLDS, len(shuffled)))]
+    whole = [group for group in groups if _still_varied(conditions, tuple(group))]
+    return [np.asarray(np.isin(design.frequency_test, group)) for group in whole]
+
+
+def _circumstances(conditions: Conditions) -> tuple[float, float, float]:
+    mass = 0.0 if conditions.added_mass is None else conditions.added_mass.mass_kg
+    return conditions.temperature_shift_k, conditions.amplitude, mass
+
+
+def _still_varied(conditions: tuple[Conditions, ...], without: tuple[int, ...]) -> bool:
+    rest = [each for t, each in enumerate(conditions) if t not in without]
+    if not rest:
+        return False
+    varied = np.ptp([_circumstances(each) for each in conditions], axis=0) > 0
+    still = np.ptp([_circumstances(each) for each in rest], axis=0) > 0
+    return bool(np.all(still | ~varied))
+
+
+def _first(residual: FloatArray) -> FloatArray:
+    percent = np.full(residual.shape[1], NAN)
+    for fold in residual[::-1]:
+        percent = np.where(np.isfinite(fold), 100 * np.expm1(fold), percent)
+    return percent
+
+
+def _rms_percent(residual: FloatArray) -> float:
+    known = residual[np.isfinite(residual)]
+    return float(100 * np.sqrt(np.mean(np.expm1(known) ** 2))) if known.size else NAN

@@ -1,0 +1,208 @@
+"""Adopted model classes: a baseline with effects of the catalogue, as `shm gap adopt` makes them.
+
+Parameters are the baseline's (its length is that of the description), the deviations of the bar as
+made, and the effects' own. All priors are uniform, as those of every model class: a deviation has
+the standard deviation of the hanger's scatter, a logarithmic size is uniform in its log10, and one
+of either sign is uniform in the value itself, because a logarithm has no zero to cross and a sign
+that is set once could not follow a hanger that changes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+
+from shm.errors import BadInput, UsageError
+from shm.models.adopted_name import AdoptedEffect, AdoptedName
+from shm.models.base import Model
+from shm.models.composed import ComposedHanger
+from shm.models.conditions import Conditions
+from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
+from shm.models.registry import MODELS
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
+
+_HALF_WIDTH_IN_SD = math.sqrt(3)
+_ALONG = 101
+_ONE_TEST = Survey(("test",), PLANES, (), False, (), (), ())
+_ANYTHING = Survey((), PLANES, (), True, (0.0, 20.0), (0.5, 1.0), ())
+
+
+class Adopted(Model):
+    """The class of one adopted name; see `shm.models.adopted_name`.
+
+    Its tension is that at the reference temperature and at rest, where an effect changes it.
+    """
+
+    expensive = True
+
+    def __init__(self, name: str, hanger: Hanger):
+        super().__init__(hanger)
+        made = checked(name, hanger)
+        self._effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
+        self._reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
+        self._composed = ComposedHanger(hanger, made.baseline, self._effects, ())
+        self.name = name
+        acting = " and ".join(f"{name} ({variant.at})" for name, variant in self._effects)
+        self.title = f"{MODELS[made.baseline].title}, with {acting}"
+        scatter = asdict(hanger.scatter)
+        held = [scatter.get(each.name) == 0 for each in self._composed.parameters]
+        self._free = np.flatnonzero(~np.array(held))
+        free = [self._composed.parameters[index] for index in self._free]
+        self._logarithmic = np.array([in_log(each) for each in free])
+        half = {name: _HALF_WIDTH_IN_SD * sd for name, sd in asdict(hanger.scatter).items()}
+        bounds = {own_name(e): bounds_of(e) for e in free}
+        bounds |= {name: (-half[name], half[name]) for name in bounds if name in half}
+        for each in made.effects:
+            for parameter, both in each.ranges.items():
+                own = parameter if parameter in bounds else f"{each.effect}.{parameter}"
+                bounds[own] = both
+        self.bounds = bounds
+
+    def conditions(self, test: ModalTest) -> Conditions:
+        """Its added mass, and its temperature and level where an effect follows them."""
+        followed = {each for name, _ in self._effects for each in EFFECTS[name].follows}
+        warm, hard = "temperature" in followed, "amplitude" in followed
+        return Conditions(
+            temperature_shift_k=test.temperature_c - self._reference_c if warm else 0.0,
+            amplitude=test.amplitude if hard and math.isfinite(test.amplitude) else 1.0,
+            added_mass=test.added_mass,
+        )
+
+    def refuse(self, test: ModalTest) -> None:
+        """Raises BadInput as any class, and where an effect follows a temperature not given."""
+        super().refuse(test)
+        if not math.isfinite(self.conditions(test).temperature_shift_k):
+            raise BadInput(
+                f"test {test.id} has no temperature, which model class {self.name} follows.",
+                remedy="Give temperature_c, or drop the adoption with `shm gap drop`.",
+            )
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        return self.frequencies_at(theta, modes, Conditions())
+
+    def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
+        found = self._composed.modes(self._values(theta), conditions, modes, shapes=False)
+        return found.frequency_hz
+
+    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        places_m = (*map(float, x_m), *np.linspace(0, self.hanger.length_m, _ALONG).tolist())
+        composed = ComposedHanger(
+            self.hanger, AdoptedName.parse(self.name).baseline, self._effects, places_m
+        )
+        axis = PLANES.index(plane)
+        values = self._values(theta[None])
+        found = composed.modes(values, Conditions(), order).shape[0, axis, order - 1, :, axis]
+        return np.asarray(found[: len(x_m)] / np.abs(found).max())
+
+    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The ends' own springs and those of the effects, each (n, planes)."""
+        physical = self._composed.physical(self._values(theta), Conditions())
+        compliance = np.einsum("nepp->nep", physical.rotational_compliance_rad_n_m)
+        with np.errstate(divide="ignore"):
+            springs = 1 / compliance
+        return springs[:, 0], springs[:, 1]
+
+    def _values(self, theta: FloatArray) -> FloatArray:
+        """All values of the composed hanger (n, values) from parameter sets (n, parameters)."""
+        values = np.zeros((len(theta), len(self._composed.parameters)))
+        plain = theta.copy()
+        plain[:, self._logarithmic] = 10.0 ** theta[:, self._logarithmic]
+        values[:, self._free] = plain
+        return values
+
+
+def unfit(name: str, hanger: Hanger) -> str:
+    """Why an adopted class cannot describe `hanger`; empty where it can.
+
+    Raises UsageError where the name is malformed or names what is not there.
+    """
+    return MODELS[checked(name, hanger).baseline].unfit(hanger)
+
+
+def checked(name: str, hanger: Hanger) -> AdoptedName:
+    """The parts of a name; raises UsageError where it is malformed or names what is not there."""
+    made = AdoptedName.parse(name)
+    if made.baseline not in MODELS:
+        raise UsageError(
+            f"unknown model class {made.baseline!r} in {name!r}.",
+            remedy=f"Known: {', '.join(MODELS)}.",
+        )
+    for each in made.effects:
+        _refuse_ranges(each, variant_of(each, hanger), hanger)
+    return made
+
+
+def variant_of(adopted: AdoptedEffect, hanger: Hanger) -> Variant:
+    """Where an adopted effect acts; raises UsageError for what cannot be adopted."""
+    effect = _effect(adopted.effect)
+    if _follows(adopted) and math.isnan(adopted.reference_c):
+        raise UsageError(
+            f"{effect.name} follows the temperature from a reference that the name does not give.",
+            remedy=f"Write {effect.name}@{adopted.key}:reference_c=10, say.",
+        )
+    variants = _variants(effect, hanger)
+    if adopted.key not in variants:
+        raise UsageError(
+            f"{effect.name} of a hanger cannot act at {adopted.key!r}.",
+            remedy=f"Places: {', '.join(variants)}.",
+        )
+    return variants[adopted.key]
+
+
+def places_of(effect: str, hanger: Hanger) -> tuple[str, ...]:
+    """The keys of where an effect may act; raises UsageError for what cannot be adopted."""
+    return tuple(_variants(_effect(effect), hanger))
+
+
+def missed_by_one_test(effect: str, hanger: Hanger) -> str:
+    """Why the frequencies of a single test cannot show an effect; empty where they can."""
+    return _effect(effect).invisible(hanger, _ONE_TEST)
+
+
+def own_name(parameter: Parameter) -> str:
+    """The name that a parameter of an effect has in the class."""
+    effect, dot, name = parameter.name.rpartition(".")
+    return f"{effect}{dot}log10_{name}" if in_log(parameter) else parameter.name
+
+
+def _variants(effect: Effect, hanger: Hanger) -> dict[str, Variant]:
+    return {each.key: each for each in effect.variants(hanger, _ANYTHING)}
+
+
+def _effect(name: str) -> Effect:
+    if name not in EFFECTS:
+        adoptable = (each for each in EFFECTS if EFFECTS[each].of_the_hanger)
+        raise UsageError(f"unknown effect {name!r}.", remedy=f"Known: {', '.join(adoptable)}.")
+    if not EFFECTS[name].of_the_hanger:
+        raise UsageError(
+            f"{name} is one of the sensors, not of the hanger: other tests would not have it.",
+            remedy="Correct the tests instead.",
+        )
+    return EFFECTS[name]
+
+
+def _refuse_ranges(adopted: AdoptedEffect, variant: Variant, hanger: Hanger) -> None:
+    known = [own_name(each) for each in EFFECTS[adopted.effect].parameters(hanger, variant)]
+    for name in adopted.ranges:
+        if name not in known:
+            raise UsageError(
+                f"{adopted.effect} has no parameter {name!r}.", remedy=f"It has {', '.join(known)}."
+            )
+
+
+def _follows(adopted: AdoptedEffect) -> bool:
+    return "temperature" in _effect(adopted.effect).follows
+
+
+def in_log(parameter: Parameter) -> bool:
+    """Whether a parameter of an effect is uniform in its log10 in the class."""
+    return parameter.spread == "logarithmic" and not parameter.signed
+
+
+def bounds_of(parameter: Parameter) -> tuple[float, float]:
+    """Limits of a parameter's uniform prior in the class, in the class's own coordinate."""
+    if in_log(parameter):
+        return math.log10(parameter.lower), math.log10(parameter.upper)
+    return (-parameter.upper if parameter.signed else parameter.lower), parameter.upper

@@ -1,0 +1,16 @@
+"""A hanger as a diagnosis sees it: a baseline, as made, with effects of the catalogue."""
+
+from __future__ import annotations
+
+from shm.models.composed.baseline import Baseline
+from shm.models.composed.hanger import ComposedHanger
+from shm.models.composed.scatter import DEVIATIONS, Deviation, deviations_of, scattered
+
+__all__ = [
+    "DEVIATIONS",
+    "Baseline",
+    "ComposedHanger",
+    "Deviation",
+    "deviations_of",
+    "scattered",
+]

@@ -1,0 +1,55 @@
+"""A hard hit stretches the hanger, so that its tension rises."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shm.models.conditions import Conditions
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.levels import missing_levels
+from shm.models.hanger.physical import PhysicalHanger
+from shm.values import FloatArray, Hanger
+
+
+class GeometricHardening(Effect):
+    """Swinging widely stretches the hanger and raises its mean tension with the amplitude squared.
+
+    All frequencies rise with the level of the hit, the low orders most.
+    """
+
+    name = "geometric_hardening"
+    title = "Tension that rises with the amplitude"
+    source = (
+        "Woinowsky-Krieger (1950), The effect of an axial force on the vibration of hinged bars; "
+        "Nayfeh and Mook (1979), Nonlinear Oscillations."
+    )
+    seen_by = ("tests at different levels",)
+    imitated_by = ("temperature_tension", "timebase")
+    follows = ("amplitude",)
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return missing_levels(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "hardening",
+            "fraction",
+            1e-6,
+            0.05,
+            0.0,
+            "One millionth to 5 % of the tension at the reference level: a hammer seldom moves a "
+            "hanger by more than a few millimetres.",
+            spread="logarithmic",
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        factor = 1 + values[:, 0] * conditions.amplitude**2
+        return replace(physical, tension_n=physical.tension_n * factor)

@@ -1,0 +1,49 @@
+"""Where effects may act: ends, planes, any place along the hanger."""
+
+from __future__ import annotations
+
+from shm.models.effects.base import Parameter, Survey, Variant
+from shm.values import NAN, PLANES, Hanger
+
+_ENDS = (("deck end", (0,)), ("arch end", (1,)), ("both ends", (0, 1)))
+
+
+def single_planes(survey: Survey) -> tuple[Variant, ...]:
+    """The whole hanger in each measured plane alone."""
+    return tuple(
+        Variant(f"everywhere, {plane}", planes=(PLANES.index(plane),)) for plane in survey.planes
+    )
+
+
+def planes(survey: Survey) -> tuple[Variant, ...]:
+    """The whole hanger: both planes where both were measured, and each measured plane alone."""
+    both = (Variant(),) if len(survey.planes) == len(PLANES) else ()
+    return both + single_planes(survey)
+
+
+def ends() -> tuple[Variant, ...]:
+    """Each end and both, both planes alike."""
+    return tuple(Variant(at, ends=where) for at, where in _ENDS)
+
+
+def ends_and_planes(survey: Survey) -> tuple[Variant, ...]:
+    """Each end and both; of the planes those that `planes` lists."""
+    return tuple(
+        Variant(plane.at.replace("everywhere", at), ends=where, planes=plane.planes)
+        for at, where in _ENDS
+        for plane in planes(survey)
+    )
+
+
+def place_along(hanger: Hanger) -> Parameter:
+    """The place of a local effect."""
+    return Parameter(
+        "x_m",
+        "m",
+        0.0,
+        hanger.length_m,
+        NAN,
+        "Nobody knows where along the hanger: every place is as likely.",
+        least=0.0,
+        most=hanger.length_m,
+    )

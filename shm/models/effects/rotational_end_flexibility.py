@@ -1,0 +1,61 @@
+"""An end that turns: a rotational spring between the bar and what holds it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places, scales
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger
+from shm.values import FloatArray, Hanger
+
+
+class RotationalEndFlexibility(Effect):
+    """The joint, the gusset plate or the deck behind it turns when the hanger bends.
+
+    A rotational spring stands between the bar and the structure; k1 and k3 act in the transverse
+    plane (deck end, arch end), k2 and k4 in the longitudinal one. It lowers all frequencies, the
+    low orders most, and so passes for less tension where ends are taken as clamped. At both ends
+    the ends are alike: k3 = k1 and k4 = k2.
+    """
+
+    name = "rotational_end_flexibility"
+    title = "Ends that turn"
+    source = (
+        "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; "
+        "Geier, De Roeck and Flesch (2006), Accurate cable force determination using ambient "
+        "vibration measurements."
+    )
+    seen_by = ("frequencies", "the other plane", "shapes near the ends")
+    imitated_by = (
+        "joint_softening",
+        "skewed_principal_axes",
+        "effective_length",
+        "bending_stiffness",
+        "translational_end_flexibility",
+    )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.ends_and_planes(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        first = 1 + 2 * variant.ends[0]
+        return tuple(
+            scales.rotational_stiffness(f"log10_k{first + plane}", hanger)
+            for plane in variant.planes
+        )
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        compliance = physical.rotational_compliance_rad_n_m.copy()
+        for end in variant.ends:
+            for column, plane in enumerate(variant.planes):
+                compliance[:, end, plane, plane] += 10.0 ** -values[:, column]
+        return replace(physical, rotational_compliance_rad_n_m=compliance)

@@ -1,0 +1,33 @@
+"""What the size of an effect is measured against in a given hanger, and the priors it makes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shm.models.base import Model
+from shm.models.effects.base import Parameter
+from shm.values import Hanger
+
+_MIDDLE_ORDER = 4
+_SOFT, _STIFF = 0.03, 1000.0
+
+
+def mass_kg(hanger: Hanger) -> float:
+    """The hanger's own mass."""
+    return hanger.mass_per_length_kg_m * hanger.length_m
+
+
+def rotational_stiffness(name: str, hanger: Hanger) -> Parameter:
+    """The log10 of an end spring's stiffness, scaled by EI p of a mode of order 4."""
+    own = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
+    return Parameter(
+        name,
+        "N m/rad",
+        math.log10(_SOFT * own),
+        math.log10(_STIFF * own),
+        np.inf,
+        "0.03 to 1000 times EI p, what the bar itself resists with in mode 4: softer is a hinge, "
+        "stiffer a clamp; nobody knows the order of magnitude.",
+    )

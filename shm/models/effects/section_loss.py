@@ -1,0 +1,66 @@
+"""A stretch of the bar that has lost section."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places
+from shm.models.effects.base import Effect, Parameter, Variant
+from shm.models.hanger.physical import PhysicalHanger, Zone
+from shm.values import NAN, FloatArray, Hanger
+
+
+class SectionLoss(Effect):
+    """Corrosion, wear or a machined neck: over a stretch the bar has lost a share of its area.
+
+    Mass falls with the area, bending stiffness with its square, as in a thinner round bar.
+    """
+
+    name = "section_loss"
+    title = "Lost section over a stretch"
+    source = (
+        "Cawley and Adams (1979), The location of defects in structures from measurements of "
+        "natural frequencies."
+    )
+    seen_by = ("frequencies of many orders", "shapes")
+    imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "loss",
+            "fraction",
+            0.005,
+            0.6,
+            0.0,
+            "0.5 to 60 % of the area: from surface rust to a bar about to break.",
+            spread="logarithmic",
+            most=0.99,
+        )
+        extent = Parameter(
+            "extent_m",
+            "m",
+            0.02 * hanger.length_m,
+            0.5 * hanger.length_m,
+            NAN,
+            "2 to 50 % of the length: from a splash zone or a notch at the socket to half the bar.",
+            spread="logarithmic",
+        )
+        return size, places.place_along(hanger), extent
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        loss, middle_m, extent_m = values.T
+        zone = Zone(
+            start_m=middle_m - extent_m / 2,
+            end_m=middle_m + extent_m / 2,
+            stiffness_factor=(1 - loss) ** 2,
+            mass_factor=1 - loss,
+        )
+        return replace(physical, zones=(*physical.zones, zone))

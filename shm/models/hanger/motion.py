@@ -1,0 +1,135 @@
+"""The modes of both planes as coefficients of the trial functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.models.hanger.breaks import stiffness_ratio
+from shm.models.hanger.eigen import Spectrum, spectrum
+from shm.models.hanger.families import families
+from shm.models.hanger.physical import PhysicalHanger
+from shm.models.hanger.springs import are_coupled, rotational_n_m_rad
+from shm.models.hanger.system import DEFLECTIONS, SLOPES, System
+from shm.values import BoolArray, FloatArray
+
+_FREE_SHIFT = 1.0
+_AS_A_WHOLE = 1e-4
+"""Below this omega^2 a free bar moves as a whole."""
+_SEARCHED = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """`omega_rad_s` (n, planes, modes); `vectors` (n, planes, axes, unknowns, modes) of unit modal
+    mass m L^3, None unless asked for. With coupled planes a mode moves along both axes."""
+
+    omega_rad_s: FloatArray
+    vectors: FloatArray | None
+
+
+def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bool) -> Motion:
+    """The first `modes` modes of each plane."""
+    if are_coupled(physical):
+        return _coupled(physical, parts, modes)
+    rows, planes, unknowns = parts.stiffness.shape[:3]
+    mass = np.broadcast_to(parts.mass, parts.stiffness.shape).reshape(-1, unknowns, unknowns)
+    stiffness = parts.stiffness.reshape(mass.shape)
+    supported = bool(np.any(parts.support_share))
+    found = spectrum(stiffness, mass, _shift(physical).ravel(), with_vectors or supported)
+    axes = None if found.vectors is None else found.vectors[:, None]
+    support = parts.support_share.transpose(0, 2, 1).reshape(rows * planes, 2, 1)
+    found = _without_supports(found, axes, parts, support, _is_free(physical)).first(modes)
+    omega = np.sqrt(found.omega_squared).reshape(rows, planes, modes) * _unit(physical)[..., None]
+    if not with_vectors or found.vectors is None:
+        return Motion(omega, None)
+    own = found.vectors.reshape(rows, planes, unknowns, modes)
+    vectors = np.zeros((rows, planes, planes, unknowns, modes))
+    for plane in range(planes):
+        vectors[:, plane, plane] = own[:, plane]
+    return Motion(omega, vectors)
+
+
+def _coupled(physical: PhysicalHanger, parts: System, modes: int) -> Motion:
+    """Both planes as one system, in the units of the transverse plane."""
+    rows, _, unknowns = parts.stiffness.shape[:3]
+    bending = physical.bending_stiffness_n_m2
+    stiffness = np.zeros((rows, 2, unknowns, 2, unknowns))
+    mass = np.zeros_like(stiffness)
+    parts_mass = np.broadcast_to(parts.mass, parts.stiffness.shape)
+    for plane in range(2):
+        ratio = (bending[:, plane] / bending[:, 0])[:, None, None]
+        stiffness[:, plane, :, plane] = parts.stiffness[:, plane] * ratio
+        mass[:, plane, :, plane] = parts_mass[:, plane]
+    cross = rotational_n_m_rad(physical)[..., 0, 1] / (bending[:, 0] / physical.length_m)[:, None]
+    for end, slope in enumerate(SLOPES):
+        at = parts.unknown(slope)
+        if at is not None:
+            stiffness[:, 0, at, 1, at] = stiffness[:, 1, at, 0, at] = cross[:, end]
+    square = (rows, 2 * unknowns, 2 * unknowns)
+    shift = _shift(physical).max(axis=1)
+    found = spectrum(stiffness.reshape(square), mass.reshape(square), shift, True)
+    assert found.vectors is not None
+    axes = found.vectors.reshape(rows, 2, unknowns, -1)
+    free = _is_free(physical)
+    found = _without_supports(found, axes, parts, parts.support_share, free)
+    found = found.first(_SEARCHED * modes)
+    axes = _axes(found, unknowns)
+    share = np.einsum("num,nuv,nvm->nm", axes[:, 0], parts_mass[:, 0], axes[:, 0], optimize=True)
+    mine = [found.taken(order) for order in families(share, modes)]
+    omega = np.stack([np.sqrt(each.omega_squared) for each in mine], axis=1)
+    vectors = np.stack([_axes(each, unknowns) for each in mine], axis=1)
+    return Motion(omega * _unit(physical)[:, :1, None], vectors)
+
+
+def _axes(found: Spectrum, unknowns: int) -> FloatArray:
+    """(rows, axes, unknowns, modes)."""
+    assert found.vectors is not None
+    return found.vectors.reshape(len(found.vectors), -1, unknowns, found.vectors.shape[-1])
+
+
+def _unit(physical: PhysicalHanger) -> FloatArray:
+    """sqrt(EI/(m L^4)) (n, planes)."""
+    inertia = physical.mass_per_length_kg_m * physical.length_m**4
+    return np.asarray(np.sqrt(physical.bending_stiffness_n_m2 / inertia[:, None]))
+
+
+def _is_free(physical: PhysicalHanger) -> bool:
+    return bool(np.any(np.isinf(physical.translational_compliance_m_n)))
+
+
+def _shift(physical: PhysicalHanger) -> FloatArray:
+    """What makes the stiffness definite (n, planes): k^4 - P k^2 + shift > 0 for compression P."""
+    squeezed = np.maximum(-stiffness_ratio(physical), 0.0)
+    return np.asarray(0.3 * squeezed**2 + (_FREE_SHIFT if _is_free(physical) else 0.0))
+
+
+def _without_supports(
+    found: Spectrum, axes: FloatArray | None, parts: System, support: FloatArray, free: bool
+) -> Spectrum:
+    """Without motions of a free bar as a whole and the supports' own modes.
+
+    `axes` (rows, axes, unknowns, modes) are the vectors, `support` (rows, ends, axes).
+    """
+    out = np.zeros(found.omega_squared.shape, dtype=bool)
+    if free:
+        out |= found.omega_squared < _AS_A_WHOLE
+    if axes is not None:
+        for end, deflection in enumerate(DEFLECTIONS):
+            at = parts.unknown(deflection)
+            if at is not None:
+                share = support[:, end, :, None] * axes[:, :, at] ** 2
+                out = _largest_out(out, share)
+    return found.without(out) if out.any() else found
+
+
+def _largest_out(out: BoolArray, share: FloatArray) -> BoolArray:
+    """Leaves out the mode with the largest share (rows, axes, modes) of each axis that has any."""
+    for axis in range(share.shape[1]):
+        left = np.where(out, -1.0, share[:, axis])
+        worst = np.argmax(left, axis=1)
+        rows = np.flatnonzero(share[:, axis].any(axis=1))
+        out = out.copy()
+        out[rows, worst[rows]] = True
+    return out

@@ -1,0 +1,142 @@
+"""Stiffness and mass of a hanger's planes over the trial functions, without units.
+
+Lengths are in L, stiffness in EI/L of the plane, masses in m L^3: an eigenvalue omega^2 stands for
+omega^2 EI/(m L^4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.models.hanger.bar import Bar
+from shm.models.hanger.breaks import along, stiffness_ratio
+from shm.models.hanger.functions import (
+    ARCH_DEFLECTION,
+    ARCH_SLOPE,
+    DECK_DEFLECTION,
+    DECK_SLOPE,
+    HERMITE,
+)
+from shm.models.hanger.physical import PhysicalHanger
+from shm.models.hanger.springs import bending_unit, rotational_n_m_rad, translational_n_m
+from shm.values import FloatArray, IntArray
+
+DEFLECTIONS = (DECK_DEFLECTION, ARCH_DEFLECTION)
+SLOPES = (DECK_SLOPE, ARCH_SLOPE)
+_RIGID_IN_SHEAR = 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Stiffness and mass (n, planes, unknowns, unknowns) of the functions `kept` (unknowns,).
+
+    `support_share` (n, ends, planes) is a support's mass as a share of m L.
+    """
+
+    stiffness: FloatArray
+    mass: FloatArray
+    kept: IntArray
+    support_share: FloatArray
+
+    def unknown(self, function: int) -> int | None:
+        """Which unknown a function is; None where nothing lets it move."""
+        found = np.flatnonzero(self.kept == function)
+        return int(found[0]) if len(found) else None
+
+
+def system(physical: PhysicalHanger, bar: Bar) -> System:
+    """Each plane by itself."""
+    stiffness, mass = _stiffness(physical, bar), _mass(physical, bar)
+    moving = physical.translational_compliance_m_n > 0
+    bar_kg = physical.mass_per_length_kg_m * physical.length_m
+    support = np.where(moving, physical.support_mass_kg, 0.0) / bar_kg[:, None, None]
+    turning = np.einsum("nepp->nep", rotational_n_m_rad(physical))
+    turning = turning / bending_unit(physical, 1)[:, None]
+    held = translational_n_m(physical) / bending_unit(physical, 3)[:, None]
+    for end in range(2):
+        stiffness[:, :, SLOPES[end], SLOPES[end]] += turning[:, end]
+        stiffness[:, :, DEFLECTIONS[end], DEFLECTIONS[end]] += held[:, end]
+    if np.any(support):
+        mass = np.broadcast_to(mass, stiffness.shape).copy()
+        for end in range(2):
+            mass[:, :, DEFLECTIONS[end], DEFLECTIONS[end]] += support[:, end]
+    if bar.hats:
+        stiffness, mass = _condensed(stiffness, mass, bar.hats)
+    first, kept = _kept(physical, stiffness.shape[-1])
+    return System(_window(stiffness, first, kept), _window(mass, first, kept), kept, support)
+
+
+def _condensed(
+    stiffness: FloatArray, mass: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Without the last `count` functions, which follow the others as in statics (Guyan 1965).
+
+    They are shear strains without deflection. Rotary inertia alone acts on them, and it changes the
+    shear strain by (radius of gyration x wave number)^2, some 1e-2: frequencies by 1e-6.
+    """
+    own = np.linalg.inv(stiffness[..., -count:, -count:])
+    follow = -own @ stiffness[..., -count:, :-count]
+    cross, transposed = mass[..., :-count, -count:] @ follow, np.swapaxes(follow, -1, -2)
+    turned = transposed @ mass[..., -count:, -count:] @ follow
+    return (
+        stiffness[..., :-count, :-count] + stiffness[..., :-count, -count:] @ follow,
+        mass[..., :-count, :-count] + cross + np.swapaxes(cross, -1, -2) + turned,
+    )
+
+
+def _window(matrix: FloatArray, first: int, kept: IntArray) -> FloatArray:
+    """Rows and columns of the kept functions; a view where the first ones alone are left out."""
+    if len(kept) == matrix.shape[-1] - first:
+        return matrix[..., first:, first:]
+    return matrix[..., kept[:, None], kept]
+
+
+def _kept(physical: PhysicalHanger, functions: int) -> tuple[int, IntArray]:
+    """All functions but those of ends that nothing lets move, and the least of them."""
+    turning = np.any(physical.rotational_compliance_rad_n_m, axis=(0, 2, 3))
+    moving = np.any(physical.translational_compliance_m_n, axis=(0, 2))
+    ends = [*np.array(SLOPES)[turning], *np.array(DEFLECTIONS)[moving]]
+    kept = np.array(sorted([*ends, *range(HERMITE, functions)]), dtype=np.int64)
+    return int(kept[0]), kept
+
+
+def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
+    """Bar, shear, sag and lateral springs (n, planes, functions, functions)."""
+    ratio = stiffness_ratio(physical)
+    total = bar.bending + ratio[..., None, None] * bar.tension[:, None]
+    if bar.counts.shear:
+        flexibility = physical.shear_compliance_1_n[:, None] * bending_unit(physical, 2)
+        rigid = 1 / np.maximum(flexibility, 1 / _RIGID_IN_SHEAR)
+        total += rigid[..., None, None] * bar.shear[:, None]
+    if np.any(physical.sag_parameter):
+        dyad = bar.area[:, None, :, None] * bar.area[:, None, None, :]
+        total += (ratio * physical.sag_parameter)[..., None, None] * dyad
+    for spring in physical.springs:
+        w = bar.deflections(along(physical, spring.x_m[:, None]))
+        share = spring.stiffness_n_m[:, : ratio.shape[1]] / bending_unit(physical, 3)
+        total = _added(total, share[..., None, None] * (w.transpose(0, 2, 1) @ w)[:, None])
+    return np.asarray(total)
+
+
+def _mass(physical: PhysicalHanger, bar: Bar) -> FloatArray:
+    """Bar, rotary inertia and point masses (n or 1, 1, functions, functions)."""
+    bar_kg = physical.mass_per_length_kg_m * physical.length_m
+    total = bar.mass
+    if np.any(physical.rotary_inertia_kg_m):
+        rotary = physical.rotary_inertia_kg_m / (bar_kg * physical.length_m)
+        total = total + rotary[:, None, None] * bar.rotation
+    if physical.masses:
+        x_m = np.stack([each.x_m for each in physical.masses], axis=1)
+        share = np.stack([each.mass_kg for each in physical.masses], axis=1) / bar_kg[:, None]
+        w = bar.deflections(along(physical, x_m))
+        total = _added(total, (w * share[..., None]).transpose(0, 2, 1) @ w)
+    return np.asarray(total[:, None])
+
+
+def _added(total: FloatArray, term: FloatArray) -> FloatArray:
+    """With a term of the functions that deflect, which come first."""
+    missing = total.shape[-1] - term.shape[-1]
+    around = [(0, 0)] * (term.ndim - 2) + [(0, missing)] * 2
+    return np.asarray(total + np.pad(term, around) if missing else total + term)

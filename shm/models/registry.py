@@ -1,0 +1,29 @@
+"""The registry of model classes: a new one is one file and one line here."""
+
+from __future__ import annotations
+
+from shm.errors import UsageError
+from shm.models.base import Model
+from shm.models.beam import Beam1, Beam2
+from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
+from shm.values import Hanger
+
+MODELS: dict[str, type[Model]] = {
+    model.name: model for model in (Beam1, Beam2, S1, S2, Solid0, Solid1, Solid2)
+}
+
+
+def registered(name: str, hanger: Hanger) -> Model:
+    """The registered class `name` of `hanger`, be it admitted there or not.
+
+    Raises UsageError for an unknown name, and where the class cannot describe the hanger.
+    """
+    if name not in MODELS:
+        raise UsageError(f"unknown model class {name!r}.", remedy=f"Known: {', '.join(MODELS)}.")
+    reason = MODELS[name].unfit(hanger)
+    if reason:
+        raise UsageError(
+            f"model class {name} does not apply to hanger {hanger.id}: {reason}",
+            remedy="Take another class, or correct the hanger's description.",
+        )
+    return MODELS[name](hanger)

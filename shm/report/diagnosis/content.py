@@ -1,0 +1,80 @@
+"""What the page of a gap diagnosis is made from, and which explanation it may claim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from shm.values import Cause, Diagnosis, Hanger
+
+_LIKELIER_THAN_NOT = 0.5
+
+
+class Answer(Enum):
+    """What a diagnosis says, in two or three words."""
+
+    EXPLAINED = "Explained"
+    ALIKE = "Explained, causes alike"
+    NO_GAP = "No gap"
+    UNEXPLAINED = "Not explained"
+    UNDECIDED = "Undecided"
+
+
+@dataclass(frozen=True)
+class DiagnosisSheet:
+    """A gap diagnosis with the hanger it is of, and the bridge's name where it is known."""
+
+    diagnosis: Diagnosis
+    hanger: Hanger
+    bridge: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One cause, or the causes that these data cannot tell apart, likeliest first."""
+
+    causes: tuple[Cause, ...]
+
+    @property
+    def probability(self) -> float:
+        return sum(cause.probability for cause in self.causes)
+
+    @property
+    def leading(self) -> Cause:
+        return self.causes[0]
+
+
+def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
+    """The causes, those of a group together, likeliest first."""
+    together: dict[str, list[Cause]] = {}
+    for cause in sorted(diagnosis.causes, key=lambda cause: -cause.probability):
+        key = cause.effect if cause.group is None else f"group {cause.group}"
+        together.setdefault(key, []).append(cause)
+    found = [Claim(tuple(causes)) for causes in together.values()]
+    return tuple(sorted(found, key=lambda claim: -claim.probability))
+
+
+def claimed(diagnosis: Diagnosis) -> Claim | None:
+    """The likeliest claim; None where no gap or something unknown is likelier than each."""
+    leading = diagnosis.leading
+    return next((claim for claim in claims(diagnosis) if claim.leading is leading), None)
+
+
+def after(diagnosis: Diagnosis) -> str:
+    """What the tension after the diagnosis allows for; empty where that is the baseline alone."""
+    if claimed(diagnosis) is not None:
+        return "with the cause"
+    no_gap = diagnosis.no_gap_probability >= diagnosis.unexplained_probability
+    return "" if no_gap else "allowing for the unknown"
+
+
+def answer(diagnosis: Diagnosis) -> Answer:
+    """What the diagnosis says; undecided where nothing is likelier than not."""
+    claim = claimed(diagnosis)
+    rest = max(diagnosis.no_gap_probability, diagnosis.unexplained_probability)
+    highest = rest if claim is None else claim.probability
+    if not highest >= _LIKELIER_THAN_NOT:
+        return Answer.UNDECIDED
+    if claim is not None:
+        return Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
+    return Answer.NO_GAP if rest == diagnosis.no_gap_probability else Answer.UNEXPLAINED

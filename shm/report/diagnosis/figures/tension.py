@@ -1,0 +1,96 @@
+"""The tension with its interval by the baseline alone and with the cause."""
+
+from __future__ import annotations
+
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shm.report.diagnosis.content import DiagnosisSheet, after
+from shm.report.diagnosis.summary import kilonewtons, tension_kn
+from shm.report.figures import style
+from shm.report.figures.member import Member
+from shm.values import TensionEstimate
+
+_NEAR = 1.0
+"""How far the nominal tension may lie to be in view, in widths of what is drawn."""
+
+
+def _draw(sheet: DiagnosisSheet) -> Figure | None:
+    rows = _rows(sheet)
+    if not rows:
+        return None
+    figure = style.new_figure(0.42 * len(rows) + 0.95)
+    axes = figure.subplots()
+    style.dress(axes, "tension (kN)", "")
+    for row, (_, estimate, colour) in enumerate(rows):
+        _interval(axes, row, estimate, colour)
+    axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(False, axis="y")
+    axes.set_ylim(len(rows) - 0.5, -0.75)
+    axes.margins(x=0.12)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    _nominal(axes, sheet)
+    return figure
+
+
+def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
+    diagnosis = sheet.diagnosis
+    rows = [
+        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, style.QUIET),
+        (after(diagnosis), diagnosis.tension_after_n, style.BLUE),
+    ]
+    return [row for row in rows if row[0] and math.isfinite(row[1].mean)]
+
+
+def _interval(axes: Axes, row: int, estimate: TensionEstimate, colour: str) -> None:
+    interval = tension_kn(estimate)
+    if math.isfinite(interval.width):
+        axes.plot(
+            [interval.low, interval.high], [row, row], color=colour, linewidth=7, alpha=0.35,
+            solid_capstyle="butt",
+        )  # fmt: skip
+    axes.plot([interval.mean], [row], marker="o", markersize=6, color=colour)
+    axes.annotate(
+        kilonewtons(estimate),
+        (interval.mean, row),
+        xytext=(0, 9),
+        textcoords="offset points",
+        ha="center",
+        fontsize=style.TINY + 0.5,
+        color=style.INK,
+    )
+
+
+def _nominal(axes: Axes, sheet: DiagnosisSheet) -> None:
+    """The nominal tension as a line, where it lies near."""
+    nominal = sheet.hanger.nominal_tension_n / 1e3
+    low, high = axes.get_xlim()
+    reach = _NEAR * (high - low)
+    if not low - reach <= nominal <= high + reach:
+        return
+    axes.axvline(nominal, color=style.INK, linestyle=":", linewidth=1.2, label="nominal")
+    margin = 0.08 * (high - low)
+    axes.set_xlim(min(low, nominal - margin), max(high, nominal + margin))
+    style.legend_above(axes)
+
+
+def _caption(sheet: DiagnosisSheet) -> str:
+    what = after(sheet.diagnosis)
+    both = (
+        f"by the baseline alone and {what}: mean and 90 % interval. Where the two bars do not "
+        "overlap, the gap moves the tension by more than the baseline admits."
+        if what
+        else "by the baseline, which explains the measurements best: mean and 90 % interval."
+    )
+    return f"Tension {both} The interval holds what the scatter of manufacture leaves open."
+
+
+def _alt(sheet: DiagnosisSheet) -> str:
+    told = [f"{what} {kilonewtons(estimate)}" for what, estimate, _ in _rows(sheet)]
+    return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
+
+
+FIGURE = Member("gap_tension", "Tension before and after", _draw, _caption, _alt)

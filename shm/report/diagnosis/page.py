@@ -1,0 +1,107 @@
+"""A gap diagnosis as one HTML file, and as a part of a hanger's page."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from markupsafe import Markup
+
+from shm.report import words
+from shm.report.diagnosis.content import Answer, DiagnosisSheet, after, answer, claimed
+from shm.report.diagnosis.figures import diagnosis_figures
+from shm.report.diagnosis.phrases import label
+from shm.report.diagnosis.summary import consequences, kilonewtons, name, verdict
+from shm.report.diagnosis.tables import answers, evidence
+from shm.report.template import ENVIRONMENT
+
+_STYLES = {
+    Answer.EXPLAINED: "first",
+    Answer.ALIKE: "first",
+    Answer.NO_GAP: "steady",
+    Answer.UNEXPLAINED: "alert",
+    Answer.UNDECIDED: "watch",
+}
+
+
+def diagnosis_page(sheet: DiagnosisSheet) -> str:
+    """The diagnosis of one hanger: readable on screen (light or dark), on paper, by ear."""
+    return ENVIRONMENT.get_template("diagnosis.html.j2").render(
+        title=name(sheet), bridge=sheet.bridge, made=_made(sheet), diagnosis=section(sheet)
+    )
+
+
+def section(sheet: DiagnosisSheet) -> dict[str, Any]:
+    """What the templates show of a diagnosis."""
+    found = answer(sheet.diagnosis)
+    return {
+        "answer": found.value,
+        "style": _STYLES[found],
+        "verdict": verdict(sheet.diagnosis),
+        "consequences": consequences(sheet.diagnosis),
+        "facts": _facts(sheet),
+        "remarks": sheet.diagnosis.remarks,
+        "illustrations": [
+            (item, Markup(item.svg()))  # noqa: S704
+            for item in diagnosis_figures(sheet)
+        ],
+        "answers": answers(sheet),
+        "evidence": evidence(sheet),
+    }
+
+
+def _facts(sheet: DiagnosisSheet) -> tuple[tuple[str, str, str], ...]:
+    """The figures on top: what, value, what stands beside it."""
+    facts = (_claim(sheet), _misses(sheet), _tension(sheet), _fit(sheet))
+    return tuple(fact for fact in facts if fact is not None)
+
+
+def _claim(sheet: DiagnosisSheet) -> tuple[str, str, str]:
+    diagnosis, claim = sheet.diagnosis, claimed(sheet.diagnosis)
+    if claim is not None:
+        more = len(claim.causes) - 1
+        alike = f" or {words.counted(more, 'cause')} like it" if more else ""
+        told = words.probability(claim.probability)
+        return ("Probability of the cause", told, f"{label(claim.leading)}{alike}")
+    no_gap, unknown = diagnosis.no_gap_probability, diagnosis.unexplained_probability
+    if no_gap >= unknown:
+        return ("Probability of no gap", words.probability(no_gap), f"by {diagnosis.baseline}")
+    return ("Something else", words.probability(unknown), "probability, not in the catalogue")
+
+
+def _misses(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+    found = sheet.diagnosis.shrinkage
+    if math.isnan(found.rms_before_percent):
+        return None
+    both = (found.rms_before_percent, found.rms_after_percent)
+    before, with_it = (words.plain(value, 2) for value in both)
+    if math.isnan(found.rms_after_percent) or claimed(sheet.diagnosis) is None:
+        return ("Error of the frequencies", f"{before} %", "rms, by the baseline")
+    held = found.held_out_after_percent
+    told = f"rms; held out {words.plain(held, 2)} %" if math.isfinite(held) else "rms"
+    return ("Error of the frequencies", f"{before} → {with_it} %", told)
+
+
+def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+    plain, better = sheet.diagnosis.tension_before_n, sheet.diagnosis.tension_after_n
+    if math.isnan(plain.mean):
+        return None
+    if not after(sheet.diagnosis) or math.isnan(better.mean):
+        return ("Tension", f"{plain.mean / 1e3:.0f} kN", f"baseline: {kilonewtons(plain)}")
+    return ("Tension", f"{better.mean / 1e3:.0f} kN", f"baseline alone: {kilonewtons(plain)}")
+
+
+def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+    p_value = sheet.diagnosis.fit_p_value
+    if math.isnan(p_value):
+        return None
+    told = "good" if p_value >= 0.05 else "doubtful" if p_value >= 0.01 else "poor"
+    return ("Fit of the answer", told, f"posterior predictive p-value {words.plain(p_value, 2)}")
+
+
+def _made(sheet: DiagnosisSheet) -> str:
+    diagnosis = sheet.diagnosis
+    tests = words.counted(len(diagnosis.tests), "test")
+    seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""
+    named = f"{tests} ({', '.join(diagnosis.tests)})"
+    return f"{named}, baseline {diagnosis.baseline}, seed {diagnosis.seed}{seconds}"

@@ -1,0 +1,272 @@
+"""The answer of a gap diagnosis in words that an engineer would sign, the claim first."""
+
+from __future__ import annotations
+
+import math
+
+from shm.report import words
+from shm.report.content import Interval
+from shm.report.diagnosis.content import (
+    Answer,
+    Claim,
+    DiagnosisSheet,
+    after,
+    answer,
+    claimed,
+    claims,
+)
+from shm.report.diagnosis.phrases import label, phrase
+from shm.values import Diagnosis, NextMeasurement, TensionEstimate, Trend
+
+_SURE = 0.9
+_POOR_FIT = 0.01
+_WORTH_MEASURING = 1.0
+_CERTAIN = 20.0
+_SHRUNK = 0.8
+"""The largest share of a held-out gap that may remain where it is said to have shrunk."""
+_SURE_TREND_SD = 2.0
+_TREND_SHARE = 0.2
+_MOST_NAMED = 3
+_CONDITIONS = {
+    "amplitude": "the level of the hits",
+    "order": "the order of the mode",
+    "plane": "the plane",
+    "temperature": "the temperature",
+    "added mass": "the known mass",
+}
+
+
+def headline(sheet: DiagnosisSheet) -> str:
+    """The hanger's name and the answer in a word or two."""
+    return f"{name(sheet)}: {answer(sheet.diagnosis).value}"
+
+
+def name(sheet: DiagnosisSheet) -> str:
+    return f"Gap diagnosis, {words.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
+
+
+def summary(sheet: DiagnosisSheet) -> str:
+    """One paragraph: which cause, what it cannot be told from, how far, tension, what next."""
+    return f"{verdict(sheet.diagnosis)} {consequences(sheet.diagnosis)}".rstrip()
+
+
+def consequences(diagnosis: Diagnosis) -> str:
+    """What follows the claim: how far the gap shrinks, how it goes, the tension, what next."""
+    sentences = (
+        _runner_up(diagnosis),
+        _shrinkage(diagnosis),
+        _misfit(diagnosis),
+        _pattern(diagnosis),
+        _tension(diagnosis),
+        next_step(diagnosis),
+    )
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """The claim with its probability."""
+    claim = claimed(diagnosis)
+    match answer(diagnosis):
+        case Answer.NO_GAP:
+            sure = diagnosis.no_gap_probability >= _SURE
+            return (
+                f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
+                "explains the measurements, probability "
+                f"{words.probability(diagnosis.no_gap_probability)}."
+            )
+        case Answer.UNEXPLAINED:
+            return (
+                f"{_none_explains(diagnosis)}: the probability of something else is "
+                f"{words.probability(diagnosis.unexplained_probability)}."
+            )
+        case Answer.UNDECIDED:
+            return _undecided(diagnosis)
+        case Answer.EXPLAINED | Answer.ALIKE:
+            assert claim is not None
+            return _explained(claim)
+
+
+def _none_explains(diagnosis: Diagnosis) -> str:
+    start = "None" if diagnosis.unexplained_probability >= _SURE else "Most likely none"
+    if not diagnosis.left_out:
+        return f"{start} of the effects in the catalogue explains it"
+    left_out = words.listed([words.quantity(effect) for effect in diagnosis.left_out])
+    return f"{start} of the effects that were tried ({left_out} left out) explains it"
+
+
+def _explained(claim: Claim) -> str:
+    sure = "is explained by" if claim.probability >= _SURE else "is most likely due to"
+    return f"The gap {sure} {_told(claim)}."
+
+
+def _told(claim: Claim) -> str:
+    """The leading cause in full, those that cannot be told from it, and the probability."""
+    others = [label(cause) for cause in claim.causes[1:]]
+    if not others:
+        return f"{phrase(claim.leading)}, {_odds(claim)}"
+    if len(others) > _MOST_NAMED:
+        others = [*others[:_MOST_NAMED], f"{len(others) - _MOST_NAMED} more"]
+    alike = words.listed(others)
+    return (
+        f"{phrase(claim.leading)}, or what these data cannot tell from it: {alike}; together "
+        f"{_odds(claim)}"
+    )
+
+
+def _odds(claim: Claim) -> str:
+    return f"probability {words.probability(claim.probability)}"
+
+
+def _undecided(diagnosis: Diagnosis) -> str:
+    """The likeliest possibilities, where none is likelier than all others together."""
+    possible = [
+        (diagnosis.no_gap_probability, "no gap"),
+        (diagnosis.unexplained_probability, "something that is not in the catalogue"),
+        *((each.probability, label(each.leading)) for each in claims(diagnosis)),
+    ]
+    known = sorted((each for each in possible if math.isfinite(each[0])), reverse=True)
+    if not known:
+        return "Undecided: these data give no probability to any explanation."
+    told = [f"{what} ({words.probability(share)})" for share, what in known[:_MOST_NAMED]]
+    return f"Undecided: these data leave open {words.listed(told)}."
+
+
+def _runner_up(diagnosis: Diagnosis) -> str:
+    """The likeliest cause where none is claimed but one is not to be forgotten."""
+    best = next(iter(claims(diagnosis)), None)
+    told = answer(diagnosis) not in (Answer.NO_GAP, Answer.UNEXPLAINED)
+    if told or best is None or not best.probability >= 1 - _SURE:
+        return ""
+    return f"The likeliest effect is {_told(best)}."
+
+
+def _pattern(diagnosis: Diagnosis) -> str:
+    """Which conditions the gap surely goes with."""
+    if answer(diagnosis) is Answer.NO_GAP:
+        return ""
+    sure = [trend for trend in diagnosis.trends if sure_trend(trend)]
+    if not sure:
+        return ""
+    told = [f"{_CONDITIONS.get(t.condition, t.condition)} ({_slope(t)})" for t in sure]
+    return f"The gap changes with {words.listed(told)}."
+
+
+def sure_trend(trend: Trend) -> bool:
+    """Whether the gap surely and noticeably goes with the condition."""
+    clear = abs(trend.slope_percent) > _SURE_TREND_SD * trend.slope_sd_percent
+    return clear and trend.share >= _TREND_SHARE
+
+
+def _slope(trend: Trend) -> str:
+    over = "from transverse to longitudinal" if trend.condition == "plane" else "over its range"
+    return f"{trend.slope_percent:+.2f} % {over}"
+
+
+def slope(trend: Trend) -> Interval:
+    return Interval.normal(trend.slope_percent, trend.slope_sd_percent)
+
+
+def _shrinkage(diagnosis: Diagnosis) -> str:
+    """How far the residuals shrink in and out of the fit; nothing where nothing is claimed."""
+    found = diagnosis.shrinkage
+    if answer(diagnosis) is Answer.NO_GAP:
+        if math.isnan(found.rms_before_percent):
+            return ""
+        return f"The frequencies differ from it by {_percent(found.rms_before_percent)} (rms)."
+    claim = claimed(diagnosis)
+    if math.isnan(found.rms_after_percent) or claim is None:
+        return ""
+    undecided = answer(diagnosis) is Answer.UNDECIDED
+    what = label(claim.leading) if undecided else "it"
+    both = _percent(found.rms_before_percent), _percent(found.rms_after_percent)
+    inside = f"With {what} the frequencies' error shrinks from {both[0]} to {both[1]} (rms)"
+    return f"{inside}{_held_out(diagnosis)}"
+
+
+def _held_out(diagnosis: Diagnosis) -> str:
+    before = diagnosis.shrinkage.held_out_before_percent
+    after = diagnosis.shrinkage.held_out_after_percent
+    if math.isnan(before) or math.isnan(after):
+        return "; nothing was held out of the fit to check that."
+    if after <= _SHRUNK * before:
+        return (
+            f" and, where they were held out of the fit, from {_percent(before)} to "
+            f"{_percent(after)}."
+        )
+    return (
+        f", but not where they were held out of the fit ({_percent(before)} before, "
+        f"{_percent(after)} after): do not rely on it yet."
+    )
+
+
+def _percent(value: float) -> str:
+    return f"{words.plain(value, 2)} %"
+
+
+def _misfit(diagnosis: Diagnosis) -> str:
+    if not diagnosis.fit_p_value < _POOR_FIT or answer(diagnosis) is Answer.UNEXPLAINED:
+        return ""
+    p_value = words.probability(diagnosis.fit_p_value)
+    return f"Even so the fit is poor (posterior predictive p-value {p_value}): something is left."
+
+
+def _tension(diagnosis: Diagnosis) -> str:
+    plain, better = diagnosis.tension_before_n, diagnosis.tension_after_n
+    if math.isnan(plain.mean):
+        return ""
+    alone = f"the baseline {diagnosis.baseline} alone gives {kilonewtons(plain)}"
+    what = after(diagnosis)
+    if not what or math.isnan(better.mean):
+        return f"For the tension {alone}{_with_care(diagnosis)}."
+    off = 100 * (plain.mean / better.mean - 1)
+    told = f"{what.capitalize()} the tension is {kilonewtons(better)}"
+    return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
+
+
+def _with_care(diagnosis: Diagnosis) -> str:
+    unsure = answer(diagnosis) in (Answer.UNEXPLAINED, Answer.UNDECIDED)
+    return ", not to be relied on while the gap is open" if unsure else ""
+
+
+def tension_kn(estimate: TensionEstimate) -> Interval:
+    return words.kilonewtons(Interval(estimate.mean, estimate.q05, estimate.q95))
+
+
+def kilonewtons(estimate: TensionEstimate) -> str:
+    """`702 kN (690 to 714)`."""
+    interval = tension_kn(estimate)
+    if math.isnan(interval.width):
+        return f"{interval.mean:.0f} kN"
+    low, high = words.span(interval).split(" to ")
+    return f"{words.mean(interval)} kN ({low} to {high})"
+
+
+def ranked_measurements(diagnosis: Diagnosis) -> list[NextMeasurement]:
+    """The measurements that were considered, those that tell most first."""
+    known = [e for e in diagnosis.next_measurements if math.isfinite(e.expected_log_bayes_factor)]
+    return sorted(known, key=lambda each: -each.expected_log_bayes_factor)
+
+
+def next_step(diagnosis: Diagnosis) -> str:
+    """The measurement that tells most between the contenders."""
+    best = next(iter(ranked_measurements(diagnosis)), None)
+    if best is None:
+        return ""
+    one, other = (contender(each) for each in best.separates)
+    if best.expected_log_bayes_factor < _WORTH_MEASURING:
+        return f"No measurement that was considered would tell {one} from {other} for sure."
+    return (
+        f"To tell {one} from {other}, measure next: {best.what} (expected log Bayes factor "
+        f"{promise(best)})."
+    )
+
+
+def promise(measurement: NextMeasurement) -> str:
+    """The expected log Bayes factor; beyond certainty nobody counts."""
+    factor = measurement.expected_log_bayes_factor
+    return f"{factor:.1f}" if factor < _CERTAIN else f"{_CERTAIN:.0f} or more"
+
+
+def contender(effect: str) -> str:
+    """What a measurement separates in plain words."""
+    return words.quantity(effect)

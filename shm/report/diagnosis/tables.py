@@ -1,0 +1,251 @@
+"""The tables of a gap diagnosis, as headings and rows of texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from shm.report import words
+from shm.report.diagnosis.content import Answer, DiagnosisSheet, after, answer, claimed, claims
+from shm.report.diagnosis.phrases import label, title
+from shm.report.diagnosis.sizes import quantity, size
+from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
+from shm.report.table import Table
+from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_WORST = 16
+
+
+def answers(sheet: DiagnosisSheet) -> tuple[Table, ...]:
+    """What the diagnosis found, in reading order."""
+    return _made(sheet, (causes, sizes, shrinkage, tension, next_measurements))
+
+
+def evidence(sheet: DiagnosisSheet) -> tuple[Table, ...]:
+    """Where the gap lies and what these data cannot show."""
+    return _made(sheet, (where, trends, places, invisible))
+
+
+def _made(
+    sheet: DiagnosisSheet, makers: tuple[Callable[[DiagnosisSheet], Table], ...]
+) -> tuple[Table, ...]:
+    return tuple(table for table in (make(sheet) for make in makers) if table.rows)
+
+
+def causes(sheet: DiagnosisSheet) -> Table:
+    diagnosis = sheet.diagnosis
+    rows = [_cause_row(cause) for claim in claims(diagnosis) for cause in claim.causes]
+    rest = (
+        ("no gap", diagnosis.no_gap_probability),
+        ("something not in the catalogue", diagnosis.unexplained_probability),
+    )
+    rows += [(what, words.probability(share), *("",) * 5) for what, share in rest]
+    return Table(
+        "Causes, likeliest first",
+        (
+            "cause",
+            "probability",
+            "alike",
+            "log Bayes factor",
+            "gain of fit",
+            "Occam's factor",
+            "how",
+        ),
+        tuple(rows),
+        note=_cause_note(diagnosis),
+        marks=_marks(diagnosis),
+    )
+
+
+def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The rows that the answer claims."""
+    claim = claimed(diagnosis)
+    rows = [
+        "claimed" if claim and cause in claim.causes else "left"
+        for each in claims(diagnosis)
+        for cause in each.causes
+    ]
+    found = answer(diagnosis)
+    rest = (found is Answer.NO_GAP, found is Answer.UNEXPLAINED)
+    return (*rows, *("claimed" if is_it else "left" for is_it in rest))
+
+
+def _cause_row(cause: Cause) -> tuple[str, ...]:
+    return (
+        label(cause),
+        words.probability(cause.probability),
+        "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
+        words.number(cause.log_bayes_factor, "+.1f"),
+        words.number(cause.log_fit, "+.1f"),
+        words.number(cause.log_occam, "+.1f"),
+        cause.method,
+    )
+
+
+def _cause_note(diagnosis: Diagnosis) -> str:
+    left_out = ", ".join(title(effect) for effect in diagnosis.left_out)
+    return (
+        f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
+        "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
+        "by the same letter cannot be told apart with these data. How far each was taken: screened "
+        "by a linear fit, or fitted in full with a normal or a sampled posterior."
+        + (f" Taken out of the catalogue: {left_out}." if left_out else "")
+    )
+
+
+def sizes(sheet: DiagnosisSheet) -> Table:
+    """The parameters of the causes that are worth a thought."""
+    return Table(
+        "Sizes of the likeliest causes",
+        ("cause", "parameter", "size (90 % interval)"),
+        tuple(
+            (label(cause), quantity(estimate.name), str(size(estimate)))
+            for claim in claims(sheet.diagnosis)
+            if claim.probability >= 0.05
+            for cause in claim.causes
+            if cause.probability >= 0.01
+            for estimate in cause.parameters
+        ),
+        note="Places count from the deck end. Sizes of logarithmic parameters are the medians.",
+    )
+
+
+def shrinkage(sheet: DiagnosisSheet) -> Table:
+    found = sheet.diagnosis.shrinkage
+    rows = (
+        ("fitted", found.rms_before_percent, found.rms_after_percent),
+        ("held out of the fit", found.held_out_before_percent, found.held_out_after_percent),
+    )
+    return Table(
+        "How far the gap shrinks",
+        ("frequencies", "before, % rms", "after, % rms"),
+        tuple(
+            (what, words.plain(before), words.plain(after))
+            for what, before, after in rows
+            if math.isfinite(before)
+        ),
+    )
+
+
+def tension(sheet: DiagnosisSheet) -> Table:
+    diagnosis, nominal = sheet.diagnosis, sheet.hanger.nominal_tension_n
+    rows = (
+        (f"before: the baseline {diagnosis.baseline}", diagnosis.tension_before_n),
+        (f"after: {after(diagnosis)}", diagnosis.tension_after_n),
+    )
+    return Table(
+        "Tension",
+        ("tension", "mean, kN", "sd, kN", "90 % interval, kN", "% of nominal"),
+        tuple(
+            _tension_row(what, each, nominal)
+            for what, each in rows
+            if math.isfinite(each.mean) and not what.endswith(": ")
+        ),
+    )
+
+
+def _tension_row(what: str, estimate: TensionEstimate, nominal_n: float) -> tuple[str, ...]:
+    return (
+        what,
+        f"{estimate.mean / 1e3:.1f}",
+        words.number(estimate.sd / 1e3, ".1f"),
+        f"{estimate.q05 / 1e3:.1f} to {estimate.q95 / 1e3:.1f}"
+        if math.isfinite(estimate.q05)
+        else "not known",
+        f"{100 * estimate.mean / nominal_n:.1f}",
+    )
+
+
+def next_measurements(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What would tell, best first",
+        ("measurement", "tells", "from", "expected log Bayes factor"),
+        tuple(
+            (
+                each.what,
+                *(contender(name) for name in each.separates),
+                promise(each),
+            )
+            for each in ranked_measurements(sheet.diagnosis)
+        ),
+        note="A log Bayes factor of 3 is odds of 20 to 1, of 5 odds of 150 to 1.",
+    )
+
+
+def where(sheet: DiagnosisSheet) -> Table:
+    """The residuals with the largest shares of the misfit."""
+    residuals = sorted(sheet.diagnosis.where, key=lambda r: (math.isnan(r.share), -r.share))
+    left = len(residuals) - _WORST
+    return Table(
+        "Where the gap lies, largest share first",
+        ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %"),
+        tuple(_residual_row(residual) for residual in residuals[:_WORST]),
+        note=(
+            "Off: measured over predicted frequency, less 1; z: the same in standard deviations."
+            + (f" {left} more residuals are in the JSON document." if left > 0 else "")
+        ),
+    )
+
+
+def _residual_row(residual: Residual) -> tuple[str, ...]:
+    return (
+        f"{residual.plane} {residual.order}",
+        residual.test,
+        words.number(residual.measured_hz, ".3f"),
+        words.number(residual.predicted_hz, ".3f"),
+        words.number(residual.residual_percent, "+.2f"),
+        words.number(residual.z, "+.1f"),
+        _share(residual.share),
+        words.number(residual.after_percent, "+.2f", ""),
+    )
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %" if math.isfinite(value) else "not known"
+
+
+def trends(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What the gap goes with",
+        ("condition", "change over its range, %", "90 % interval, %", "share of the misfit"),
+        tuple(_trend_row(trend) for trend in sheet.diagnosis.trends),
+    )
+
+
+def _trend_row(trend: Trend) -> tuple[str, ...]:
+    interval = slope(trend)
+    bounds = f"{interval.low:+.2f} to {interval.high:+.2f}"
+    return (
+        trend.condition,
+        words.number(trend.slope_percent, "+.2f"),
+        bounds if math.isfinite(interval.width) else "not known",
+        _share(trend.share),
+    )
+
+
+def places(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "Where along the hanger a local cause would sit",
+        ("were it", "at, m", "90 % interval, m", "share of the misfit explained"),
+        tuple(_place_row(place) for place in sheet.diagnosis.places),
+        note="Places count from the deck end.",
+    )
+
+
+def _place_row(place: GapPlace) -> tuple[str, ...]:
+    bounds = f"{place.low_m:.2f} to {place.high_m:.2f}"
+    return (
+        title(place.kind),
+        words.number(place.x_m, ".2f"),
+        bounds if math.isfinite(place.low_m + place.high_m) else "not known",
+        _share(place.share),
+    )
+
+
+def invisible(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What these data cannot show",
+        ("effect", "why"),
+        tuple((title(effect), why) for effect, why in sheet.diagnosis.invisible),
+    )

@@ -1,0 +1,139 @@
+"""What the finite elements are told of a hanger in one test: plain numbers, one bar."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from shm.simulate.pieces import pieces_of
+from shm.simulate.state import HangerState
+from shm.values import Hanger
+
+Pair = tuple[float, float]
+_SOFT = 1e-9  # of EI/L: a spring that stands for a hinge
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the bar whose bending stiffness, by plane, and mass are multiplied.
+
+    Parts may overlap.
+    """
+
+    start_m: float
+    end_m: float
+    stiffness_factor: Pair = (1.0, 1.0)
+    mass_factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A mass clamped on."""
+
+    x_m: float
+    mass_kg: float
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring against something that stands still; its stiffness in each plane."""
+
+    x_m: float
+    stiffness_n_m: Pair
+
+
+@dataclass(frozen=True)
+class BarEnd:
+    """How an end is held, values by plane.
+
+    `turning_rad_n_m` is the compliance of the rotations against moments, `cross_rad_n_m` between
+    the planes, 0 for a clamped end. `held_n_m` is the spring against deflection, infinite for an
+    end that does not move; `support_mass_kg` moves with it. `loss_factor` is that
+    of the joint.
+    """
+
+    turning_rad_n_m: Pair = (0.0, 0.0)
+    cross_rad_n_m: float = 0.0
+    held_n_m: Pair = (math.inf, math.inf)
+    support_mass_kg: Pair = (0.0, 0.0)
+    loss_factor: Pair = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One hanger in one test. Planes: transverse, longitudinal; ends: deck, arch.
+
+    It goes from `deck_end_m` to `arch_end_m` of the hanger's axis. `shear_compliance_1_n` is
+    1/(kappa G A), `rotary_inertia_kg_m` rho I; `sag_parameter` Irvine's lambda squared in each
+    plane; `damping_ratio` that of every mode without the joints'. The logger reports frequencies
+    times `clock_factor`; the sensor at a place of `turned_rad` is turned about the bar's axis, from
+    transverse to longitudinal.
+    """
+
+    deck_end_m: float
+    arch_end_m: float
+    tension_n: float
+    bending_stiffness_n_m2: Pair
+    mass_per_length_kg_m: float
+    ends: tuple[BarEnd, BarEnd]
+    stretches: tuple[Stretch, ...] = ()
+    masses: tuple[Mass, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    shear_compliance_1_n: float = 0.0
+    rotary_inertia_kg_m: float = 0.0
+    sag_parameter: Pair = (0.0, 0.0)
+    damping_ratio: float = 0.0
+    clock_factor: float = 1.0
+    turned_rad: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def length_m(self) -> float:
+        return self.arch_end_m - self.deck_end_m
+
+    @property
+    def coupled(self) -> bool:
+        """Whether an end couples the planes."""
+        return any(end.cross_rad_n_m != 0 for end in self.ends)
+
+    def turn_rad(self, x_m: float) -> float:
+        """By how much the sensor at a place is turned."""
+        return sum(angle for place, angle in self.turned_rad if abs(place - x_m) < 1e-6)
+
+    def with_end(self, index: int, end: BarEnd) -> Bar:
+        """The bar with another deck (0) or arch (1) end."""
+        ends = (end, self.ends[1]) if index == 0 else (self.ends[0], end)
+        return replace(self, ends=ends)
+
+
+def bar_of(hanger: Hanger, state: HangerState) -> Bar:
+    """The bar of a hanger in a state, with its turnbuckles and no effect."""
+    length_m = state.effective_length_m(hanger)
+    hinge = _SOFT * hanger.bending_stiffness_n_m2 / length_m
+    deck, arch = (
+        BarEnd(turning_rad_n_m=(1 / max(springs[0], hinge), 1 / max(springs[1], hinge)))
+        for springs in (
+            (state.k1_n_m_rad, state.k2_n_m_rad),
+            (state.k3_n_m_rad, state.k4_n_m_rad),
+        )
+    )
+    return Bar(
+        deck_end_m=0.0,
+        arch_end_m=length_m,
+        tension_n=state.tension_n,
+        bending_stiffness_n_m2=(hanger.bending_stiffness_n_m2, hanger.bending_stiffness_n_m2),
+        mass_per_length_kg_m=hanger.mass_per_length_kg_m,
+        ends=(deck, arch),
+        stretches=_turnbuckles(hanger, length_m),
+        damping_ratio=state.damping_ratio,
+    )
+
+
+def _turnbuckles(hanger: Hanger, length_m: float) -> tuple[Stretch, ...]:
+    found, start = [], 0.0
+    for piece in pieces_of(hanger, length_m) if hanger.turnbuckles else ():
+        stiffness = piece.bending_stiffness_n_m2 / hanger.bending_stiffness_n_m2
+        mass = piece.mass_per_length_kg_m / hanger.mass_per_length_kg_m
+        if (stiffness, mass) != (1.0, 1.0):
+            found.append(Stretch(start, start + piece.length_m, (stiffness, stiffness), mass))
+        start += piece.length_m
+    return tuple(found)

@@ -1,0 +1,124 @@
+"""Nodes of a bar: where its section changes, at special places, crowded towards thin layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from shm.simulate.bar.description import Bar
+from shm.values import FloatArray, IntArray
+
+_SAME = 1e-7  # of the length: edges so close are one
+# Elements much shorter than the rest would drown the tension in the rounding of their stiffness.
+_APART = 1 / 4000  # of the length: a place closer to a node has none of its own
+_ELEMENTS_A_LAYER = 8
+_GROWTH = 1.7
+_TABLE = 2001
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Nodes on the bar's axis (nodes,) and, of each element, factors of bending stiffness (planes,
+    elements) and mass (elements,).
+    """
+
+    nodes_m: FloatArray
+    stiffness_factor: FloatArray
+    mass_factor: FloatArray
+
+    @property
+    def size_m(self) -> FloatArray:
+        return np.diff(self.nodes_m)
+
+
+def mesh_of(bar: Bar, places_m: Sequence[float], elements: int) -> Mesh:
+    """About `elements` elements, with nodes at all edges and, as far as may be, at the places.
+
+    More of them where a string-like bar bends in thin layers.
+    """
+    nodes = _filled(_special(bar, places_m, elements), bar, elements)
+    middle = (nodes[1:] + nodes[:-1]) / 2
+    stiffness, mass = np.ones((2, len(middle))), np.ones_like(middle)
+    for each in bar.stretches:
+        inside = (each.start_m < middle) & (middle < each.end_m)
+        stiffness[:, inside] *= np.array(each.stiffness_factor)[:, None]
+        mass[inside] *= each.mass_factor
+    return Mesh(nodes, stiffness, mass)
+
+
+def interpolation(nodes_m: FloatArray, x_m: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The element (points,) of places on the bar, and what they move (4, points) with its ends'
+    deflection and rotation: exact at nodes, cubic between.
+    """
+    element = np.clip(np.searchsorted(nodes_m, x_m) - 1, 0, len(nodes_m) - 2)
+    size = np.diff(nodes_m)[element]
+    s = (x_m - nodes_m[element]) / size
+    weights = [
+        1 - 3 * s**2 + 2 * s**3,
+        size * (s - 2 * s**2 + s**3),
+        3 * s**2 - 2 * s**3,
+        size * (s**3 - s**2),
+    ]
+    return element, np.array(weights)
+
+
+def _special(bar: Bar, places_m: Sequence[float], elements: int) -> list[float]:
+    """Ends, edges and, where they keep their distance, all places within, sorted."""
+    length, layer = bar.length_m, _layer_m(bar)
+    found = [bar.deck_end_m, bar.arch_end_m]
+    edges = [edge for each in bar.stretches for edge in (each.start_m, each.end_m)]
+    points = [mass.x_m for mass in bar.masses] + [spring.x_m for spring in bar.springs]
+    bends = [x_m + step for x_m in points for step in _steps(layer, length / elements)]
+    for wanted, apart in (
+        (edges, _SAME * length),
+        (points, _APART * length),
+        (bends, layer / 4),
+        (places_m, _APART * length),
+    ):
+        for place in wanted:
+            inside = bar.deck_end_m < place < bar.arch_end_m
+            if inside and min(abs(place - other) for other in found) > apart:
+                found.append(place)
+    return sorted(found)
+
+
+def _steps(layer_m: float, spacing_m: float) -> list[float]:
+    """Distances from a point, to both sides, at which a thin layer about it wants nodes."""
+    steps, step = [], layer_m / 2
+    while step < spacing_m:
+        steps += [step, -step]
+        step *= _GROWTH
+    return steps
+
+
+def _filled(special: Sequence[float], bar: Bar, elements: int) -> FloatArray:
+    """Nodes between the special ones, evenly spaced but for the thin layers at the ends.
+
+    The spacing goes over from even to that of `x = L sin(angle)^2` as far as it must.
+    """
+    share = np.linspace(0, 1, _TABLE)
+    crowded = _crowding(bar, elements)
+    place = (1 - crowded) * share + crowded * np.sin(np.pi / 2 * share) ** 2
+    place = bar.deck_end_m + bar.length_m * place
+    nodes = []
+    for begin, end in pairwise(special):
+        first, last = np.interp([begin, end], place, share)
+        count = max(1, math.ceil(elements * (last - first)))
+        inner = np.interp(np.linspace(first, last, count + 1)[1:-1], share, place)
+        nodes += [[begin], inner]
+    return np.concatenate([*nodes, [special[-1]]])
+
+
+def _crowding(bar: Bar, elements: int) -> float:
+    return max(0.0, 1 - _layer_m(bar) * elements / (_ELEMENTS_A_LAYER * bar.length_m))
+
+
+def _layer_m(bar: Bar) -> float:
+    """How far from ends, masses and springs a string-like bar bends: sqrt(EI/T)."""
+    if bar.tension_n <= 0:
+        return math.inf
+    return math.sqrt(min(bar.bending_stiffness_n_m2) / bar.tension_n)

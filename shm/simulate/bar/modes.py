@@ -1,0 +1,180 @@
+"""Modes of a bar: each plane by itself, or both together where an end couples them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from shm.simulate.bar.description import Bar, BarEnd, Pair, Spring
+from shm.simulate.bar.mesh import interpolation, mesh_of
+from shm.simulate.bar.problem import Solved, solved
+from shm.values import BoolArray, FloatArray, IntArray
+
+# The frequency of a Hermite element errs by (wave number x size)^4/1440, 2e-6 in the highest mode;
+# with shear by (frequency x size / speed of shear waves)^2/24, so that needs more.
+_LEAST_ELEMENTS = 160
+_ELEMENTS_PER_MODE = 24
+_TIMES_FOR_SHEAR = 3
+_SPARE_MODES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class BarModes:
+    """Modes that belong to one plane, mass-normalised, ascending.
+
+    `angular_frequency_rad_s` (modes,); `nodes_m` (nodes,); `deflection` and `rotation` (planes,
+    nodes, modes) in kg^-1/2 and kg^-1/2/m; `added_damping_ratio` (modes,) is what joints add.
+    """
+
+    angular_frequency_rad_s: FloatArray
+    nodes_m: FloatArray
+    deflection: FloatArray
+    rotation: FloatArray
+    added_damping_ratio: FloatArray
+
+    def at(self, places_m: Sequence[float]) -> FloatArray:
+        """Deflections, (places, planes, modes); 0 beyond the ends."""
+        places = np.asarray(places_m, float)
+        beyond = (places < self.nodes_m[0]) | (places > self.nodes_m[-1])
+        element, weights = interpolation(self.nodes_m, np.where(beyond, self.nodes_m[0], places))
+        ends = (
+            self.deflection[:, element],
+            self.rotation[:, element],
+            self.deflection[:, element + 1],
+            self.rotation[:, element + 1],
+        )
+        seen = np.einsum("wx,wpxm->xpm", weights, np.array(ends))
+        return np.where(beyond[:, None, None], 0.0, seen)
+
+
+def bar_modes(
+    bar: Bar,
+    modes: int,
+    places_m: Sequence[float] = (),
+    *,
+    with_supports: bool = False,
+    refined: int = 1,
+) -> tuple[BarModes, BarModes]:
+    """The lowest `modes` modes of the transverse and of the longitudinal plane.
+
+    A mode belongs to the plane in which it moves most mass. A support's own mode, that with the
+    largest share of kinetic energy in the support, is left out unless `with_supports`. The mesh is
+    `refined` times as fine as the accuracy asks for. Raises UsageError where the bar buckles.
+    """
+    plain = replace(bar, clock_factor=1.0, turned_rad=(), damping_ratio=0.0)
+    places = tuple(sorted(places_m))
+    elements = refined * _elements(bar, modes)
+    if bar.coupled:
+        transverse, longitudinal = (
+            _together(plain, plane, modes, places, elements, with_supports) for plane in (0, 1)
+        )
+        return transverse, longitudinal
+    transverse, longitudinal = (
+        _alone(_of_one_plane(plain, plane), modes, places, elements, with_supports)
+        for plane in (0, 1)
+    )
+    return transverse, replace(
+        longitudinal,
+        deflection=longitudinal.deflection[::-1],
+        rotation=longitudinal.rotation[::-1],
+    )
+
+
+def _elements(bar: Bar, modes: int) -> int:
+    shears = bar.shear_compliance_1_n > 0
+    elements = max(_LEAST_ELEMENTS, _ELEMENTS_PER_MODE * modes)
+    return elements * (_TIMES_FOR_SHEAR if shears else 1)
+
+
+def _of_one_plane(bar: Bar, plane: int) -> Bar:
+    """The bar with both planes like one of them, so that equal planes are solved once."""
+
+    def alike(pair: Pair) -> Pair:
+        return pair[plane], pair[plane]
+
+    def end_alike(end: BarEnd) -> BarEnd:
+        return replace(
+            end,
+            turning_rad_n_m=alike(end.turning_rad_n_m),
+            held_n_m=alike(end.held_n_m),
+            support_mass_kg=alike(end.support_mass_kg),
+            loss_factor=alike(end.loss_factor),
+        )
+
+    return replace(
+        bar,
+        bending_stiffness_n_m2=alike(bar.bending_stiffness_n_m2),
+        ends=(end_alike(bar.ends[0]), end_alike(bar.ends[1])),
+        stretches=tuple(
+            replace(each, stiffness_factor=alike(each.stiffness_factor)) for each in bar.stretches
+        ),
+        springs=tuple(Spring(each.x_m, alike(each.stiffness_n_m)) for each in bar.springs),
+        sag_parameter=alike(bar.sag_parameter),
+    )
+
+
+@lru_cache(maxsize=512)
+def _alone(
+    bar: Bar, modes: int, places_m: tuple[float, ...], elements: int, with_supports: bool
+) -> BarModes:
+    """Modes of the transverse plane, the other plane's components 0."""
+    mesh = mesh_of(bar, places_m, elements)
+    supports = sum(end.support_mass_kg[0] > 0 for end in bar.ends)
+    spare = _SPARE_MODES + supports if supports and not with_supports else 0
+    found = solved(bar, mesh, (0,), modes + spare)
+    kept = _hangers_own(bar, found, () if with_supports else (0,))
+    still = np.zeros_like(found.deflection)
+    both = replace(
+        found,
+        deflection=np.concatenate([found.deflection, still]),
+        rotation=np.concatenate([found.rotation, still]),
+    )
+    return _chosen(both, mesh.nodes_m, kept[:modes])
+
+
+@lru_cache(maxsize=512)
+def _together(
+    bar: Bar, plane: int, modes: int, places_m: tuple[float, ...], elements: int, supports: bool
+) -> BarModes:
+    """Modes that move most mass in one plane, of the coupled planes."""
+    mesh = mesh_of(bar, places_m, elements)
+    sought = 2 * modes + _SPARE_MODES
+    while True:
+        found = solved(bar, mesh, (0, 1), sought)
+        kept = _hangers_own(bar, found, () if supports else (0, 1))
+        own = kept[_mainly(found, plane)[kept]]
+        if len(own) >= modes:
+            return _chosen(found, mesh.nodes_m, own[:modes])
+        sought += modes
+
+
+def _mainly(found: Solved, plane: int) -> BoolArray:
+    """Which modes move more mass in a plane than in the other."""
+    transverse = found.moved[0] >= found.moved[1]
+    return np.asarray(transverse if plane == 0 else ~transverse, bool)
+
+
+def _hangers_own(bar: Bar, found: Solved, planes: tuple[int, ...]) -> IntArray:
+    """Indices of the modes that are no support's own in these planes."""
+    own = np.ones(len(found.squares), bool)
+    for index, end in enumerate(bar.ends):
+        for number, plane in enumerate(planes):
+            mass = end.support_mass_kg[plane]
+            if mass > 0:
+                share = mass * found.deflection[number, -index] ** 2
+                own[int(np.argmax(np.where(own, share, -math.inf)))] = False
+    return np.flatnonzero(own)
+
+
+def _chosen(found: Solved, nodes_m: FloatArray, kept: IntArray) -> BarModes:
+    return BarModes(
+        np.sqrt(found.squares[kept]),
+        nodes_m,
+        found.deflection[:, :, kept],
+        found.rotation[:, :, kept],
+        found.added_damping_ratio[kept],
+    )

@@ -1,0 +1,213 @@
+"""The finite-element problem of a bar in one plane, or in both at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+from shm.errors import UsageError
+from shm.simulate.bar.description import Bar, BarEnd
+from shm.simulate.bar.elements import load_of, mass_of, stiffness_of
+from shm.simulate.bar.mesh import Mesh, interpolation
+from shm.values import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Eigenvectors of the planes that were solved together, mass-normalised.
+
+    `squares` (modes,) of the angular frequency; `deflection` and `rotation` (planes, nodes, modes);
+    `moved` (planes, modes) is twice the kinetic energy in each plane at unit frequency;
+    `added_damping_ratio` (modes,).
+    """
+
+    squares: FloatArray
+    deflection: FloatArray
+    rotation: FloatArray
+    moved: FloatArray
+    added_damping_ratio: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """A direction in which an end rotates: its share of each plane, stiffness, loss factor."""
+
+    end: int
+    direction: FloatArray
+    stiffness_n_m_rad: float
+    loss_factor: float
+
+
+def solved(bar: Bar, mesh: Mesh, planes: Sequence[int], modes: int) -> Solved:
+    """The lowest modes of the planes; raises UsageError where the bar buckles."""
+    joints = [joint for end in (0, 1) for joint in _joints(bar.ends[end], end, planes)]
+    turn, springs, weights = _unknowns(bar, mesh, planes, joints)
+    matrices = [_matrices(bar, mesh, plane) for plane in planes]
+    mass = _diagonal_blocks([each[1] for each in matrices])
+    stiffness = turn.T @ _diagonal_blocks([each[0] for each in matrices]) @ turn
+    sags = turn.T @ _sags(bar, mesh, planes)
+    reduced_mass = turn.T @ mass @ turn + diags_array(weights)
+    squares, vectors = _lowest(stiffness + diags_array(springs), reduced_mass, sags, modes)
+    full = (turn @ vectors).reshape(len(planes), len(mesh.nodes_m), 2, modes)
+    return Solved(
+        squares,
+        full[:, :, 0],
+        full[:, :, 1],
+        _moved(full.reshape(len(planes), -1, modes), [each[1] for each in matrices]),
+        _damping(joints, vectors, squares),
+    )
+
+
+def _matrices(bar: Bar, mesh: Mesh, plane: int) -> tuple[Any, Any]:
+    """Stiffness and mass of the free bar with what it carries, sparse."""
+    bending = bar.bending_stiffness_n_m2[plane] * mesh.stiffness_factor[plane]
+    shear, size = bar.shear_compliance_1_n, mesh.size_m
+    per_length = bar.mass_per_length_kg_m * mesh.mass_factor
+    stiffness = stiffness_of(size, bending, shear, bar.tension_n)
+    mass = mass_of(size, bending, shear, per_length, bar.rotary_inertia_kg_m)
+    springs = [(each.x_m, each.stiffness_n_m[plane]) for each in bar.springs]
+    _add_at_points(stiffness, mesh, springs)
+    _add_at_points(mass, mesh, [(each.x_m, each.mass_kg) for each in bar.masses])
+    return _assembled(stiffness), _assembled(mass)
+
+
+def _add_at_points(elements: FloatArray, mesh: Mesh, points: Sequence[tuple[float, float]]) -> None:
+    """Adds what acts at single places (x_m, amount) to the element matrices; none beyond an end."""
+    for x_m, amount in points:
+        if mesh.nodes_m[0] <= x_m <= mesh.nodes_m[-1]:
+            element, weights = interpolation(mesh.nodes_m, np.array([x_m]))
+            elements[element[0]] += amount * weights @ weights.T
+
+
+def _assembled(elements: FloatArray) -> Any:
+    count = len(elements)
+    unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
+    rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
+    columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
+    return csc_array((elements.ravel(), (rows, columns)), shape=(2 * count + 2, 2 * count + 2))
+
+
+def _diagonal_blocks(blocks: Sequence[Any]) -> Any:
+    if len(blocks) == 1:
+        return blocks[0]
+    coordinates = [block.tocoo() for block in blocks]
+    size = blocks[0].shape[0]
+    rows = np.concatenate([size * i + each.row for i, each in enumerate(coordinates)])
+    columns = np.concatenate([size * i + each.col for i, each in enumerate(coordinates)])
+    values = np.concatenate([each.data for each in coordinates])
+    return csc_array((values, (rows, columns)), shape=(2 * size, 2 * size))
+
+
+def _joints(end: BarEnd, index: int, planes: Sequence[int]) -> list[_Joint]:
+    """The principal directions of an end's compliance that are not rigid."""
+    compliance = np.diag([end.turning_rad_n_m[plane] for plane in planes])
+    if len(planes) == 2:
+        compliance[0, 1] = compliance[1, 0] = end.cross_rad_n_m
+    loss = np.array([end.loss_factor[plane] for plane in planes])
+    values, vectors = np.linalg.eigh(compliance)
+    return [
+        _Joint(index, vectors[:, i], float(1 / value), float(vectors[:, i] ** 2 @ loss))
+        for i, value in enumerate(values)
+        if value > 1e-12 * values[-1]
+    ]
+
+
+def _unknowns(
+    bar: Bar, mesh: Mesh, planes: Sequence[int], joints: Sequence[_Joint]
+) -> tuple[Any, FloatArray, FloatArray]:
+    """What the bar's 2 nodes x planes freedoms are of the unknowns (sparse), and what springs and
+    masses act on these (unknowns,). The joints' unknowns are the last.
+    """
+    a_plane = 2 * len(mesh.nodes_m)
+    springs, weights = np.zeros(a_plane * len(planes)), np.zeros(a_plane * len(planes))
+    free = np.ones(a_plane * len(planes), bool)
+    for number, plane in enumerate(planes):
+        for index, node in ((0, 0), (1, a_plane - 2)):
+            end, unknown = bar.ends[index], number * a_plane + node
+            held = end.held_n_m[plane]
+            free[[unknown, unknown + 1]] = math.isfinite(held), False
+            springs[unknown] = held if math.isfinite(held) else 0.0
+            weights[unknown] = end.support_mass_kg[plane]
+    kept = np.flatnonzero(free)
+    rows, columns, shares = [kept], [np.arange(len(kept))], [np.ones(len(kept))]
+    for order, joint in enumerate(joints):
+        node = 1 if joint.end == 0 else a_plane - 1
+        rows.append(node + a_plane * np.arange(len(planes)))
+        columns.append(np.full(len(planes), len(kept) + order))
+        shares.append(joint.direction)
+    entries = (np.concatenate(rows), np.concatenate(columns))
+    shape = (a_plane * len(planes), len(kept) + len(joints))
+    turn = csc_array((np.concatenate(shares), entries), shape=shape)
+    stiff = np.array([joint.stiffness_n_m_rad for joint in joints])
+    return (
+        turn,
+        np.concatenate([springs[kept], stiff]),
+        np.concatenate([weights[kept], 0 * stiff]),
+    )
+
+
+def _sags(bar: Bar, mesh: Mesh, planes: Sequence[int]) -> FloatArray:
+    """Vectors b of the stiffness b b^T that a sagging bar's stretching adds, (freedoms, planes).
+
+    The motion's area takes up chord length: lambda^2 T/L^3 times its square (H. M. Irvine, Cable
+    Structures, 1981, 3.3).
+    """
+    a_plane = 2 * len(mesh.nodes_m)
+    vectors = np.zeros((a_plane * len(planes), len(planes)))
+    for number, plane in enumerate(planes):
+        bending = bar.bending_stiffness_n_m2[plane] * mesh.stiffness_factor[plane]
+        loads = load_of(mesh.size_m, bending, bar.shear_compliance_1_n)
+        area = np.zeros(a_plane)
+        np.add.at(area, 2 * np.arange(len(loads))[:, None] + np.arange(4), loads)
+        strength = bar.sag_parameter[plane] * bar.tension_n / bar.length_m**3
+        vectors[number * a_plane : (number + 1) * a_plane, number] = math.sqrt(strength) * area
+    return vectors
+
+
+def _lowest(
+    stiffness: Any, mass: Any, sags: FloatArray, modes: int
+) -> tuple[FloatArray, FloatArray]:
+    """The lowest squares (modes,) and mass-normalised vectors of stiffness + sags sags^T."""
+    factor = splu(stiffness.tocsc())
+    lifted = factor.solve(sags)
+    core = np.linalg.inv(np.eye(sags.shape[1]) + sags.T @ lifted)
+
+    def with_sags(load: FloatArray) -> FloatArray:
+        plain = factor.solve(load)
+        return np.asarray(plain - lifted @ (core @ (sags.T @ plain)))
+
+    solve = with_sags if np.any(sags) else factor.solve
+    inverse = LinearOperator(stiffness.shape, matvec=solve, dtype=float)
+    start = np.ones(stiffness.shape[0])  # a fixed start, so that the same input gives the same bits
+    squares, vectors = eigsh(stiffness, k=modes, M=mass, sigma=0.0, OPinv=inverse, v0=start)
+    order = np.argsort(squares)
+    squares, vectors = squares[order], vectors[:, order]
+    if not squares[0] > 0:
+        raise UsageError(
+            "the compression buckles the hanger: it has no lowest frequency.",
+            remedy="Give a larger tension.",
+        )
+    return squares, vectors
+
+
+def _moved(full: FloatArray, masses: Sequence[Any]) -> FloatArray:
+    return np.array(
+        [np.sum(own * (mass @ own), axis=0) for own, mass in zip(full, masses, strict=True)]
+    )
+
+
+def _damping(joints: Sequence[_Joint], vectors: FloatArray, squares: FloatArray) -> FloatArray:
+    """Half the loss factor: each joint's times its share of the mode's strain energy.
+
+    C. D. Johnson and D. A. Kienholz, AIAA Journal 20 (1982).
+    """
+    loss = np.zeros_like(squares)
+    for joint, turned in zip(joints, vectors[len(vectors) - len(joints) :], strict=True):
+        loss += joint.loss_factor * joint.stiffness_n_m_rad * turned**2
+    return np.asarray(loss / squares / 2)

@@ -1,0 +1,185 @@
+"""What a gap diagnosis finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from shm.values.kinds import NAN, Plane
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How far one measured frequency lies from the baseline's best prediction of it.
+
+    `residual_percent` is measured over predicted, less 1; `z` is in standard deviations of the
+    identification and of what the baseline leaves open; `share` is its part of the misfit.
+    `after_percent` is the same residual with the leading cause in the model, `held_out_percent`
+    with that cause fitted without this mode (NaN where it was not held out).
+    """
+
+    plane: Plane
+    order: int
+    test: str
+    measured_hz: float
+    predicted_hz: float
+    residual_percent: float
+    z: float
+    share: float
+    after_percent: float = NAN
+    held_out_before_percent: float = NAN
+    held_out_after_percent: float = NAN
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the gap grows with a `condition`.
+
+    It is `temperature`, `amplitude`, `order`, `added mass` or `plane` (from transverse to
+    longitudinal).
+
+    `slope_percent` is the change of the mean residual over the condition's range, with its
+    standard deviation; `share` is the part of the misfit that goes with the condition.
+    """
+
+    condition: str
+    slope_percent: float
+    slope_sd_percent: float
+    share: float
+
+
+@dataclass(frozen=True)
+class GapPlace:
+    """Where along the hanger a local cause of one `kind` would have to sit, and what it explains.
+
+    Kinds are `point mass`, `lateral spring`, `section loss` and `flexible end` (0 or the length).
+
+    `x_m` is the likeliest place, `low_m` to `high_m` holds it with 90 % probability were it of this
+    kind; `share` is the part of the misfit that it explains. `profile` holds (x_m, density).
+    """
+
+    kind: str
+    x_m: float
+    low_m: float
+    high_m: float
+    share: float
+    profile: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class EffectEstimate:
+    """One parameter of a cause: posterior mean, standard deviation and 90 % interval, in `unit`."""
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect of the catalogue, or a pair, as an explanation of the gap.
+
+    `effect` is the name, or two joined by ` + `, and `at` where the likeliest variant acts.
+    `log_bayes_factor` compares it with the baseline, averaged over its variants; `log_fit` is what
+    the best fit gains in log likelihood and `log_occam` what its evidence pays for free parameters.
+    `group` is the index of the group of causes that the data cannot tell apart, None for none.
+    `method` is how far it was taken: `screened`, `normal` or `sampled`.
+    """
+
+    effect: str
+    at: str
+    probability: float
+    log_bayes_factor: float
+    log_fit: float
+    log_occam: float
+    parameters: tuple[EffectEstimate, ...]
+    method: Literal["screened", "normal", "sampled"]
+    group: int | None = None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects of the catalogue that it holds, one or two."""
+        return tuple(self.effect.split(" + "))
+
+
+@dataclass(frozen=True)
+class Shrinkage:
+    """Root mean square of the frequency residuals before and after, in and out of the fit."""
+
+    rms_before_percent: float
+    rms_after_percent: float
+    held_out_before_percent: float
+    held_out_after_percent: float
+
+
+@dataclass(frozen=True)
+class TensionEstimate:
+    """Posterior of the tension under one explanation: mean, sd and 90 % interval."""
+
+    mean: float
+    sd: float
+    q05: float
+    q95: float
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """A measurement that would tell causes apart, and the log Bayes factor to expect of it."""
+
+    what: str
+    separates: tuple[str, str]
+    expected_log_bayes_factor: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Where a baseline and the measurements of a hanger differ, why, and what that changes.
+
+    `causes` holds every effect that these data could show, best first, and the pairs that were
+    tried; their probabilities, `no_gap_probability` and `unexplained_probability` add to 1.
+    `fit_p_value` is the posterior predictive p-value of the leading explanation. `invisible` names
+    the effects that these data cannot show, and why; `left_out` those that were taken out of the
+    catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
+    """
+
+    hanger: int | None
+    baseline: str
+    tests: tuple[str, ...]
+    where: tuple[Residual, ...]
+    trends: tuple[Trend, ...]
+    places: tuple[GapPlace, ...]
+    no_gap_probability: float
+    unexplained_probability: float
+    causes: tuple[Cause, ...]
+    groups: tuple[tuple[str, ...], ...]
+    invisible: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
+    fit_p_value: float
+    model_error_percent: float
+    shrinkage: Shrinkage
+    tension_before_n: TensionEstimate
+    tension_after_n: TensionEstimate
+    next_measurements: tuple[NextMeasurement, ...]
+    remarks: tuple[str, ...]
+    seed: int
+    seconds: float
+
+    def claim(self, cause: Cause) -> float:
+        """The probability of a cause together with those that the data cannot tell it from."""
+        if cause.group is None:
+            return cause.probability
+        return sum(each.probability for each in self.causes if each.group == cause.group)
+
+    @property
+    def leading(self) -> Cause | None:
+        """The likeliest cause of the likeliest group.
+
+        None where no gap or something unknown is likelier than each group.
+        """
+        order = [(self.claim(cause), cause.probability) for cause in self.causes]
+        best = max(range(len(order)), key=order.__getitem__, default=None)
+        rest = max(self.no_gap_probability, self.unexplained_probability)
+        return self.causes[best] if best is not None and order[best][0] > rest else None

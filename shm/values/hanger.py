@@ -1,0 +1,96 @@
+"""What a hanger is, as its owner describes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from shm.values.kinds import NAN
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """How large a shift of this hanger matters, and how sure one must be to say so."""
+
+    tension_shift_fraction: float = 0.05
+    stiffness_shift_decades: float = 0.5
+    alert_probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class EndPlate:
+    """The plate welded to each end of a round rod, which is slotted into it over `slot_m`.
+
+    Its width goes linearly from `end_width_m` at the end face to `neck_width_m`. The deck-end
+    plate lies along the bridge, the arch-end plate across it. Springs on the end faces' edges are
+    given per node; the nodes are `edge_node_spacing_m` apart.
+    """
+
+    length_m: float
+    thickness_m: float
+    end_width_m: float
+    neck_width_m: float
+    slot_m: float
+    edge_node_spacing_m: float
+
+
+@dataclass(frozen=True)
+class Turnbuckle:
+    """A coupler in the bar, centred at `x_m`; its mass and stiffness replace the bar's there."""
+
+    x_m: float
+    length_m: float
+    mass_kg: float
+    bending_stiffness_n_m2: float
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations, as fractions, by which a bar as made differs from its description."""
+
+    section: float = 0.005
+    density: float = 0.005
+    length: float = 0.005
+    modulus: float = 0.005
+
+
+@dataclass(frozen=True)
+class EffectPrior:
+    """The owner's range of one parameter of an effect of the gap diagnosis, in its unit."""
+
+    effect: str
+    parameter: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Hanger:
+    """One hanger as its owner describes it: geometry, material, nominal tension.
+
+    `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of
+    the solid section's bending stiffness that a strand has. `models` names the model classes that
+    the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
+    catalogue of effects.
+    """
+
+    id: int
+    length_m: float
+    elastic_modulus_pa: float
+    area_m2: float
+    second_moment_m4: float
+    mass_per_length_kg_m: float
+    nominal_tension_n: float
+    name: str = ""
+    thresholds: Thresholds = field(default_factory=Thresholds)
+    diameter_m: float = NAN
+    poissons_ratio: float = 0.3
+    bending_stiffness_factor: float = 1.0
+    plate: EndPlate | None = None
+    turnbuckles: tuple[Turnbuckle, ...] = ()
+    models: tuple[str, ...] = ()
+    scatter: Scatter = field(default_factory=Scatter)
+    effect_priors: tuple[EffectPrior, ...] = ()
+
+    @property
+    def bending_stiffness_n_m2(self) -> float:
+        return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor

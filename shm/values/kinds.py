@@ -1,0 +1,20 @@
+"""Kinds of values that the nouns share."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+ComplexArray: TypeAlias = NDArray[np.complex128]
+Plane: TypeAlias = Literal["transverse", "longitudinal"]
+Quantity: TypeAlias = Literal["force", "acceleration"]
+Verdict: TypeAlias = Literal["good", "warning", "refused", "unknown"]
+
+PLANES: tuple[Plane, Plane] = ("transverse", "longitudinal")
+NAN = math.nan

@@ -1,0 +1,90 @@
+"""What an identification finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+from shm.values.kinds import NAN, Plane, Verdict
+
+
+@dataclass(frozen=True)
+class ShapePoint:
+    """A mode shape at one place: `value` in the mode's plane, `cross` in the other plane."""
+
+    x_m: float
+    value: float
+    cross: float = NAN
+    sd: float = NAN
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One identified mode. `order` counts from 1 in each plane; standard deviations may be NaN.
+
+    `acceleration_m_s2` is the amplitude with which it rings right after a hit, at the sensor that
+    moves most (median over the hits).
+    """
+
+    plane: Plane
+    order: int
+    frequency_hz: float
+    frequency_sd_hz: float = NAN
+    damping_ratio: float = NAN
+    damping_sd: float = NAN
+    shape: tuple[ShapePoint, ...] = ()
+    acceleration_m_s2: float = NAN
+
+
+@dataclass(frozen=True)
+class ForeignMode:
+    """A resonance or tone in a test that is not a bending mode of the hanger, and why not.
+
+    `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine) or
+    `deck` (the bridge or another neighbour moves the hanger).
+    """
+
+    kind: Literal["harmonic", "tone", "deck"]
+    frequency_hz: float
+    damping_ratio: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class QualityCheck:
+    """One figure of a test's quality beside its limit, and what to do where it is not met.
+
+    `value` and `limit` are in `unit` (empty: none); `found` says what was seen and where; `remedy`
+    is what the crew should do, empty where the verdict is good. A figure that these records do not
+    give is NaN and `unknown`; a test with a `refused` check is not identified.
+    """
+
+    name: str
+    verdict: Verdict
+    value: float
+    limit: float
+    unit: str
+    found: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class AddedMass:
+    """A known mass clamped on the hanger for one test."""
+
+    mass_kg: float
+    x_m: float
+
+
+@dataclass(frozen=True)
+class ModalTest:
+    """What one hammer test says about a hanger: its identified modes and the conditions."""
+
+    id: str
+    modes: tuple[Mode, ...]
+    hanger: int | None = None
+    time: datetime | None = None
+    temperature_c: float = NAN
+    amplitude: float = NAN
+    added_mass: AddedMass | None = None

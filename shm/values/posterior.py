@@ -1,0 +1,110 @@
+"""What inference and watching find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from shm.values.kinds import FloatArray, Plane
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Independent uniform priors: `lower` and `upper` have shape (parameters,)."""
+
+    names: tuple[str, ...]
+    lower: FloatArray
+    upper: FloatArray
+
+
+@dataclass(frozen=True)
+class PredictedFrequency:
+    """A frequency with the uncertainty of the parameters (thesis 4.14) beside its measurement."""
+
+    plane: Plane
+    order: int
+    mean_hz: float
+    sd_hz: float
+    measured_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Samples of one model class's parameters given modal tests, and its evidence.
+
+    `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
+    `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
+    batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
+    `tmcmc` or `textbook` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
+    """
+
+    model: str
+    hanger: int | None
+    names: tuple[str, ...]
+    samples: FloatArray
+    log_likelihood: FloatArray
+    most_probable: FloatArray
+    nominal_tension_n: float
+    log_evidence: float
+    log_evidence_sd: float
+    effective_sample_size: float
+    r_hat: float
+    evaluations: int
+    predicted: tuple[PredictedFrequency, ...]
+    tests: tuple[str, ...]
+    seed: int
+    seconds: float
+    method: str = "tmcmc"
+
+    def parameter(self, name: str) -> FloatArray:
+        """Samples of one parameter, shape (samples,)."""
+        return self.samples[:, self.names.index(name)]
+
+    @property
+    def tension_n(self) -> FloatArray:
+        """Samples of the tension, shape (samples,)."""
+        return self.parameter("theta_F") * self.nominal_tension_n
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Model classes compared on the same tests, most probable first."""
+
+    posteriors: tuple[Posterior, ...]
+    probabilities: tuple[float, ...]
+
+    @property
+    def selected(self) -> Posterior:
+        return self.posteriors[0]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far one quantity has moved from its baseline, with the probability that it matters.
+
+    `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
+    `log10_k1` (shift in decades); `probability` is that of a shift beyond `threshold`, up or down.
+    """
+
+    hanger: int
+    test: str
+    time: datetime
+    quantity: str
+    baseline: float
+    value: float
+    shift_mean: float
+    shift_sd: float
+    threshold: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Alert:
+    """A shift that its owner should know of. `key` makes its delivery idempotent."""
+
+    key: str
+    hanger: int
+    test: str
+    time: datetime
+    message: str
+    drifts: tuple[Drift, ...]

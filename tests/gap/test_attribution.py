@@ -1,0 +1,116 @@
+"""Which effect: planted in campaigns by the simulator, which shares no code with the models."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from shm.gap.attribution import Attribution, attributed
+from shm.gap.observations import observed
+from shm.gap.options import GapOptions
+from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from tests.helpers.hangers import HANGER_3
+
+CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
+SWING = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.003})
+KNOWN = ("point_mass", "geometric_hardening", "temperature_tension", "sensor_mass", "timebase")
+STATE = HangerState(711e3)
+PLAN = CampaignPlan(modes=5, temperatures_c=(0.0, 20.0), amplitudes=(1.0, 2.0))
+
+
+@cache
+def _found(
+    *effects: str, known: tuple[str, ...] = KNOWN, seed: int = 1
+) -> tuple[Attribution, tuple[tuple[str, float], ...]]:
+    planted = [each for each in (CLAMP, SWING) if each.name in effects]
+    tests = campaign(HANGER_3, STATE, planted, PLAN, np.random.default_rng(seed))
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    without = tuple(name for name in EFFECTS if name not in known)
+    told: list[tuple[str, float]] = []
+    found = attributed(
+        problem,
+        GapOptions(without=without),
+        np.random.default_rng(seed),
+        lambda label, fraction: told.append((label, fraction)),
+    )
+    return found, tuple(told)
+
+
+def test_nothing_planted_is_no_gap() -> None:
+    found, _ = _found()
+    assert found.leading is None
+    assert found.no_gap_probability > 0.8
+
+
+def test_the_planted_effect_is_named_with_its_size() -> None:
+    found, _ = _found("point_mass")
+    assert found.leading is not None
+    assert found.leading.effect == "point_mass"
+    assert found.leading.probability > 0.9
+    assert found.p_value > 0.01
+
+
+@pytest.mark.parametrize("effects", [(), ("point_mass",), ("point_mass", "geometric_hardening")])
+def test_probabilities_add_to_one(effects: tuple[str, ...]) -> None:
+    found, _ = _found(*effects)
+    causes = sum(each.probability for each in found.explanations)
+    total = causes + found.no_gap_probability + found.unexplained_probability
+    assert total == pytest.approx(1.0)
+
+
+def test_two_planted_effects_are_named_as_a_pair() -> None:
+    found, _ = _found("point_mass", "geometric_hardening")
+    assert found.leading is not None
+    assert set(found.leading.effect.split(" + ")) == {"point_mass", "geometric_hardening"}
+
+
+def test_an_effect_that_is_not_in_the_catalogue_is_unexplained() -> None:
+    known = tuple(name for name in KNOWN if name != "point_mass")
+    found, _ = _found("point_mass", known=known)
+    assert found.unexplained_probability > 0.8
+    assert found.unexplained.hypothesis.flexible
+
+
+def test_evidence_is_what_the_fit_gains_less_what_freedom_costs() -> None:
+    found, _ = _found("point_mass")
+    for each in found.explanations:
+        assert each.log_bayes_factor == pytest.approx(each.log_fit + each.log_occam)
+    assert found.explanations[0].log_occam < 0
+
+
+def test_explanations_come_likeliest_first() -> None:
+    chances = [each.probability for each in _found("point_mass")[0].explanations]
+    assert chances == sorted(chances, reverse=True)
+
+
+def test_the_same_seed_gives_the_same_answer() -> None:
+    again = _found.__wrapped__("point_mass")[0]
+    first, _ = _found("point_mass")
+    assert [e.probability for e in again.explanations] == [
+        e.probability for e in first.explanations
+    ]
+
+
+def test_progress_is_told_and_never_goes_back() -> None:
+    _, told = _found("point_mass", "geometric_hardening")
+    fractions = [fraction for _, fraction in told]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+
+
+def test_an_effect_that_would_drown_in_the_errors_is_told_to_be_invisible() -> None:
+    plan = CampaignPlan(
+        modes=2, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0,
+        frequency_sd=0.03,
+    )  # fmt: skip
+    tests = campaign(HANGER_3, STATE, (), plan, np.random.default_rng(1))
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    without = tuple(name for name in EFFECTS if name != "distributed_mass")
+    found = attributed(problem, GapOptions(without=without), np.random.default_rng(1))
+    assert "drown" in dict(found.invisible)["distributed_mass"]
+    assert found.leading is None
+    assert found.explanations == ()

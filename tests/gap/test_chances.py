@@ -1,0 +1,63 @@
+"""Probabilities of families."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.chances import NO_GAP, SINGLE, Tried, families, probabilities
+from shm.gap.contract import Hypothesis
+from shm.models.effects import Variant
+from tests.gap import linear_toy as toy
+
+
+def _tried(
+    log_evidence: float, *names: str, at: str = "everywhere", flexible: bool = False
+) -> Tried:
+    effects = tuple((name, Variant(at)) for name in names)
+    return Tried(Hypothesis(effects, flexible), log_evidence, 0.0)
+
+
+def test_probabilities_add_to_one() -> None:
+    tried = [_tried(0.0), _tried(1.0, "a"), _tried(3.0, "b"), _tried(2.0, flexible=True)]
+    assert probabilities(families(tried, {"a": 1, "b": 1})).sum() == pytest.approx(1.0)
+
+
+def test_an_effect_does_not_gain_by_having_more_variants() -> None:
+    once = [_tried(0.0), _tried(2.0, "a"), _tried(2.0, "b")]
+    often = [_tried(0.0), _tried(2.0, "a"), *(_tried(2.0, "b", at=f"{k}") for k in range(9))]
+    few = probabilities(families(once, {"a": 1, "b": 1}))
+    many = probabilities(families(often, {"a": 1, "b": 9}))
+    assert sorted(many) == pytest.approx(sorted(few))
+
+
+def test_variants_that_were_not_tried_count_as_impossible() -> None:
+    (family,) = families([_tried(2.0, "a")], {"a": 2})
+    assert family.log_evidence == pytest.approx(2.0 - 0.6931, abs=1e-3)
+
+
+def test_with_evidence_for_nothing_the_priors_stand() -> None:
+    tried = [_tried(0.0), _tried(0.0, "a"), _tried(0.0, "b")]
+    chances = dict(
+        zip(
+            [family.name for family in families(tried, {"a": 1, "b": 1})],
+            probabilities(families(tried, {"a": 1, "b": 1})),
+            strict=True,
+        )
+    )
+    assert chances[""] / chances["a"] == pytest.approx(NO_GAP / (SINGLE / 2))
+
+
+def test_the_best_variant_comes_first() -> None:
+    tried = [_tried(1.0, "a", at="deck end"), _tried(4.0, "a", at="arch end")]
+    (family,) = families(tried, {"a": 2})
+    assert family.best.hypothesis.at == "arch end"
+
+
+def test_a_baseline_that_fits_by_an_unlikely_bar_fits_less_well() -> None:
+    own = toy.fit(np.zeros(toy.design().size), toy.tension())
+    unlikely = replace(own, z=np.array([4.0]))
+    assert Tried.fitted(unlikely, 1).log_fit == pytest.approx(Tried.fitted(own, 1).log_fit - 8.0)
+    assert Tried.fitted(unlikely, 0).log_fit == pytest.approx(own.log_fit)

@@ -1,0 +1,222 @@
+"""What to measure next: closed forms of a toy, and what is proposed when."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.contract import Hypothesis, Observations
+from shm.gap.fit import fitted
+from shm.gap.foresight import Errors, Foresight, divergence, foreseen
+from shm.gap.next_measurement import NO_GAP, ranked
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.gap.proposals import like_the_present, measured_already, proposals, with_sensors
+from shm.models.effects import EFFECTS, Conditions, Variant
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect
+from shm.simulate import campaign as simulated
+from shm.values import AddedMass
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+
+MODES = [(0, order) for order in range(1, 7)]
+ONE_TEST = (Conditions("t1"),)
+STIFFER = Hypothesis((("bending_stiffness", Variant()),))
+WARMER = Hypothesis((("temperature_tension", Variant()),))
+LEVEL = Hypothesis((("joint_softening", Variant()),))
+
+
+def with_order(design):
+    """The cause grows with the order, whatever the conditions."""
+    return _with(design, 0.002 * design.frequency_order**2)
+
+
+def with_temperature(design):
+    """It does the same in the test that was made, and more the warmer it is."""
+    shift = np.array([c.temperature_shift_k for c in design.conditions])[design.frequency_test]
+    return _with(design, 0.002 * design.frequency_order**2 + 0.002 * shift)
+
+
+def with_level(design):
+    level = np.array([c.amplitude for c in design.conditions])[design.frequency_test]
+    return _with(design, 0.002 * design.frequency_order**2 * level)
+
+
+def _with(design, own):
+    column = np.zeros((design.size, 1))
+    column[: design.frequencies, 0] = own
+    return np.hstack([tension(design), column])
+
+
+SLOPES = {
+    Hypothesis(): tension,
+    STIFFER: with_order,
+    WARMER: with_temperature,
+    LEVEL: with_level,
+}
+
+
+def toy(conditions=ONE_TEST, modes=MODES, places_m=()):
+    design = design_of(conditions, modes, places_m)
+    value = with_order(design) @ [0.4, 0.5]
+    return ToyProblem(Observations(design, value, np.full(design.size, SD)), SLOPES)
+
+
+def normal(mean, covariance):
+    return Foresight(design_of(ONE_TEST, MODES[: len(mean)]), np.array(mean), np.array(covariance))
+
+
+def test_the_divergence_of_two_normal_distributions_is_the_closed_form():
+    """KL = ln(s2/s1) + (s1^2 + (m1 - m2)^2)/(2 s2^2) - 1/2 (univariate)."""
+    one, other = normal([1.0], [[4.0]]), normal([3.0], [[9.0]])
+    assert divergence(one, other) == pytest.approx(np.log(1.5) + (4 + 4) / 18 - 0.5)
+    assert divergence(one, one) == pytest.approx(0)
+
+
+def test_the_divergence_of_correlated_normals_is_the_mean_log_ratio_of_their_densities():
+    rng = np.random.default_rng(1)
+    a, b = (rng.standard_normal((3, 3)) for _ in range(2))
+    one = normal([0.1, 0.2, 0.3], a @ a.T + np.eye(3))
+    other = normal([0.0, 0.5, 0.1], b @ b.T + np.eye(3))
+    draws = rng.multivariate_normal(one.mean, one.covariance, 200_000)
+    ratio = _log_density(draws, one) - _log_density(draws, other)
+    assert divergence(one, other) == pytest.approx(ratio.mean(), abs=0.02)
+
+
+def _log_density(x, normal_):
+    apart = x - normal_.mean
+    square = np.sum(apart @ np.linalg.inv(normal_.covariance) * apart, axis=1)
+    return -(square + np.linalg.slogdet(normal_.covariance)[1]) / 2
+
+
+def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution():
+    """Joint normal of old and new data, a mode's model error shared, conditioned on the old."""
+    problem, error = toy(), 2e-3
+    fit = problem.fit(STIFFER, model_error=error)
+    new = like_the_present(problem.observations.design)
+    seen = foreseen(problem, fit, new, Errors.of(problem.observations, fit))
+    slopes = np.vstack([with_order(problem.observations.design), with_order(new)])
+    joint = slopes @ slopes.T + SD**2 * np.eye(12) + error**2 * np.tile(np.eye(6), (2, 2))
+    gain = joint[6:, :6] @ np.linalg.inv(joint[:6, :6])
+    assert seen.mean == pytest.approx(gain @ problem.observations.value, abs=1e-9)
+    assert seen.covariance == pytest.approx(joint[6:, 6:] - gain @ joint[:6, 6:], abs=1e-10)
+
+
+def test_a_cause_of_temperature_asks_for_another_day():
+    first = ranked(problem := toy(), [problem.fit(STIFFER), problem.fit(WARMER)])[0]
+    assert "on a day 20 K" in first.what
+    assert first.separates == ("bending_stiffness", "temperature_tension")
+    assert first.expected_log_bayes_factor > 5
+
+
+def test_a_cause_of_the_level_asks_for_another_hit():
+    found = ranked(problem := toy(), [problem.fit(STIFFER), problem.fit(LEVEL)])
+    assert "hit, 3 times the usual level" in found[0].what
+    assert all("hit" in each.what for each in found)
+
+
+def test_what_no_measurement_can_tell_apart_has_none_proposed():
+    twin = Hypothesis((("distributed_mass", Variant()),))
+    problem = toy()
+    problem.slopes = {**SLOPES, twin: with_order}
+    assert ranked(problem, [problem.fit(STIFFER), problem.fit(twin)]) == ()
+
+
+def test_no_gap_is_a_contender_by_that_name_and_flexible_fits_are_none():
+    problem = toy()
+    problem.observations = replace(problem.observations, sd=np.full(6, 0.01))
+    stiffer, nothing = problem.fit(STIFFER), problem.fit()
+    flexible = replace(nothing, hypothesis=Hypothesis(flexible=True))
+    found = ranked(problem, [flexible, stiffer, nothing])
+    assert {each.separates for each in found} == {("bending_stiffness", NO_GAP)}
+    assert ranked(problem, [stiffer, flexible]) == ()
+
+
+def test_an_explanation_that_is_out_of_the_race_is_not_asked_about():
+    problem = toy()
+    beaten = replace(problem.fit(WARMER), log_evidence=-20.0)
+    assert ranked(problem, [problem.fit(STIFFER), beaten]) == ()
+
+
+def test_measurements_come_best_first_and_promise_something():
+    problem = toy()
+    found = ranked(problem, [problem.fit(each) for each in (STIFFER, WARMER, LEVEL)])
+    promised = [each.expected_log_bayes_factor for each in found]
+    assert promised == sorted(promised, reverse=True)
+    assert 0 < len(promised) <= 8
+    assert min(promised) >= 0.5
+    assert len({(each.what, each.separates) for each in found}) == len(found)
+
+
+def test_of_measurements_that_are_as_good_as_certain_the_easier_comes_first():
+    problem = toy()
+    problem.slopes = {**SLOPES, LEVEL: lambda design: 50 * with_level(design)}
+    problem.slopes[WARMER] = lambda design: 50 * with_temperature(design)
+    found = ranked(problem, [problem.fit(each) for each in (LEVEL, WARMER)])
+    assert [each.expected_log_bayes_factor for each in found[:2]] == [100, 100]
+    assert "day" in found[0].what
+    assert "hit" in found[1].what
+
+
+def test_everything_that_was_not_measured_yet_is_proposed():
+    kinds = {each.kind for each in proposals(design_of(ONE_TEST, MODES), HANGER_3)}
+    assert kinds == {"repeat", "other plane", "more modes", "temperature", "level", "known mass"}
+
+
+def test_what_was_measured_already_is_not_proposed_again():
+    both = [(plane, order) for plane in (0, 1) for order in range(1, 17)]
+    design = design_of(campaign(AddedMass(25.0, 3.6)), both)
+    assert set(measured_already(design)) == {"other plane", "temperature", "level", "known mass"}
+    assert [each.kind for each in proposals(design, HANGER_3)] == ["repeat"]
+
+
+def test_proposals_are_worded_for_people():
+    said = [each.what for each in proposals(design_of(ONE_TEST, MODES), HANGER_3)]
+    assert "known mass of 25 kg at 3.6 m" in said
+    assert "modes 7 and 8" in said
+    assert "the longitudinal plane, modes 1 to 6" in said
+    assert "a test on a day 20 K colder" in said
+
+
+def test_a_light_hanger_gets_a_light_mass():
+    light = replace(HANGER_3, mass_per_length_kg_m=1.5)
+    said = [each.what for each in proposals(design_of(ONE_TEST, MODES), light)]
+    assert "known mass of 0.4 kg at 3.6 m" in said
+
+
+def test_new_sensors_stand_behind_the_present_ones_and_see_both_axes():
+    design = with_sensors(design_of(ONE_TEST, MODES, places_m=(6.0,)), (2.0, 4.0)).design
+    assert design.places_m == (6.0, 2.0, 4.0)
+    assert set(design.shape_place) == {1, 2}
+    assert len(design.shape_mode) == 6 * 2 * 2
+
+
+def asked(effect, others, at="everywhere"):
+    """What is asked for after one test of frequencies with `effect` planted."""
+    plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
+    rng = np.random.default_rng(1)
+    tests = simulated(HANGER_3, HangerState(711e3), (effect,), plan, rng)
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    survey = problem.observations.design.survey
+    fits = []
+    for name in (effect.name, *others):
+        variants = EFFECTS[name].variants(HANGER_3, survey)
+        variant = next(each for each in variants if each.at == at)
+        fits.append(fitted(problem, Hypothesis(((name, variant),)), rng))
+    return ranked(problem, fits)
+
+
+def test_distributed_mass_against_bending_stiffness_asks_for_a_known_mass_first():
+    planted = PlantedEffect("distributed_mass", "everywhere", {"mass_change": 0.05})
+    first = asked(planted, ["bending_stiffness"])[0]
+    assert first.what.startswith("known mass of 25 kg at")
+    assert first.expected_log_bayes_factor > 5
+
+
+def test_joint_softening_against_ends_that_turn_asks_for_another_level_first():
+    planted = PlantedEffect("joint_softening", "both ends", {"log10_k_at_reference_level": 7.0})
+    first = asked(planted, ["rotational_end_flexibility"], at="both ends")[0]
+    assert "hit" in first.what
+    assert first.separates == ("joint_softening", "rotational_end_flexibility")

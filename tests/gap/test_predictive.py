@@ -1,0 +1,33 @@
+"""The posterior predictive p-value."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shm.gap.predictive import predictive_p_value
+from tests.gap import linear_toy as toy
+
+
+def _p_values(gap: np.ndarray, count: int) -> np.ndarray:
+    none = toy.fit(np.zeros(toy.design().size), toy.tension())
+    found = []
+    for seed in range(count):
+        value = toy.noise(np.random.default_rng(seed)) + gap
+        found.append(predictive_p_value(toy.observations(value), none, none.noise))
+    return np.array(found)
+
+
+def test_data_of_the_hypothesis_are_seldom_found_odd() -> None:
+    found = _p_values(np.zeros(toy.design().size), 200)
+    assert np.mean(found < 0.05) <= 0.09
+    assert np.median(found) > 0.3
+
+
+def test_a_gap_that_repeats_in_every_test_is_found_though_each_test_hides_it() -> None:
+    assert np.median(_p_values(toy.stiffening(3e-4), 20)) < 0.01
+
+
+def test_shapes_that_are_off_are_found() -> None:
+    gap = np.zeros(toy.design().size)
+    gap[toy.design().frequencies :: 2] = 1.5 * toy.SHAPE_SD
+    assert np.median(_p_values(gap, 20)) < 0.01

@@ -1,0 +1,130 @@
+"""Sampled posteriors against brute force, where normal approximations are poor."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import logsumexp
+
+from shm.gap.contract import Hypothesis
+from shm.gap.fit import baseline_fit, fitted
+from shm.gap.noise import nodes
+from shm.gap.problem import GapProblem
+from shm.gap.sampled import sampled
+from shm.gap.sensitivity import scan, truncate
+from shm.models.effects import Variant
+from shm.values import FloatArray
+from tests.helpers.gap_campaigns import campaign, problem_of
+
+_STEP = 1e-4
+
+
+def _conditional_log_evidence(
+    problem: GapProblem, hypothesis: Hypothesis, other: FloatArray, start: FloatArray
+) -> FloatArray:
+    """Log evidence (n,) at given effect parameters (n, p): linearised where the rest goes best."""
+    n, linear = len(other), 5
+    z = np.column_stack([np.repeat(start[None], n, axis=0), other])
+    for _ in range(2):
+        at = problem.predict(hypothesis, z)
+        units = _STEP * np.eye(z.shape[1])[:linear]
+        moved = [problem.predict(hypothesis, z + unit) for unit in units]
+        slopes = np.stack([(each - at) / _STEP for each in moved], axis=2)
+        shifted = problem.observations.value - at + np.einsum("nij,nj->ni", slopes, z[:, :linear])
+        precision = 1 / (problem.observations.sd**2 + 3e-5**2)
+        inner = np.einsum("nij,i,nik->njk", slopes, precision, slopes) + np.eye(linear)
+        pull = np.einsum("nij,i,ni->nj", slopes, precision, shifted)
+        z[:, :linear] = np.linalg.solve(inner, pull[..., None])[..., 0]
+    log = [
+        node.log_weight
+        + _normal(shifted, node.covariance.frequency + slopes @ np.swapaxes(slopes, 1, 2))
+        for node in nodes(problem.observations)
+    ]
+    return np.asarray(logsumexp(log, axis=0))
+
+
+def _normal(value: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Log density (n,) of values (n, data) of N(0, covariance (n, data, data))."""
+    square = (value * np.linalg.solve(covariance, value[..., None])[..., 0]).sum(axis=1)
+    volume = np.linalg.slogdet(2 * np.pi * covariance)[1]
+    return np.asarray(-(square + volume) / 2)
+
+
+def _brute_force(
+    problem: GapProblem, hypothesis: Hypothesis, points: tuple[int, ...], start: FloatArray
+) -> float:
+    """The mean evidence over midpoints of equal shares of the effect's prior."""
+    shares = [(np.arange(count) + 0.5) / count for count in points]
+    other = stats.norm.ppf(np.array(list(product(*shares))))
+    log = _conditional_log_evidence(problem, hypothesis, other, start)
+    return float(logsumexp(log) - np.log(len(log)))
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "points"),
+    [
+        ("bending_stiffness", [0.02], (60,)),
+        ("distributed_mass", [0.012], (60,)),
+        ("point_mass", [0.6, 4.0], (16, 48)),
+    ],
+)
+def test_the_evidence_of_an_effect_hardly_seen_is_that_of_brute_force(
+    effect: str, values: list[float], points: tuple[int, ...]
+) -> None:
+    """Midpoint rule over the effect's parameters, the rest integrated in closed form."""
+    problem = problem_of(campaign(((effect, Variant()),), values, seed=5))
+    rng, hypothesis = np.random.default_rng(1), Hypothesis(((effect, Variant()),))
+    before = baseline_fit(problem, rng)
+    truncate(problem, scan(problem, before, hypothesis))
+    fit = fitted(problem, hypothesis, rng)
+    found = [sampled(problem, fit, np.random.default_rng(seed), 200) for seed in range(3)]
+    exact = _brute_force(problem, hypothesis, points, fit.z[:5])
+    each = np.array([one.log_evidence for one in found])
+    assert each.mean() == pytest.approx(exact, abs=0.05 * (1 + len(points)))
+    assert each.std(ddof=1) < 3 * found[0].log_evidence_sd
+
+
+def test_sampled_draws_have_the_moments_of_brute_force() -> None:
+    problem = problem_of(campaign((("distributed_mass", Variant()),), [0.012], seed=5))
+    rng, hypothesis = np.random.default_rng(1), Hypothesis((("distributed_mass", Variant()),))
+    fit = fitted(problem, hypothesis, rng)
+    found = sampled(problem, fit, rng, 2000)
+    other = stats.norm.ppf((np.arange(60) + 0.5) / 60)
+    log = _conditional_log_evidence(problem, hypothesis, other[:, None], fit.z[:5])
+    weight = np.exp(log - logsumexp(log))
+    mean = weight @ other
+    assert found.draws[:, 5].mean() == pytest.approx(mean, abs=0.25)
+    assert found.draws[:, 5].std() == pytest.approx(np.sqrt(weight @ (other - mean) ** 2), rel=0.25)
+
+
+def test_sampling_keeps_what_the_fit_found_and_says_how_sure_its_evidence_is() -> None:
+    problem = problem_of(campaign((("point_mass", Variant()),), [12.0, 3.1]))
+    rng, hypothesis = np.random.default_rng(1), Hypothesis((("point_mass", Variant()),))
+    fit = fitted(problem, hypothesis, rng)
+    found = sampled(problem, fit, rng, 300)
+    assert found.method == "sampled"
+    assert 0 < found.log_evidence_sd < 0.15
+    assert found.draws.shape == (300, 7)
+    assert found.log_evidence == pytest.approx(fit.log_evidence, abs=0.6)
+    np.testing.assert_array_equal(found.z, fit.z)
+
+
+def test_the_same_seed_gives_the_same_draws() -> None:
+    problem = problem_of(campaign())
+    hypothesis = Hypothesis((("bending_stiffness", Variant()),))
+    fit = fitted(problem, hypothesis, np.random.default_rng(1))
+    one, other = (sampled(problem, fit, np.random.default_rng(7), 50) for _ in range(2))
+    np.testing.assert_array_equal(one.draws, other.draws)
+
+
+def test_a_baseline_with_end_springs_is_sampled_in_its_springs() -> None:
+    problem = problem_of(campaign(), "beam2")
+    fit = baseline_fit(problem, np.random.default_rng(1))
+    found = sampled(problem, fit, np.random.default_rng(2), 200)
+    assert np.isfinite(found.log_evidence)
+    assert found.log_evidence_sd < 0.5
+    springs = problem.theta(Hypothesis(), found.draws)[:, 1:5]
+    assert springs.min() > 6

@@ -1,0 +1,77 @@
+"""What of an effect can be seen, and where its prior is cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shm.gap.contract import Hypothesis
+from shm.gap.fit import baseline_fit, fitted
+from shm.gap.noise import MEAN_MODEL_ERROR, nodes
+from shm.gap.sensitivity import VISIBLE, scan, truncate
+from shm.models.effects import Variant
+from tests.helpers.gap_campaigns import campaign, problem_of
+
+STIFFER = Hypothesis((("bending_stiffness", Variant()),))
+HEAVIER = Hypothesis((("distributed_mass", Variant()),))
+CLAMP = Hypothesis((("point_mass", Variant()),))
+
+
+def test_a_shift_counts_only_beyond_what_the_baseline_can_follow() -> None:
+    """d' (C + J J')^-1 d, with the baseline's slopes J and priors N(0, I)."""
+    problem, rng = problem_of(campaign()), np.random.default_rng(1)
+    before = baseline_fit(problem, rng)
+    found = scan(problem, before, STIFFER)
+    node = min(
+        nodes(problem.observations), key=lambda n: abs(np.log(n.model_error / MEAN_MODEL_ERROR))
+    )
+    covariance = node.covariance.frequency + before.slopes @ before.slopes.T
+    square = np.einsum("gi,ig->g", found.shift, np.linalg.solve(covariance, found.shift.T))
+    np.testing.assert_allclose(found.visible, np.sqrt(square), rtol=1e-4)
+
+
+def test_a_cut_prior_begins_where_half_of_the_places_show_the_effect() -> None:
+    problem, rng = problem_of(campaign()), np.random.default_rng(1)
+    before = baseline_fit(problem, rng)
+    found = scan(problem, before, CLAMP)
+    truncate(problem, found)
+    z = np.zeros((40, 7))
+    z[:, :5] = before.z
+    z[:, 5], z[:, 6] = -6.0, np.linspace(-1.5, 1.5, 40)
+    theta = problem.theta(CLAMP, z)
+    shift = problem.predict_at(CLAMP, theta) - before.predicted
+    covariance = np.diag(problem.observations.sd**2) + before.slopes @ before.slopes.T
+    visible = np.sqrt(np.einsum("gi,ig->g", shift, np.linalg.solve(covariance, shift.T)))
+    assert VISIBLE / 2.5 < np.median(visible) < VISIBLE * 2.5
+
+
+def test_an_effect_that_these_data_cannot_show_says_so() -> None:
+    turned = Variant("all sensors")
+    problem = problem_of(campaign())
+    before = baseline_fit(problem, np.random.default_rng(1))
+    found = scan(problem, before, Hypothesis((("sensor_misalignment", turned),)))
+    assert found.smallest == 1.0
+    assert found.log_evidence == pytest.approx(before.log_evidence, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("hypothesis", "values"), [(HEAVIER, [0.06]), (STIFFER, [0.1]), (CLAMP, [5.0, 3.1])]
+)
+def test_the_scans_evidence_is_near_that_of_the_fit(
+    hypothesis: Hypothesis, values: list[float]
+) -> None:
+    problem, rng = problem_of(campaign(hypothesis.effects, values)), np.random.default_rng(1)
+    before = baseline_fit(problem, rng)
+    found = scan(problem, before, hypothesis)
+    truncate(problem, found)
+    fit = fitted(problem, hypothesis, rng)
+    gained = fit.log_evidence - before.log_evidence
+    assert found.log_evidence - before.log_evidence == pytest.approx(gained, abs=3 + 0.5 * gained)
+    assert found.starts(problem.coordinates(hypothesis), 2).shape[1] == len(fit.z)
+
+
+def test_shapes_show_a_turned_sensor() -> None:
+    turned = Variant("all sensors")
+    problem = problem_of(campaign(shape_sd=0.01))
+    before = baseline_fit(problem, np.random.default_rng(1))
+    assert scan(problem, before, Hypothesis((("sensor_misalignment", turned),))).smallest < 0.6

@@ -1,0 +1,78 @@
+"""Small campaigns of hanger 3 for the gap diagnosis, made by the general model itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.models.composed import ComposedHanger
+from shm.models.effects import Conditions, Variant
+from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, ShapePoint
+from tests.helpers.hangers import HANGER_3
+
+PLACES_M = (2.0, 4.5, 6.5, 9.0)
+CLAMP = AddedMass(25.0, 3.6)
+Effects = tuple[tuple[str, Variant], ...]
+
+
+def campaign(
+    effects: Effects = (),
+    values: Sequence[float] = (),
+    tests: int = 2,
+    modes: int = 6,
+    sd: float = 2e-4,
+    given_sd: bool = True,
+    shape_sd: float = NAN,
+    tension: float = 1.1,
+    seed: int = 0,
+) -> tuple[ModalTest, ...]:
+    """Tests with `values` of the effects and deviations of 0.5 %; the last has a known mass.
+
+    Shapes are measured where `shape_sd` is given.
+    """
+    rng = np.random.default_rng(seed)
+    hanger = ComposedHanger(HANGER_3, "beam1", effects, PLACES_M)
+    theta = np.array([[tension, *(0.005 * rng.standard_normal(4)), *values]])
+    model_error = 2e-5 * rng.standard_normal((2, modes))
+    made = []
+    for t in range(tests):
+        mass = CLAMP if t == tests - 1 else None
+        found = hanger.modes(theta, Conditions(f"t{t + 1}", 0.0, 1.0, mass), modes)
+        log = np.log(found.frequency_hz[0]) + model_error + sd * rng.standard_normal((2, modes))
+        shape = found.shape[0] + np.nan_to_num(shape_sd) * rng.standard_normal(found.shape[0].shape)
+        made.append(
+            ModalTest(
+                f"t{t + 1}",
+                tuple(
+                    Mode(
+                        plane,
+                        order + 1,
+                        float(np.exp(log[p, order])),
+                        sd * float(np.exp(log[p, order])) if given_sd else NAN,
+                        shape=_points(shape[p, order], p, shape_sd),
+                    )
+                    for p, plane in enumerate(PLANES)
+                    for order in range(modes)
+                ),
+                hanger=3,
+                added_mass=mass,
+            )
+        )
+    return tuple(made)
+
+
+def problem_of(tests: Sequence[ModalTest], baseline: str = "beam1") -> GapProblem:
+    """The problem of tests of hanger 3."""
+    return GapProblem(HANGER_3, baseline, observed(tests, HANGER_3))
+
+
+def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
+    if not np.isfinite(sd):
+        return ()
+    return tuple(
+        ShapePoint(x_m, float(here[plane]), float(here[1 - plane]), sd)
+        for x_m, here in zip(PLACES_M, shape, strict=True)
+    )

@@ -1,0 +1,121 @@
+"""A linear toy of a gap problem, whose posteriors are exact, and small campaigns of tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.gap.contract import Covariance, Design, Fit, Hypothesis, Observations
+from shm.models.effects import Conditions, Parameter, Survey
+from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger
+from tests.helpers.hangers import HANGER_3
+
+Slopes = Callable[[Design], FloatArray]
+BASELINE = Hypothesis()
+SD = 1e-3
+
+
+@dataclass(frozen=True)
+class ToyCoordinates:
+    parameters: tuple[Parameter, ...]
+
+
+class ToyProblem:
+    """Every hypothesis predicts `slopes(design) @ z`, with slopes (data, d)."""
+
+    def __init__(self, observations: Observations, slopes: Mapping[Hypothesis, Slopes]):
+        self.observations = observations
+        self.slopes = slopes
+        self.hanger: Hanger = HANGER_3
+
+    def predict(
+        self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
+    ) -> FloatArray:
+        return z @ self.slopes[hypothesis](design or self.observations.design).T
+
+    def coordinates(self, hypothesis: Hypothesis) -> ToyCoordinates:
+        d = self.slopes[hypothesis](self.observations.design).shape[1]
+        return ToyCoordinates((Parameter("size", "", -1, 1, 0, ""),) * d)
+
+    def fit(self, hypothesis: Hypothesis = BASELINE, model_error: float = 0.0) -> Fit:
+        """The exact posterior."""
+        design, sd = self.observations.design, self.observations.sd
+        f = design.frequencies
+        same = (design.frequency_plane[:, None] == design.frequency_plane) & (
+            design.frequency_order[:, None] == design.frequency_order
+        )
+        noise = Covariance(np.diag(sd[:f] ** 2) + model_error**2 * same, sd[f:] ** 2)
+        precision = np.zeros((design.size, design.size))
+        precision[:f, :f] = np.linalg.inv(noise.frequency)
+        precision[f:, f:] = np.diag(1 / noise.shape)
+        slopes = self.slopes[hypothesis](design)
+        covariance = np.linalg.inv(np.eye(slopes.shape[1]) + slopes.T @ precision @ slopes)
+        z = covariance @ slopes.T @ precision @ self.observations.value
+        return Fit(
+            hypothesis=hypothesis,
+            z=z,
+            covariance=covariance,
+            predicted=slopes @ z,
+            slopes=slopes,
+            noise=noise,
+            model_error=model_error,
+            draws=z[None],
+            log_fit=0.0,
+            log_evidence=0.0,
+            log_evidence_sd=NAN,
+            method="normal",
+        )
+
+
+def design_of(
+    conditions: Sequence[Conditions],
+    modes: Sequence[tuple[int, int]],
+    places_m: tuple[float, ...] = (),
+) -> Design:
+    """Every mode (plane, order) in every test; every place sees the mode's plane alone."""
+    rows = [(t, plane, order) for t in range(len(conditions)) for plane, order in modes]
+    test, plane, order = np.array(rows).T
+    shapes = [(mode, place) for mode in range(len(rows)) for place in range(len(places_m))]
+    mode, place = np.array(shapes, dtype=np.int64).reshape(-1, 2).T
+    return Design(
+        survey=_survey(conditions, sorted({plane for plane, _ in modes}), places_m),
+        conditions=tuple(conditions),
+        places_m=places_m,
+        frequency_test=test,
+        frequency_plane=plane,
+        frequency_order=order,
+        shape_mode=mode,
+        shape_place=place,
+        shape_component=plane[mode],
+    )
+
+
+def _survey(
+    conditions: Sequence[Conditions], planes: Sequence[int], places_m: tuple[float, ...]
+) -> Survey:
+    masses = {each.added_mass for each in conditions if each.added_mass is not None}
+    return Survey(
+        tests=tuple(each.test for each in conditions),
+        planes=tuple(PLANES[plane] for plane in planes),
+        sensor_places_m=places_m,
+        biaxial=False,
+        temperatures_c=tuple(sorted({each.temperature_shift_k for each in conditions})),
+        amplitudes=tuple(sorted({each.amplitude for each in conditions})),
+        added_masses=tuple(sorted(masses, key=lambda mass: (mass.x_m, mass.mass_kg))),
+    )
+
+
+def campaign(known_mass: AddedMass | None = None) -> tuple[Conditions, ...]:
+    """Three temperatures, three levels, and a test with a known mass if one is given."""
+    plain = tuple(
+        Conditions(f"t{i + 1}", shift_k, level)
+        for i, (shift_k, level) in enumerate([(-10, 1), (0, 1), (10, 1), (0, 0.5), (0, 2)])
+    )
+    return plain + ((Conditions("t6", added_mass=known_mass),) if known_mass else ())
+
+
+def tension(design: Design) -> FloatArray:
+    """One parameter that moves all logarithms of frequencies alike, and no shape."""
+    return np.repeat([[0.1], [0.0]], [design.frequencies, len(design.shape_mode)], axis=0)

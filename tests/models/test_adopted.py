@@ -1,0 +1,215 @@
+"""Adopted classes: names say all of them, no effect is the baseline, conditions are followed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, UsageError
+from shm.models import Model, applicable, build, competing_names, described
+from shm.models.adopted import missed_by_one_test, places_of
+from shm.models.adopted_name import AdoptedEffect, AdoptedName
+from shm.models.effects import EFFECTS, Variant
+from shm.values import AddedMass, ModalTest, Scatter
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.workspaces import modes_of
+
+MASS = "beam1+point_mass@everywhere"
+WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
+ADOPTABLE = [
+    (name, key)
+    for name, effect in EFFECTS.items()
+    if effect.of_the_hanger
+    for key in places_of(name, HANGER_3)[-1:]
+]
+
+
+def parameters(model: Model, **values: float) -> np.ndarray:
+    """One parameter set (1, parameters): nominal tension, as described, but for `values`."""
+    known = {"theta_F": 1.0, **values}
+    return np.array([[known.get(name, 0.0) for name in model.parameter_names]])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        AdoptedName("beam1", (AdoptedEffect("point_mass", "everywhere"),)),
+        AdoptedName(
+            "beam2",
+            (
+                AdoptedEffect("effective_length", "deck_end"),
+                AdoptedEffect("bending_stiffness", "everywhere.transverse"),
+            ),
+        ),
+        AdoptedName(
+            "beam1",
+            (
+                AdoptedEffect(
+                    "temperature_tension",
+                    "everywhere",
+                    -3.5,
+                    {"tension_per_kelvin_n_k": (-1.25e6, -1e-5)},
+                ),
+            ),
+        ),
+    ],
+)
+def test_a_name_comes_back_from_its_text(name: AdoptedName) -> None:
+    back = AdoptedName.parse(str(name))
+    assert str(back) == str(name)
+    assert [(e.effect, e.key, dict(e.ranges)) for e in back.effects] == [
+        (e.effect, e.key, dict(e.ranges)) for e in name.effects
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("beam1+", "EFFECT@WHERE"),
+        ("+point_mass@everywhere", "no baseline"),
+        ("beam1+point_mass", "EFFECT@WHERE"),
+        ("beam1+point_mass@everywhere:x_m", "NAME=LOW..HIGH"),
+        ("beam1+point_mass@everywhere:x_m=4..3", "rising range"),
+        ("beam1+point_mass@everywhere:x_m=nan..3", "rising range"),
+        ("beam1+point_mass@everywhere:reference_c=1..3", "temperature"),
+        ("beam1+point_mass@everywhere:y_m=1..3", "no parameter 'y_m'"),
+        ("beam9+point_mass@everywhere", "unknown model class 'beam9'"),
+        ("beam1+gremlins@everywhere", "unknown effect"),
+        ("beam1+point_mass@deck_end", "Places: everywhere"),
+        ("beam1+timebase@test_t3", "Places: all_tests"),
+        ("beam1+sensor_mass@all_sensors", "of the sensors"),
+        ("beam1+temperature_tension@everywhere", "reference_c"),
+    ],
+)
+def test_a_name_that_says_nothing_sensible_is_refused_in_words(name: str, fault: str) -> None:
+    for attempt in (build, described):
+        with pytest.raises(UsageError) as caught:
+            attempt(name, HANGER_3)
+        assert fault in str(caught.value)
+        assert caught.value.remedy
+    with pytest.raises(UsageError):
+        applicable(HANGER_3, ["beam1", name])
+
+
+@pytest.mark.parametrize(("name", "key"), ADOPTABLE)
+def test_every_effect_of_the_hanger_can_be_adopted_and_moves_a_frequency(
+    name: str, key: str
+) -> None:
+    reference = ":reference_c=10" if "temperature" in EFFECTS[name].follows else ""
+    model = build(f"beam1+{name}@{key}{reference}", HANGER_3)
+    rng = np.random.default_rng(1)
+    theta = rng.uniform(model.prior.lower, model.prior.upper, (5, len(model.bounds)))
+    theta[:, 0] = 1.0
+    test = ModalTest("t", (), temperature_c=30.0, amplitude=2.0)
+    found = model.frequencies_at(theta, 4, model.conditions(test))
+    assert found.shape == (5, 2, 4)
+    bare = build("beam1", HANGER_3).frequencies_hz(np.array([[1.0, 1.0]]), 4)
+    assert np.abs(found / bare - 1).max() > 1e-4
+
+
+@pytest.mark.parametrize("baseline", ["beam1", "beam2"])
+def test_no_effect_is_the_baseline(baseline: str) -> None:
+    name = f"{baseline}+effective_length@both_ends"
+    model, bare = build(name, HANGER_3), build(baseline, HANGER_3)
+    springs = {f"log10_k{i}": 6.0 + i / 3 for i in range(1, 5)}
+    theta = parameters(model, **springs)
+    expected = bare.frequencies_hz(parameters(bare, theta_L=1.0, **springs), 6)
+    np.testing.assert_allclose(model.frequencies_hz(theta, 6), expected, rtol=1e-6)
+    for mine, its in zip(
+        model.springs_n_m_rad(theta),
+        bare.springs_n_m_rad(parameters(bare, theta_L=1.0, **springs)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(mine, its)
+
+
+def test_end_springs_that_an_effect_adds_are_told_for_the_watch() -> None:
+    model = build("beam1+rotational_end_flexibility@deck_end.transverse", HANGER_3)
+    deck, arch = model.springs_n_m_rad(parameters(model, log10_k1=6.5))
+    np.testing.assert_allclose(deck, [[10**6.5, np.inf]])
+    assert np.isinf(arch).all()
+
+
+def test_a_temperature_counts_from_the_reference_of_the_name() -> None:
+    model = build(WARMTH, HANGER_3)
+    theta = parameters(model, tension_per_kelvin_n_k=-2000.0)
+    warm = model.conditions(ModalTest("t", (), temperature_c=25.0))
+    assert warm.temperature_shift_k == 15.0
+    looser = parameters(model, theta_F=1 - 30e3 / HANGER_3.nominal_tension_n)
+    np.testing.assert_allclose(
+        model.frequencies_at(theta, 6, warm), model.frequencies_hz(looser, 6), rtol=1e-9
+    )
+
+
+def test_conditions_that_no_effect_follows_are_not_noticed() -> None:
+    model = build(MASS, HANGER_3)
+    hot, cold = (
+        ModalTest("t", (), temperature_c=t, amplitude=a) for t, a in ((30, 2.0), (-5, 0.3))
+    )
+    assert model.conditions(hot) == model.conditions(cold)
+    level = build("beam1+geometric_hardening@everywhere", HANGER_3)
+    assert level.conditions(hot) != level.conditions(cold)
+    assert level.conditions(ModalTest("t", ())).amplitude == 1.0
+
+
+def test_a_known_mass_is_described_by_adopted_classes_and_by_no_other() -> None:
+    test = ModalTest("t", modes_of(HANGER_3, 1.0), added_mass=AddedMass(25.0, 6.0))
+    model = build(MASS, HANGER_3)
+    model.refuse(test)
+    loaded = model.frequencies_at(parameters(model), 3, model.conditions(test))
+    free = model.frequencies_hz(parameters(model), 3)
+    assert loaded[0, 0, 0] < 0.99 * free[0, 0, 0]
+    np.testing.assert_allclose(loaded[0, 0, 1], free[0, 0, 1], rtol=1e-4)  # a node of order 2
+    with pytest.raises(BadInput, match="25 kg"):
+        build("beam1", HANGER_3).refuse(test)
+
+
+def test_a_class_that_follows_the_temperature_refuses_a_test_without() -> None:
+    with pytest.raises(BadInput, match="no temperature") as caught:
+        build(WARMTH, HANGER_3).refuse(ModalTest("t", ()))
+    assert caught.value.remedy
+
+
+def test_priors_are_those_of_the_catalogue_and_of_the_scatter() -> None:
+    bounds = build(MASS, HANGER_3).bounds
+    mass = EFFECTS["point_mass"].parameters(HANGER_3, Variant())[0]
+    assert bounds["theta_F"] == (0.5, 5.0)
+    assert bounds["log10_mass_kg"][0] == pytest.approx(np.log10(mass.lower))
+    assert bounds["x_m"] == (0.0, 12.0)
+    signed = build("beam1+bending_stiffness@everywhere", HANGER_3).bounds["stiffness_change"]
+    assert signed == (-0.8, 0.8)
+    assert build(f"{MASS}:x_m=3..4", HANGER_3).bounds["x_m"] == (3.0, 4.0)
+
+
+def test_a_hanger_without_scatter_has_no_deviations() -> None:
+    exact = replace(HANGER_3, scatter=Scatter(0.0, 0.0, 0.0, 0.0))
+    assert build(MASS, exact).parameter_names == ("theta_F", "log10_mass_kg", "x_m")
+
+
+def test_two_effects_with_one_parameter_name_keep_their_ranges_apart() -> None:
+    two = "beam1+point_mass@everywhere:x_m=3..4+intermediate_support@everywhere:x_m=7..8"
+    bounds = build(two, HANGER_3).bounds
+    assert bounds["point_mass.x_m"] == (3.0, 4.0)
+    assert bounds["intermediate_support.x_m"] == (7.0, 8.0)
+
+
+def test_an_adopted_class_is_admitted_where_its_baseline_is() -> None:
+    admitting = replace(HANGER_3, models=("beam1",))
+    assert competing_names(admitting, ["beam1", "beam2", MASS]) == ("beam1", MASS)
+    with pytest.raises(UsageError, match="admits beam2 only"):
+        build(MASS, replace(HANGER_3, models=("beam2",)))
+
+
+def test_a_shape_reaches_one_and_vanishes_at_clamped_ends() -> None:
+    model = build(MASS, HANGER_3)
+    theta = parameters(model, log10_mass_kg=1.0, x_m=3.4)[0]
+    shape = model.shape(theta, "longitudinal", 2, np.linspace(0, 12.0, 101))
+    assert np.abs(shape).max() == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(shape[[0, -1]], 0, atol=1e-9)
+
+
+def test_what_a_single_test_cannot_show_is_known() -> None:
+    assert missed_by_one_test("temperature_tension", HANGER_3)
+    assert not missed_by_one_test("point_mass", HANGER_3)

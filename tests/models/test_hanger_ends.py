@@ -1,0 +1,216 @@
+"""Supports that give way, supports that move on their own mass, sag, and turned end springs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from shm.models import tensioned_beam
+from shm.models.hanger import PhysicalHanger, solve
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.physical_hangers import (
+    EI,
+    LENGTH,
+    MASS,
+    NOWHERE,
+    TENSION,
+    clamped,
+    frequencies_hz,
+    of_slenderness,
+    on_springs,
+)
+
+UNIT_HZ = np.sqrt(TENSION / MASS) / (2 * np.pi)
+LOOSE = np.zeros((1, 2))
+
+
+def string() -> PhysicalHanger:
+    """Pinned, and next to no bending stiffness."""
+    return on_springs(of_slenderness(np.array([1e3])), LOOSE, LOOSE)
+
+
+def supported(
+    hanger: PhysicalHanger, end: int, compliance_m_n: float, mass_kg: float = 0.0
+) -> PhysicalHanger:
+    """Both planes alike."""
+    compliance, mass = np.zeros((2, len(hanger.tension_n), 2, 2))
+    compliance[:, end], mass[:, end] = compliance_m_n, mass_kg
+    return replace(hanger, translational_compliance_m_n=compliance, support_mass_kg=mass)
+
+
+@pytest.mark.parametrize("stiffness", [3.0, 30.0, 3e4])
+def test_a_string_whose_end_yields(stiffness: float) -> None:
+    """Spring s at one end: tan(k L) = -T k/s."""
+    n_m = stiffness * TENSION / LENGTH
+
+    def fault(k: float) -> float:
+        return float(np.sin(k * LENGTH) * n_m + TENSION * k * np.cos(k * LENGTH))
+
+    edges = (np.arange(1, 7)[:, None] + [-0.5, 0.0]) * np.pi / LENGTH
+    waves = np.array([brentq(fault, low, high) for low, high in edges])
+    for end in (0, 1):
+        found = frequencies_hz(supported(string(), end, 1 / n_m), 6)[0]
+        np.testing.assert_allclose(found, np.tile(waves * UNIT_HZ, (2, 1)), rtol=1e-3)
+
+
+def test_a_string_whose_end_moves_with_a_mass() -> None:
+    """Spring s and mass M at one end: T k cos(k L) + (s - M omega^2) sin(k L) = 0 with omega^2 =
+    k^2 T/m. The mode that the support alone would have, near sqrt(s/M), is not the hanger's."""
+    mass_kg, support_hz = 20 * MASS * LENGTH, 4.0
+    n_m = mass_kg * (2 * np.pi * support_hz) ** 2
+
+    def fault(k: float) -> float:
+        moved = n_m - mass_kg * k**2 * TENSION / MASS
+        return float(TENSION * k * np.cos(k * LENGTH) + moved * np.sin(k * LENGTH))
+
+    k = np.linspace(1e-3, 2.0, 4001)
+    signs = np.sign([fault(each) for each in k])
+    at = np.flatnonzero(signs[1:] != signs[:-1])
+    roots = np.array([brentq(fault, k[i], k[i + 1]) for i in at]) * UNIT_HZ
+    own = np.argmin(np.abs(roots - support_hz))
+    expected = np.delete(roots, own)[:5]
+    assert abs(roots[own] - support_hz) < 0.1
+    hanger = supported(string(), 0, 1 / n_m, mass_kg)
+    np.testing.assert_allclose(frequencies_hz(hanger, 5)[0, 0], expected, rtol=1e-3)
+    np.testing.assert_array_equal(
+        solve(hanger, 5, np.array([6.0])).frequency_hz, frequencies_hz(hanger, 5)
+    )
+
+
+def test_a_support_that_does_not_give_way_holds_whatever_its_mass() -> None:
+    found = frequencies_hz(supported(clamped(), 1, 0.0, 1e9), 8)
+    np.testing.assert_allclose(found, frequencies_hz(clamped(), 8), rtol=1e-9)
+
+
+def test_a_support_in_one_plane_leaves_the_other_alone() -> None:
+    compliance, mass = np.zeros((2, 1, 2, 2))
+    compliance[0, 0, 0], mass[0, 0, 0] = 1e-7, 5000.0
+    moved = replace(clamped(), translational_compliance_m_n=compliance, support_mass_kg=mass)
+    found, plain = frequencies_hz(moved, 8)[0], frequencies_hz(clamped(), 8)[0]
+    np.testing.assert_allclose(found[1], plain[1], rtol=1e-6)
+    assert np.abs(found[0] / plain[0] - 1).max() > 1e-3
+
+
+def test_a_free_bar_has_its_bending_modes_alone() -> None:
+    """Without tension a free bar has the frequencies of a clamped one (cosh q cos q = 1)."""
+    free = replace(
+        on_springs(of_slenderness(np.zeros(1)), LOOSE, LOOSE),
+        translational_compliance_m_n=np.full((1, 2, 2), np.inf),
+    )
+    expected = frequencies_hz(of_slenderness(np.zeros(1)), 8)
+    np.testing.assert_allclose(frequencies_hz(free, 8), expected, rtol=1e-5)
+    np.testing.assert_allclose(solve(free, 8, np.array([1.0])).frequency_hz, expected, rtol=1e-5)
+
+
+def test_a_bar_hanging_from_one_end_has_a_cantilevers_modes() -> None:
+    """Clamped at the arch end, free at the deck end: cosh q cos q = -1."""
+    q = [
+        brentq(lambda q: np.cos(q) + 1 / np.cosh(q), (n - 1) * np.pi + 0.1, n * np.pi)
+        for n in range(1, 7)
+    ]
+    compliance = np.zeros((1, 2, 2))
+    compliance[:, 0] = np.inf
+    hanger = on_springs(of_slenderness(np.zeros(1)), LOOSE, LOOSE + np.inf)
+    hanger = replace(hanger, translational_compliance_m_n=compliance)
+    expected = np.square(q) * np.sqrt(EI / MASS) / LENGTH**2 / (2 * np.pi)
+    np.testing.assert_allclose(frequencies_hz(hanger, 6)[0, 0], expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("sag", [0.01, 1.0, 15.0])
+def test_sag_is_irvines(sag: float) -> None:
+    """Symmetric modes of a string: tan(w/2) = w/2 - (4/lambda^2) (w/2)^3 with w = omega L
+    sqrt(m/T); antisymmetric ones at 2 n pi (Irvine and Caughey 1974)."""
+
+    def fault(w: float) -> float:
+        half = w / 2
+        return float(np.sin(half) - (half - 4 / sag * half**3) * np.cos(half))
+
+    symmetric = [
+        brentq(fault, (2 * n + 1) * np.pi * (1 - 1e-9), (2 * n + 2) * np.pi * (1 - 1e-9))
+        if n == 0
+        else brentq(fault, (2 * n + 1) * np.pi * (1 - 1e-9), (2 * n + 1.9) * np.pi)
+        for n in range(3)
+    ]
+    waves = np.sort([*symmetric, *(2 * np.pi * np.arange(1, 4))]) / LENGTH
+    sagging = replace(string(), sag_parameter=np.full((1, 2), sag))
+    found = frequencies_hz(sagging, 6)[0, 0]
+    np.testing.assert_allclose(found, waves * UNIT_HZ, rtol=1e-3)
+
+
+def skewed(angle: float, k: float, ends=(0, 1)) -> PhysicalHanger:
+    """Springs k about one axis, turned by `angle` from the transverse plane; rigid about the
+    other."""
+    axis = np.array([np.cos(angle), np.sin(angle)])
+    compliance = np.zeros((1, 2, 2, 2))
+    compliance[:, list(ends)] = np.outer(axis, axis) / k
+    return replace(clamped(), rotational_compliance_rad_n_m=compliance)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.2, np.pi / 4, 1.0, np.pi / 2, -0.7])
+def test_turned_springs_keep_the_frequencies_and_turn_the_motion(angle: float) -> None:
+    k = 3e6
+    straight = tensioned_beam.frequencies_hz(
+        np.array([LENGTH]),
+        np.array([TENSION]),
+        np.array([EI]),
+        np.array([MASS]),
+        np.array([k]),
+        np.array([k]),
+        8,
+    )[0]
+    rigid = frequencies_hz(clamped(), 8)[0, 0]
+    found = solve(skewed(angle, k), 8, np.array([2.0, 5.1]))
+    both = np.sort(found.frequency_hz[0].ravel())
+    np.testing.assert_allclose(both, np.sort([*straight, *rigid]), rtol=2e-6)
+    soft_plane = 0 if abs(angle) < np.pi / 4 else 1
+    if abs(abs(angle) - np.pi / 4) > 0.1:
+        np.testing.assert_allclose(found.frequency_hz[0, soft_plane], straight, rtol=2e-6)
+        tangent = found.shape[0, soft_plane, :, :, 1 - soft_plane]
+        across = found.shape[0, soft_plane, :, :, soft_plane]
+        expected = np.tan(angle) if soft_plane == 0 else 1 / np.tan(angle)
+        np.testing.assert_allclose(tangent, expected * across, atol=1e-5)
+
+
+@pytest.mark.parametrize("off", [-1e-2, -1e-4, -1e-9, 0.0, 1e-9, 1e-4, 1e-2])
+def test_each_plane_keeps_an_unbroken_family_near_45_degrees(off: float) -> None:
+    """Of each pair of neighbours one belongs to each plane, also with ends that differ."""
+    rows = []
+    for ends in ((0, 1), (0,)):
+        found = solve(skewed(np.pi / 4 + off, 1e6, ends), 8, np.array([2.0]))
+        frequency = found.frequency_hz[0]
+        order = np.argsort(frequency.T.ravel(), kind="stable")
+        np.testing.assert_array_equal(order // 2, np.repeat(np.arange(8), 2))
+        assert np.all(np.diff(frequency, axis=1) > 0)
+        rows.append(frequency)
+    assert len(rows) == 2
+
+
+def test_a_slight_coupling_is_hardly_any() -> None:
+    """Planes of different springs with a weak cross term: second order in it."""
+    straight = on_springs(clamped(), np.array([[1e6, 5e6]]), np.array([[2e6, 8e6]]))
+    compliance = straight.rotational_compliance_rad_n_m.copy()
+    compliance[:, 0, 0, 1] = compliance[:, 0, 1, 0] = 1e-12
+    coupled = replace(straight, rotational_compliance_rad_n_m=compliance)
+    one, other = (solve(each, 8, np.array([3.0])) for each in (straight, coupled))
+    np.testing.assert_allclose(other.frequency_hz, one.frequency_hz, rtol=1e-7)
+    np.testing.assert_allclose(np.abs(other.shape), np.abs(one.shape), atol=1e-3)
+
+
+def test_coupled_planes_of_different_stiffness() -> None:
+    """The frequencies do not depend on which plane is called the first."""
+    stiff = np.array([[EI, 1.7 * EI]])
+    one = replace(skewed(0.5, 2e6), bending_stiffness_n_m2=stiff)
+    other = replace(skewed(np.pi / 2 - 0.5, 2e6), bending_stiffness_n_m2=stiff[:, ::-1])
+    np.testing.assert_allclose(
+        solve(one, 6, NOWHERE).frequency_hz,
+        solve(other, 6, NOWHERE).frequency_hz[:, ::-1],
+        rtol=1e-9,
+    )
+
+
+def test_one_hanger_or_none_can_be_solved() -> None:
+    assert frequencies_hz(PhysicalHanger.clamped(HANGER_3, np.empty(0)), 5).shape == (0, 2, 5)
+    assert frequencies_hz(clamped(1), 5).shape == (1, 2, 5)

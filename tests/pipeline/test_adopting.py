@@ -1,0 +1,324 @@
+"""An adopted effect is in the hanger's class from the next test on; dropping it restores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, NothingThere, UsageError
+from shm.models import Model, build
+from shm.pipeline import adopting, steps
+from shm.pipeline.adopting import Wish, adopt, gap_watch
+from shm.pipeline.naming import adopted_name
+from shm.pipeline.reporting import hanger_report
+from shm.store import Lineage, Store, StoredAdoption, Workspace
+from shm.update import UpdateOptions
+from shm.values import ModalTest, Posterior, PredictedFrequency
+from tests.helpers import quick_update
+from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis
+from tests.helpers.flows import Clock, Postman, ingest
+from tests.helpers.workspaces import START, make_workspace, put, write_test
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+MASS_MODEL = "beam1+point_mass@everywhere"
+_UPDATE = quick_update.update
+STIFFNESS = "beam1+bending_stiffness@everywhere"
+
+
+def spool(workspace: Workspace, name: str, **values: float) -> None:
+    write_test(workspace.spool / f"{name}.modes.json", workspace, **values)  # type: ignore[arg-type]
+
+
+def quick(
+    tests: Sequence[ModalTest], model: Model, options: UpdateOptions, *_: Any, **__: Any
+) -> Posterior:
+    """The stand-in for the sampler; adopted classes predict 0.2 % off, others 2 %."""
+    found = _UPDATE(tests, model, options)
+    off = 1.002 if "+" in model.name else 1.02
+    predicted = tuple(
+        PredictedFrequency(m.plane, m.order, m.frequency_hz * off, 0.01, m.frequency_hz)
+        for test in tests
+        for m in test.modes
+    )
+    return replace(found, predicted=predicted)
+
+
+@pytest.fixture(autouse=True)
+def _quick_gaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adopting, "update", quick)
+    monkeypatch.setattr(quick_update, "update", quick)
+    monkeypatch.setattr(
+        steps, "refresh", lambda tests, model, known, options: quick(tests, model, options)
+    )
+
+
+@pytest.fixture
+def begun(workspace: Workspace) -> Workspace:
+    """One test in beam1, which is the baseline."""
+    spool(workspace, "t1")
+    ingest(workspace)
+    return workspace
+
+
+def wish(*effects: str, at: Sequence[str] = (), baseline: str = "", why: str = "a lamp") -> Wish:
+    return Wish(effects, tuple(at), baseline, why, "engineer")
+
+
+def adopted(workspace: Workspace, *effects: str, at: Sequence[str] = ()) -> StoredAdoption:
+    hanger = workspace.bridge.hanger(3)
+    with workspace.store() as store:
+        return adopt(workspace, store, hanger, wish(*effects, at=at), START)
+
+
+def models(store: Store) -> dict[str, str]:
+    return {test.test.id: posterior.model for test, posterior in store.history(3)}
+
+
+def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace) -> None:
+    made = adopted(begun, "point_mass")
+    assert made.adoption.model == MASS_MODEL
+    assert made.adoption.gap_percent == pytest.approx(0.2)
+    spool(begun, "t2", day=1, tension=1.01)
+    ingest(begun)
+    with begun.store() as store:
+        assert models(store) == {"t1": MASS_MODEL, "t2": MASS_MODEL}
+        (drift,) = store.drifts(3)
+        assert (drift.test, drift.shift_mean) == ("t2", pytest.approx(0.01, abs=0.005))
+        baseline, selection = store.baseline(3), store.selection(3)
+        assert baseline is not None
+        assert (baseline.posterior.tests, baseline.why) == (
+            ("t1",),
+            f"adopted {MASS_MODEL}: a lamp",
+        )
+        assert selection is not None
+        assert {p.model for p in selection.selection.posteriors} == {"beam1", MASS_MODEL}
+        assert sum(selection.selection.probabilities) == pytest.approx(1)
+
+
+def test_dropping_it_restores_class_and_baseline_for_the_next_test(begun: Workspace) -> None:
+    made = adopted(begun, "point_mass")
+    spool(begun, "t2", day=1)
+    ingest(begun)
+    with begun.store() as store:
+        store.drop_adoption(made.id, "taken off", "engineer", START)
+    spool(begun, "t3", day=2)
+    ingest(begun)
+    with begun.store() as store:
+        assert models(store) == {"t1": "beam1", "t2": MASS_MODEL, "t3": "beam1"}
+        assert [drift.test for drift in store.drifts(3)] == ["t2", "t3"]
+        assert store.alerts() == ()
+        assert gap_watch(store, 3) is None
+
+
+def test_a_test_updated_before_the_adoption_is_watched_against_its_own_class(
+    begun: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[str, str]] = []
+    watch = steps.watch_test
+
+    def note(baseline, current, *others):  # type: ignore[no-untyped-def]
+        if current.tests == ("t2",) and not seen:
+            adopted(begun, "point_mass")
+        seen.append((baseline.posterior.model, current.model))
+        return watch(baseline, current, *others)
+
+    monkeypatch.setattr(steps, "watch_test", note)
+    for day in (1, 2):
+        spool(begun, f"t{day + 1}", day=day)
+        ingest(begun)
+    assert seen == [("beam1", "beam1"), (MASS_MODEL, MASS_MODEL)]
+
+
+def test_the_gap_is_told_before_with_and_since_the_adoption(begun: Workspace) -> None:
+    adopted(begun, "point_mass")
+    with begun.store() as store:
+        watch = gap_watch(store, 3)
+        assert "2.00 % rms before adoption, 0.20 % with it, no test since." in str(watch)
+    spool(begun, "t2", day=1)
+    ingest(begun)
+    with begun.store() as store:
+        watch = gap_watch(store, 3)
+        assert watch is not None
+        assert watch.now_percent == pytest.approx(0.2)
+        assert not watch.has_grown
+        report = hanger_report(begun, store, 3, START)
+        assert report.gap_watch == str(watch)
+        assert report.baseline is not None
+        assert report.baseline.model == report.posterior.model == MASS_MODEL
+
+
+def test_a_gap_that_opens_again_is_one_alert(
+    begun: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adopted(begun, "point_mass")
+
+    def opened(tests, model, known, options):  # type: ignore[no-untyped-def]
+        found = quick(tests, model, options)
+        rows = [replace(row, mean_hz=1.01 * row.measured_hz) for row in found.predicted]
+        return replace(found, predicted=tuple(rows))
+
+    monkeypatch.setattr(steps, "refresh", opened)
+    for day in (1, 2):
+        spool(begun, f"t{day + 1}", day=day)
+    postman = Postman()
+    ingest(begun, notifier=postman)
+    with begun.store() as store:
+        (stored,) = store.alerts()
+        watch = gap_watch(store, 3)
+    assert stored.alert.key.startswith("hanger-3:gap-up:baseline-")
+    assert "1.00 % off the measured ones, 0.20 % when it was adopted" in stored.alert.message
+    assert [key for _, key in postman.told] == [stored.alert.key]
+    assert watch is not None
+    assert str(watch).endswith("1.00 % now, grown: diagnose it again.")
+
+
+def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
+    begun: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adopted(begun, "point_mass")
+    monkeypatch.setattr(steps, "watch_gap", lambda *a, **k: _gap_alert(*a, **k))
+    spool(begun, "t2", day=1, tension=0.8)
+    ingest(begun)
+    with begun.store() as store:
+        (stored,) = store.alerts()
+    assert stored.alert.key.startswith("hanger-3:tension-down:gap-up:baseline-")
+    assert "tension moved" in stored.alert.message
+    assert stored.alert.message.endswith("The gap opened.")
+
+
+def _gap_alert(_before: Any, _now: Any, hanger: Any, *, test: str, time: Any) -> Any:
+    from shm.values import Alert
+
+    return Alert(f"hanger-{hanger.id}:gap-up", hanger.id, test, time, "The gap opened.", ())
+
+
+def test_there_is_nothing_to_adopt_before_the_first_test(workspace: Workspace) -> None:
+    with pytest.raises(NothingThere, match="no baseline yet"):
+        adopted(workspace, "point_mass")
+
+
+def test_adopting_twice_is_refused_before_the_work(
+    begun: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adopted(begun, "point_mass")
+    monkeypatch.setattr(adopting, "update", lambda *a, **k: pytest.fail("computed"))
+    with pytest.raises(UsageError, match="already"):
+        adopted(begun, "point_mass")
+
+
+def test_where_it_acts_must_be_said_where_no_diagnosis_tells(begun: Workspace) -> None:
+    with pytest.raises(UsageError, match=r"--at, one of deck_end, arch_end, both_ends") as caught:
+        adopted(begun, "effective_length")
+    assert "shm gap diagnose --hanger 3" in caught.value.remedy
+    made = adopted(begun, "effective_length", at=["deck end"])
+    assert made.adoption.model == "beam1+effective_length@deck_end"
+    assert (made.adoption.at, made.adoption.diagnosis_id) == ("deck end", None)
+
+
+def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Workspace) -> None:
+    ends = replace(MASS, effect="effective_length", at="arch end", parameters=())
+    pair = replace(MASS, effect="sag + effective_length", at="everywhere, transverse + both ends")
+    found = replace(a_diagnosis(causes=(MASS, ends, pair)), baseline="beam2")
+    with begun.store() as store:
+        stored = store.add_diagnosis(3, found, LINEAGE, START)
+    made = adopted(begun, "effective_length")
+    assert made.adoption.model == "beam2+effective_length@arch_end"
+    assert made.adoption.diagnosis_id == stored.id
+    both = adopted(begun, "effective_length", "sag")
+    assert both.adoption.model == "beam2+effective_length@both_ends+sag@everywhere.transverse"
+
+
+def test_what_single_tests_cannot_show_takes_its_size_from_the_diagnosis(
+    begun: Workspace,
+) -> None:
+    hanger = begun.bridge.hanger(3)
+    with begun.store() as store:
+        for day, temperature in ((1, 5.0), (2, 16.0)):
+            test = write_test(begun.spool / "w.modes.json", begun, day=day, name=f"w{day}")
+            put(begun.spool / "w.modes.json", _with_temperature(test, temperature))
+            ingest(begun)
+        tests = store.tests(3)
+        with pytest.raises(BadInput, match="must come from a diagnosis"):
+            adopted_name(["temperature_tension"], (), "beam1", hanger, None, tests)
+        diagnosis = store.add_diagnosis(3, a_diagnosis(("w1", "w2")), LINEAGE, START)
+        name = adopted_name(["temperature_tension"], (), "", hanger, diagnosis, tests)
+    estimate = WARMTH.parameters[0]
+    model = build(str(name), hanger)
+    low, high = model.bounds["tension_per_kelvin_n_k"]
+    assert str(name).startswith("beam1+temperature_tension@everywhere:reference_c=10.5:")
+    shares = np.linspace(low, high, 10001)
+    np.testing.assert_allclose(
+        np.quantile(shares, [0.05, 0.95]), [estimate.q05, estimate.q95], rtol=1e-3
+    )
+
+
+def test_where_an_effect_sits_stays_as_diagnosed_and_its_size_is_free(begun: Workspace) -> None:
+    hanger = begun.bridge.hanger(3)
+    with begun.store() as store:
+        diagnosis = store.add_diagnosis(3, a_diagnosis(), LINEAGE, START)
+        tests = store.tests(3)
+    name = adopted_name(["point_mass"], (), "", hanger, diagnosis, tests)
+    assert str(name) == f"{MASS_MODEL}:x_m=3.31111..3.48889"
+    elsewhere = replace(MASS, at="nowhere")
+    other = replace(diagnosis, diagnosis=a_diagnosis(causes=[elsewhere]))
+    assert str(adopted_name(["point_mass"], ["everywhere"], "", hanger, other, tests)) == MASS_MODEL
+
+
+def _with_temperature(test: ModalTest, temperature_c: float) -> str:
+    from shm.documents import dump, modes_document
+
+    return dump(modes_document([replace(test, temperature_c=temperature_c)]))
+
+
+def test_an_effect_of_the_temperature_needs_tests_with_temperatures(begun: Workspace) -> None:
+    with pytest.raises(BadInput, match="no test of hanger 3 has"):
+        adopted(begun, "temperature_tension")
+
+
+def test_each_effect_needs_its_place(begun: Workspace) -> None:
+    with pytest.raises(UsageError, match=r"2 effect\(s\) and 1 place"):
+        adopted(begun, "point_mass", "sag", at=["everywhere"])
+
+
+def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
+    adopted(begun, "bending_stiffness", at=["everywhere"])
+    with begun.store() as store:
+        posteriors = {each.posterior.model: each for each in store.posteriors(3)}
+        test = store.tests(3)[0]
+    assert posteriors.keys() == {STIFFNESS}
+    lineage = posteriors[STIFFNESS].lineage
+    assert lineage.input_sha256
+    assert lineage != test.lineage
+
+
+@pytest.mark.usefixtures("real_sampler")
+def test_adopting_with_the_real_sampler_closes_the_gap(
+    begun: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from shm.update import update
+
+    monkeypatch.setattr(adopting, "update", update)
+    made = adopted(begun, "bending_stiffness", at=["everywhere"])
+    assert made.adoption.model == STIFFNESS
+    assert made.adoption.gap_percent < 0.05
+
+
+def test_a_workspace_with_the_adoption_ingests_with_any_executor(tmp_path: Any) -> None:
+    workspace = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 2})
+    for day in (1, 2):
+        spool(workspace, f"t{day}", day=day)
+    ingest(workspace)
+    made = adopted(workspace, "point_mass")
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert baseline.posterior.tests == ("t1", "t2")
+        assert made.adoption.gap_before_percent == pytest.approx(2.0)
+    spool(workspace, "t3", day=3)
+    ingest(workspace, clock=Clock(), lanes=2)
+    with workspace.store() as store:
+        assert models(store)["t3"] == MASS_MODEL

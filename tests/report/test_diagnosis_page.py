@@ -1,0 +1,131 @@
+"""A gap diagnosis as a page, in a terminal, as a document and inside a hanger's report."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from shm import documents, report
+from shm.report import DiagnosisSheet, HangerReport
+from tests.report.diagnoses import CASES, HANGER, LED, sheet
+from tests.report.outline import Outline
+
+PAGES = ("led", "alike", "nothing known")
+
+
+@pytest.fixture(scope="module")
+def pages() -> dict[str, str]:
+    return {name: report.diagnosis_page(sheet(name)) for name in PAGES}
+
+
+def parsed(page: str) -> Outline:
+    outline = Outline()
+    outline.feed(page)
+    return outline
+
+
+def told(outline: Outline) -> str:
+    return " ".join(" ".join(outline.words).split())
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_nest_fetch_nothing_and_have_sound_headings(name: str, pages: dict[str, str]) -> None:
+    outline = parsed(pages[name])
+    assert outline.open == []
+    for tag, attributes in outline.tags:
+        assert tag not in {"script", "link", "iframe"}
+        assert not {"src", "srcset", "data", "action"} & attributes.keys()
+    assert not re.search(r"url\((?!#)|@import", pages[name])
+    ids = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    levels = [int(tag[1]) for tag, _ in outline.tags if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_say_nan_nowhere(name: str, pages: dict[str, str]) -> None:
+    assert not re.search(r"\b(nan|inf|None(?! of))\b", told(parsed(pages[name])))
+
+
+def test_the_page_leads_with_the_cause_its_size_place_and_probability(
+    pages: dict[str, str],
+) -> None:
+    page = told(parsed(pages["led"]))
+    cause = "a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7), probability 0.930."
+    assert page.index("Explained") < page.index(cause) < page.index("What causes the gap")
+
+
+def test_remarks_on_bad_data_stand_beside_the_answer(pages: dict[str, str]) -> None:
+    page = told(parsed(pages["led"]))
+    assert page.index("transverse 9 and 10 are out of order") < page.index("What causes the gap")
+    assert "What to mind about these data" not in told(parsed(pages["alike"]))
+
+
+def test_the_page_tells_what_these_data_cannot_show_and_why(pages: dict[str, str]) -> None:
+    page = told(parsed(pages["led"]))
+    assert "sensor misalignment No test has shapes of biaxial sensors." in page
+
+
+def test_words_from_outside_cannot_inject_markup() -> None:
+    sly = "<script>alert(1)</script>"
+    remarked = replace(CASES["nothing known"], remarks=(sly,))
+    page = report.diagnosis_page(DiagnosisSheet(remarked, HANGER, bridge=sly))
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_texts_fit_a_terminal(name: str) -> None:
+    text = report.diagnosis_text(sheet(name))
+    assert max(len(line) for line in text.splitlines()) <= 100
+    assert len(text.splitlines()) < 100
+    assert not re.search(r"\b(nan|inf|None(?! of))\b", text)
+
+
+def test_a_shortened_table_of_causes_keeps_no_gap_and_something_else() -> None:
+    text = report.diagnosis_text(sheet("led"))
+    table = text[text.index("CAUSES") : text.index("SIZES")]
+    assert "no gap" in table
+    assert "something not in" in table
+    assert "4 more rows" in " ".join(table.split())
+
+
+def test_causes_that_cannot_be_told_apart_share_a_letter() -> None:
+    text = report.diagnosis_text(sheet("alike"))
+    marked = [line for line in text.splitlines() if re.search(r"0\.\d{3} +A ", line)]
+    assert len(marked) == 3
+
+
+def test_the_document_holds_the_contract_and_the_answer_in_words() -> None:
+    document = json.loads(documents.dump(report.diagnosis_json(sheet("led"))))
+    assert document["answer"] == "explained"
+    assert document["summary"].startswith("The gap is explained by a point mass of 12 kg")
+    assert document["causes"][0]["effect"] == "point_mass"
+    assert document["tension_n"]["after"]["mean"] == pytest.approx(702.3e3)
+
+
+def test_a_report_without_diagnosis_says_how_to_make_one(bare: HangerReport) -> None:
+    for written in (told(parsed(report.html(bare))), " ".join(report.text(bare).split())):
+        assert "shm gap diagnose --hanger 3" in written
+    assert report.json(bare)["diagnosis"] is None
+
+
+def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: HangerReport) -> None:
+    watched = "beam1 with point mass, adopted 2026-05-01: gap 2.30 % before, 0.62 % now."
+    diagnosed = replace(bare, diagnosis=LED, gap_watch=watched)
+    outline = parsed(report.html(diagnosed))
+    assert outline.open == []
+    names = {attributes.get("id") for _, attributes in outline.tags}
+    assert {"causes-title", "gap_map-title", "before_and_after-title"} <= names
+    for written in (told(outline), " ".join(report.text(diagnosed).split())):
+        assert "explained by a point mass of 12 kg" in written
+        assert watched in written
+        assert "has not been diagnosed" not in written
+    document = report.json(diagnosed)
+    assert document["diagnosis"]["causes"][0]["effect"] == "point_mass"
+    assert document["gap_watch"] == watched

@@ -1,0 +1,215 @@
+"""What a gap diagnosis claims, in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shm.models.effects import EFFECTS, Survey
+from shm.report import DiagnosisSheet
+from shm.report.diagnosis.content import Answer, answer, claimed
+from shm.report.diagnosis.phrases import PHRASES, label, phrase, title
+from shm.report.diagnosis.sizes import size
+from shm.report.diagnosis.summary import summary
+from shm.values import (
+    NAN,
+    AddedMass,
+    Cause,
+    Diagnosis,
+    EffectEstimate,
+    NextMeasurement,
+    Shrinkage,
+)
+from tests.report.diagnoses import (
+    ALIKE,
+    CASES,
+    HANGER,
+    LED,
+    MASS,
+    NO_GAP,
+    UNDECIDED,
+    UNEXPLAINED,
+    make_cause,
+)
+
+RICH = Survey(
+    tests=("t1", "t2"), planes=("transverse", "longitudinal"), sensor_places_m=(2.0, 4.0),
+    biaxial=True, temperatures_c=(5.0, 25.0), amplitudes=(0.5, 2.0),
+    added_masses=(AddedMass(25.0, 3.6),),
+)  # fmt: skip
+
+
+def said(diagnosis: Diagnosis) -> str:
+    return summary(DiagnosisSheet(diagnosis, HANGER))
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("led", Answer.EXPLAINED),
+        ("alike", Answer.ALIKE),
+        ("no gap", Answer.NO_GAP),
+        ("unexplained", Answer.UNEXPLAINED),
+        ("undecided", Answer.UNDECIDED),
+        ("one mode", Answer.NO_GAP),
+        ("nothing known", Answer.UNDECIDED),
+    ],
+)
+def test_the_answer_in_a_word(name: str, found: Answer) -> None:
+    assert answer(CASES[name]) is found
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "words"),
+    [
+        (LED, "The gap is explained by a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7), "
+              "probability 0.930."),
+        (LED, "With it the frequencies' error shrinks from 2.3 % to 0.21 % (rms) and, where they "
+              "were held out of the fit, from 2.5 % to 0.34 %."),
+        (LED, "With the cause the tension is 702 kN (690 to 715); the baseline beam1 alone gives "
+              "731.4 kN (728.0 to 734.9), +4.1 %."),
+        (LED, "To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m "
+              "(expected log Bayes factor 6.0)."),
+        (LED, "The gap changes with the order of the mode (+1.40 % over its range)."),
+        (ALIKE, "or what these data cannot tell from it: effective length (both ends) and "
+                "bending stiffness; together probability 0.900."),
+        (NO_GAP, "No gap: the baseline beam1 explains the measurements, probability 0.920."),
+        (replace(NO_GAP, no_gap_probability=0.7), "Most likely no gap: the baseline beam1"),
+        (UNEXPLAINED, "Most likely none of the effects that were tried (rotational end "
+                      "flexibility left out) explains it: the probability of something else is "
+                      "0.870."),
+        (replace(UNEXPLAINED, left_out=(), unexplained_probability=0.95),
+         "None of the effects in the catalogue explains it"),
+        (UNEXPLAINED, "The likeliest effect is a point mass of 12 kg (9 to 15)"),
+        (UNEXPLAINED, "Allowing for the unknown the tension is 702 kN"),
+        (UNDECIDED, "Undecided: these data leave open point mass (0.300), sag (0.250) and no gap "
+                    "(0.250)."),
+        (UNDECIDED, "With point mass the frequencies' error shrinks"),
+        (replace(LED, fit_p_value=0.002), "Even so the fit is poor"),
+    ],
+)  # fmt: skip
+def test_the_paragraph_says(diagnosis: Diagnosis, words: str) -> None:
+    assert words in said(diagnosis)
+
+
+def test_a_group_is_claimed_by_its_sum_where_no_member_leads_alone() -> None:
+    shared = [replace(cause, probability=0.2, group=0) for cause in ALIKE.causes[:3]]
+    diagnosis = replace(
+        ALIKE, causes=tuple(shared), no_gap_probability=0.38, unexplained_probability=0.02
+    )
+    claim = claimed(diagnosis)
+    assert claim is not None
+    assert claim.probability == pytest.approx(0.6)
+    assert "is most likely due to ends that turn" in said(diagnosis)
+
+
+def test_a_gap_that_shrinks_only_where_it_was_fitted_is_not_relied_on() -> None:
+    only_inside = replace(LED, shrinkage=Shrinkage(2.3, 0.2, 2.5, 2.6))
+    assert "but not where they were held out of the fit" in said(only_inside)
+    assert "do not rely on it yet" in said(only_inside)
+    unchecked = replace(LED, shrinkage=Shrinkage(2.3, 0.2, NAN, NAN))
+    assert "nothing was held out of the fit to check that" in said(unchecked)
+
+
+def test_a_measurement_that_hardly_tells_is_not_recommended() -> None:
+    poor = NextMeasurement("two more modes", ("point_mass", "no gap"), 0.6)
+    assert "No measurement that was considered would tell point mass from no gap" in said(
+        replace(LED, next_measurements=(poor,))
+    )
+
+
+@pytest.mark.parametrize(
+    ("estimate", "words"),
+    [
+        (EffectEstimate("mass_kg", "kg", 12.13, 1.8, 9.2, 15.1), "12 kg (9 to 15)"),
+        (EffectEstimate("x_m", "m", 3.412, 0.04, 3.343, 3.478), "3.41 m (3.34 to 3.48)"),
+        (EffectEstimate("mass_kg", "kg", 1234.0, 300.0, 734.0, 1734.0), "1200 kg (700 to 1700)"),
+        (EffectEstimate("loss", "fraction", 0.081, 0.01, 0.065, 0.098), "8.1 % (6.5 to 9.8)"),
+        (EffectEstimate("log10_k1", "N m/rad", 6.8, 0.1, 6.6, 7.0), "6.3 MN m/rad (4.0 to 10)"),
+        (EffectEstimate("stiffness_n_m", "N/m", 4.2e4, 3e3, 3.7e4, 4.7e4), "42 kN/m (37 to 47)"),
+        (
+            EffectEstimate("stiffness_ratio", "times EI", 20.1, 20.0, 2.13, 80.4),
+            "20 times EI (2.1 to 80)",
+        ),
+        (EffectEstimate("mass_kg", "kg", 12.0, NAN, NAN, NAN), "12 kg"),
+        (EffectEstimate("mass_kg", "kg", NAN, NAN, NAN, NAN), "of unknown size kg"),
+    ],
+)
+def test_sizes_have_the_digits_that_their_intervals_deserve(
+    estimate: EffectEstimate, words: str
+) -> None:
+    assert str(size(estimate)) == words
+
+
+@pytest.mark.parametrize(
+    ("mean", "q05", "q95", "words"),
+    [
+        (0.12, 0.09, 0.15, "0.12 m (0.09 to 0.15) longer"),
+        (-0.12, -0.15, -0.09, "0.12 m (0.09 to 0.15) shorter"),
+        (0.02, -0.05, 0.09, "+0.02 m (-0.05 to +0.09) longer"),
+    ],
+)
+def test_directions_are_said_in_words_where_they_are_sure(
+    mean: float, q05: float, q95: float, words: str
+) -> None:
+    length = EffectEstimate("length_change_m", "m", mean, 0.02, q05, q95)
+    cause = make_cause("effective_length", 0.9, "deck end", parameters=(length,))
+    assert phrase(cause) == f"an effective length {words} than described at the deck end"
+
+
+def estimates(effect: str, at: str) -> Cause:
+    """A cause with each parameter of the effect in the middle of its prior."""
+    variant = next(v for v in EFFECTS[effect].variants(HANGER, RICH) if v.at == at)
+    found = []
+    for parameter in EFFECTS[effect].parameters(HANGER, variant):
+        middle = (parameter.lower + parameter.upper) / 2
+        width = 0.1 * (parameter.upper - parameter.lower)
+        found.append(
+            EffectEstimate(
+                parameter.name, parameter.unit, middle, width, middle - width, middle + width
+            )
+        )
+    return make_cause(effect, 0.9, at, parameters=tuple(found))
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_every_effect_of_the_catalogue_is_put_in_words_with_its_size_at_every_place(
+    effect: str,
+) -> None:
+    assert effect in PHRASES
+    for variant in EFFECTS[effect].variants(HANGER, RICH):
+        told = phrase(estimates(effect, variant.at))
+        assert not told.startswith(title(effect) + " at")
+        assert told.count("(") >= 1
+        assert "_" not in told
+
+
+def test_a_pair_is_told_with_both_sizes_and_places() -> None:
+    turned = EffectEstimate("log10_k1", "N m/rad", 6.8, 0.1, 6.6, 7.0)
+    pair = make_cause(
+        "point_mass + rotational_end_flexibility", 0.9, "everywhere + deck end, transverse",
+        parameters=(*MASS, turned),
+    )  # fmt: skip
+    assert phrase(pair) == (
+        "a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7) together with ends that turn "
+        "against springs of 6.3 MN m/rad (4.0 to 10) at the deck end in the transverse plane"
+    )
+    assert label(pair) == "point mass + rotational end flexibility (deck end, transverse)"
+
+
+def test_a_pair_whose_effects_share_a_name_tells_each_its_own() -> None:
+    found = tuple(
+        EffectEstimate(name, unit, mean, 0.1 * mean, 0.8 * mean, 1.2 * mean)
+        for name, unit, mean in (
+            ("mass_kg", "kg", 10.0), ("point_mass.x_m", "m", 3.0),
+            ("intermediate_support.x_m", "m", 9.0), ("stiffness_n_m", "N/m", 5e4),
+        )
+    )  # fmt: skip
+    told = phrase(make_cause("point_mass + intermediate_support", 0.9, parameters=found))
+    assert "a point mass of 10.0 kg (8.0 to 12.0) at 3.0 m" in told
+    assert "an intermediate support of 50 kN/m (40 to 60) at 9.0 m" in told
+
+
+def test_a_cause_of_unknown_size_is_told_by_its_name() -> None:
+    assert phrase(make_cause("sag", 0.9, "everywhere, transverse")) == "sag in the transverse plane"

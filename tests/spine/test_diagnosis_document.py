@@ -1,0 +1,48 @@
+"""The document of a gap diagnosis: what is written is read back, and it keeps the contract."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+
+import pytest
+
+from shm.diagnosis_document import diagnosis_document, diagnosis_of
+from shm.documents import dump
+from shm.values import Diagnosis
+from tests.report.diagnoses import CASES, LED
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_diagnosis_is_read_back_as_it_was(name: str) -> None:
+    text = dump(diagnosis_document(CASES[name]))
+    assert "NaN" not in text
+    assert repr(diagnosis_of(json.loads(text))) == repr(CASES[name])
+
+
+def test_the_document_has_the_names_and_nesting_of_the_contract() -> None:
+    document = diagnosis_document(LED)
+    assert document["baseline"] == "beam1"
+    assert {"plane", "order", "test", "residual_percent", "z", "share"} <= set(document["where"][0])
+    cause = document["causes"][0]
+    assert {"effect", "probability", "log_bayes_factor", "group", "at"} <= set(cause)
+    assert cause["parameters"]["mass_kg"] == {
+        "unit": "kg", "mean": 12.1, "sd": 1.8, "q05": 9.2, "q95": 15.1,
+    }  # fmt: skip
+    assert set(document["shrinkage"]) == {
+        "rms_before_percent", "rms_after_percent", "held_out_before_percent",
+        "held_out_after_percent",
+    }  # fmt: skip
+    assert {"mean", "sd"} <= set(document["tension_n"]["before"])
+    assert {"mean", "sd"} <= set(document["tension_n"]["after"])
+    assert document["next_measurement"][0] == {
+        "what": "known mass of 25 kg at 3.6 m", "separates": ("point_mass", "section_loss"),
+        "expected_log_bayes_factor": 6.04,
+    }  # fmt: skip
+    assert document["no_gap_probability"] == 0.0004
+    assert document["unexplained_probability"] == 0.03
+
+
+def test_no_field_of_a_diagnosis_is_left_out() -> None:
+    renamed = {"tension_before_n", "tension_after_n", "next_measurements"}
+    assert {field.name for field in fields(Diagnosis)} - renamed <= set(diagnosis_document(LED))

@@ -1,0 +1,123 @@
+"""Each test is predicted under its own conditions, those alike to the class in one evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.models import Model, build
+from shm.models.conditions import Conditions
+from shm.simulate import HangerState, TestConditions, planted_modes
+from shm.update import UpdateOptions, update
+from shm.update.likelihood import Likelihood
+from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
+from tests.helpers.hangers import HANGER_3
+
+WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
+SD = 1e-3
+SPRINGS = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
+
+
+def measured(
+    model: Model, theta: np.ndarray, tests: list[ModalTest], modes: int = 6, seed: int = 1
+) -> list[ModalTest]:
+    """`tests` with the frequencies that the model gives them, each off by 0.1 %."""
+    rng, found = np.random.default_rng(seed), []
+    for test in tests:
+        exact = model.frequencies_at(theta, modes, model.conditions(test))[0]
+        noisy = exact * (1 + SD * rng.standard_normal(exact.shape))
+        rows = tuple(
+            Mode(plane, order + 1, float(noisy[row, order]), float(SD * exact[row, order]))
+            for row, plane in enumerate(PLANES)
+            for order in range(modes)
+        )
+        found.append(replace(test, modes=rows))
+    return found
+
+
+def parameters(model: Model, **values: float) -> np.ndarray:
+    known = {"theta_F": 1.0, **values}
+    return np.array([[known.get(name, 0.0) for name in model.parameter_names]])
+
+
+def a_test(name: str, temperature_c: float = NAN, mass: AddedMass | None = None) -> ModalTest:
+    return ModalTest(name, (), 3, temperature_c=temperature_c, added_mass=mass)
+
+
+def test_each_test_is_predicted_under_its_own_conditions() -> None:
+    model = build(WARMTH, HANGER_3)
+    theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
+    tests = measured(model, theta, [a_test("a", 10.0), a_test("b", 25.0), a_test("c", 10.0)])
+    tests[1] = replace(tests[1], modes=tests[1].modes[3:8])
+    predicted = Likelihood(tests).predict(model, theta)
+    assert predicted.shape == (1, 12 + 5 + 12)
+    np.testing.assert_array_equal(predicted[:, :12], predicted[:, 17:])
+    warm = model.frequencies_at(theta, 6, Conditions(temperature_shift_k=15.0))
+    np.testing.assert_array_equal(predicted[0, 12:17], warm.ravel()[3:8])
+    exact = np.array([mode.frequency_hz for test in tests for mode in test.modes])
+    np.testing.assert_allclose(predicted[0], exact, rtol=5 * SD)
+
+
+def test_tests_alike_to_the_class_are_one_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, asked = build("beam1", HANGER_3), []
+    evaluate = model.frequencies_hz
+    theta = np.array([[1.0, 1.0]])
+    tests = measured(model, theta, [a_test("a", 10.0), a_test("b", 25.0)])
+
+    def count(theta, modes):  # type: ignore[no-untyped-def]
+        asked.append(modes)
+        return evaluate(theta, modes)
+
+    monkeypatch.setattr(model, "frequencies_hz", count)
+    predicted = Likelihood(tests).predict(model, theta)
+    assert asked == [6]
+    np.testing.assert_array_equal(predicted[:, :12], predicted[:, 12:])
+
+
+def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
+    """A strand with 30 % less bending stiffness: the clamped rod puts its tension 5 % off."""
+    model = build("beam1+bending_stiffness@everywhere", HANGER_3)
+    theta = parameters(model, stiffness_change=-0.3)
+    (test,) = measured(model, theta, [a_test("a")])
+    options = UpdateOptions(samples=200)
+    found = update([test], model, options)
+    low, high = np.quantile(found.tension_n, [0.025, 0.975])
+    assert low < HANGER_3.nominal_tension_n < high
+    assert found.parameter("stiffness_change").mean() == pytest.approx(-0.3, abs=0.08)
+    assert max(abs(p.mean_hz / p.measured_hz - 1) for p in found.predicted) < 4 * SD
+    assert found.r_hat < 1.1
+
+
+def test_tests_at_two_temperatures_tell_the_tension_at_the_reference() -> None:
+    size = "tension_per_kelvin_n_k=-3300..-2700"
+    model = build(f"{WARMTH}:{size}", HANGER_3)
+    theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
+    (test,) = measured(model, theta, [a_test("a", 25.0)])
+    found = update([test], model, UpdateOptions(samples=200))
+    assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.02)
+    ignored = update([test], build("beam1", HANGER_3), UpdateOptions(samples=200))
+    assert ignored.tension_n.mean() < 0.96 * HANGER_3.nominal_tension_n
+
+
+@pytest.mark.parametrize("name", ["beam1", "beam1+bending_stiffness@everywhere"])
+def test_a_known_mass_is_part_of_the_prediction_and_not_of_the_tension(name: str) -> None:
+    adopted = build("beam1+bending_stiffness@everywhere", HANGER_3)
+    laden = a_test("a", mass=AddedMass(25.0, 3.6))
+    (test,) = measured(adopted, parameters(adopted), [laden], modes=4)
+    found = update([test], build(name, HANGER_3), UpdateOptions(samples=100))
+    assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["beam1", "beam2"])
+def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
+    """Beam classes take the mass's share from the general model; the simulator has its own."""
+    model, springs = build(name, HANGER_3), (2e7, 4e7, 8e7, 6e7)
+    given = dict(zip(SPRINGS, np.log10(springs), strict=True))
+    theta = model.pack({"theta_F": 1.0, "theta_L": 1.0, **(given if name == "beam2" else {})})
+    mass = AddedMass(25.0, 3.6)
+    found = model.frequencies_at(theta[None], 6, Conditions(added_mass=mass))[0]
+    state = HangerState(HANGER_3.nominal_tension_n, *(springs if name == "beam2" else ()))
+    planted = planted_modes(HANGER_3, state, (), TestConditions(added_mass=mass), 6, ())
+    np.testing.assert_allclose(found, planted.frequency_hz, rtol=2e-6)
