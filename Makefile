@@ -15,7 +15,7 @@ demo: .venv/runtime
 	$(BIN)/shm demo
 
 test: lint
-	$(BIN)/python -m pytest --quiet
+	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile
 
 lint: .venv/development
 	$(BIN)/ruff check .

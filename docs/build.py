@@ -1,4 +1,4 @@
-"""Makes the generated pages: commands, settings, and the validation tables.
+"""Makes the generated pages: commands, settings, effects, and the tables of validation and gap.
 
 python docs/build.py            # all, the tables included (two minutes)
 python docs/build.py --quick    # without the tables
@@ -14,6 +14,7 @@ from pathlib import Path
 import rich_click as click
 
 from docs.effects_page import effects_page
+from docs.gap_page import hanger_3_table
 from shm.settings import TABLE, Setting
 from shm_cli.main import VERBS, cli
 from shm_cli.validate import compared, markdown
@@ -97,6 +98,7 @@ def main() -> None:
     preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
     _fill_in(DOCS / "validation.md", "frequencies", computed)
     _fill_in(DOCS / "validation.md", "selection", preferred)
+    _fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])
     _fill_in(DOCS.parent / "README.md", "selection", short)

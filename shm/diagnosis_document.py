@@ -92,7 +92,8 @@ def _cause(document: Mapping[str, Any]) -> Cause:
         _noun(EffectEstimate, {**estimate, "name": name})
         for name, estimate in document["parameters"].items()
     )
-    return _noun(Cause, {**document, "parameters": parameters})
+    elsewhere = tuple(document["also_at"])
+    return _noun(Cause, {**document, "parameters": parameters, "also_at": elsewhere})
 
 
 def _next(document: Mapping[str, Any]) -> NextMeasurement:

@@ -11,6 +11,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
+from shm.report.words import model_class
 from shm.store import Store, StoredAdoption
 from shm_cli.common import (
     hanger_option,
@@ -182,7 +183,7 @@ def _row(document: dict[str, Any]) -> tuple[str, ...]:
     return (
         str(document["id"]),
         str(document["hanger"]),
-        document["model"],
+        model_class(document["model"]),
         f"{document['adopted_at']:%Y-%m-%d %H:%M}",
         document["who"],
         document["why"],

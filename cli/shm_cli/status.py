@@ -9,6 +9,7 @@ import rich_click as click
 
 from shm.models import applicable
 from shm.pipeline.adopting import GapWatch, gap_watch
+from shm.report.words import model_class
 from shm.store import DeliveryState, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
 
@@ -40,7 +41,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
             str(row["hanger"]),
             str(row["tests"]),
             f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
-            row["model"] or "none yet",
+            model_class(row["model"]) if row["model"] else "none yet",
             f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
         )
     show_table(made)
@@ -68,7 +69,7 @@ def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
     """Which classes compete and why others do not, each with the hangers that it is true of."""
     found: dict[str, list[str]] = {}
     for row in rows:
-        said = f"{', '.join(row['competing']) or 'no model class'} may compete"
+        said = f"{', '.join(map(model_class, row['competing'])) or 'no model class'} may compete"
         for reason, names in _by_reason(row["not_applicable"]).items():
             said += f"; {', '.join(names)} {'do' if names[1:] else 'does'} not apply: {reason}"
         found.setdefault(f"{said}.", []).append(str(row["hanger"]))

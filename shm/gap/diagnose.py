@@ -33,6 +33,9 @@ from shm.values import (
 _ATTRIBUTION = 0.85
 """The part of a diagnosis's time that goes into finding the cause."""
 
+_AS_LIKELY = 1.5
+"""Places of one effect whose log evidences differ by less are not told apart."""
+
 
 def diagnose(
     tests: Sequence[ModalTest],
@@ -105,6 +108,11 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
         parameters=_estimates(problem, best.fit) if best.fit else (),
         method=best.method,
         group=explanation.group,
+        also_at=tuple(
+            each.hypothesis.at
+            for each in explanation.variants
+            if each is not best and each.log_evidence > best.log_evidence - _AS_LIKELY
+        ),
     )
 
 

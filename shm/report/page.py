@@ -49,5 +49,5 @@ def _facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
             words.moment(data.latest.time),
             words.temperature(data.latest.temperature_c),
         ),
-        ("Model class", data.posterior.model, f"{len(modes)} modes identified"),
+        ("Model class", words.model_class(data.posterior.model), f"{len(modes)} modes identified"),
     )

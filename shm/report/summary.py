@@ -156,10 +156,10 @@ def _model(data: HangerReport) -> str:
 
 
 def _chosen(data: HangerReport) -> str:
-    model = data.posterior.model
+    model = words.model_class(data.posterior.model)
     if data.selection is None or len(data.selection.posteriors) < 2:
         return f"The model class is {model}"
-    names = [posterior.model for posterior in data.selection.posteriors]
+    names = [words.model_class(posterior.model) for posterior in data.selection.posteriors]
     if model not in names:
         return f"The model class is {model}"
     share = data.selection.probabilities[names.index(model)]

@@ -95,7 +95,7 @@ def quality(data: HangerReport) -> Table:
 def parameters(data: HangerReport) -> Table:
     posterior = data.posterior
     return Table(
-        f"Parameters of the model class {posterior.model}",
+        f"Parameters of the model class {words.model_class(posterior.model)}",
         ("name", "meaning", "mean", "90 % interval", "most probable"),
         tuple(_parameter_row(posterior, name) for name in posterior.names),
     )
@@ -129,7 +129,7 @@ def models(data: HangerReport) -> Table:
 def _model_row(posterior: Posterior, share: float) -> tuple[str, ...]:
     kilonewtons = words.kilonewtons(Interval.of_samples(posterior.tension_n))
     return (
-        posterior.model,
+        words.model_class(posterior.model),
         words.probability(share),
         f"{posterior.log_evidence:.2f}",
         words.number(posterior.log_evidence_sd, ".2f"),
@@ -153,7 +153,7 @@ def _history_row(row: TrendRow) -> tuple[str, ...]:
         row.test,
         words.number(row.temperature_c, ".1f", "not recorded")
         + (" °C" if math.isfinite(row.temperature_c) else ""),
-        row.model,
+        words.model_class(row.model),
         words.mean(kilonewtons),
         words.span(kilonewtons),
     )

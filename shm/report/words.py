@@ -130,6 +130,17 @@ def meaning(name: str, model: str) -> str:
     return _MEANINGS.get(name, name.replace("log10_", "log10 of ").replace("_", " "))
 
 
+def model_class(name: str) -> str:
+    """`beam1 + point mass (deck end)` of an adopted class's name, whose ranges are left out."""
+    baseline, *effects = name.split("+")
+    return " + ".join([baseline, *(_adopted(effect.partition(":")[0]) for effect in effects)])
+
+
+def _adopted(effect: str) -> str:
+    what, _, where = (part.replace("_", " ") for part in effect.partition("@"))
+    return what if where in ("", "everywhere") else f"{what} ({where.replace('.', ', ')})"
+
+
 def place(name: str, plane: str | None, x_m: float) -> str:
     """`acc_1, transverse, 2.52 m` of a sensor, as far as it is known."""
     known = (_shortened(name), plane or "", f"{x_m:.2f} m" if math.isfinite(x_m) else "")

@@ -21,6 +21,7 @@ from shm.update.mixture import TMixture
 from shm.update.problem import Points, Problem
 from shm.update.search import Anchors
 from shm.update.tmcmc import normalised, systematic
+from shm.update.valley import along
 from shm.values import FloatArray
 
 _CLUSTERS = 16
@@ -28,6 +29,8 @@ _TAIL_CLUSTERS = 6
 _FROM_TAILS = 0.35
 _LATER = 0.3
 _FROM_PRIOR = 0.1
+_VALLEY_CLUSTERS = 10
+_FROM_VALLEYS = 0.5
 _FROM_ANCHORS = 0.2
 _ENOUGH_ERROR = 0.06
 _UNSEEN = 1.25
@@ -111,37 +114,41 @@ def weigh(
     """Draws until `enough` effective ones and a standard error of 0.06, within reason.
 
     `population` (n, d) follows the posterior, each (n, d) of `wider` an earlier stage: these keep
-    a share of all proposals, for the tails. The first mixture holds the anchors too, lest the
-    population have missed one that matters. Where too few of the final draws are effective, they
-    become trials, and others are drawn.
+    a share of all proposals, for the tails. The first mixture holds the anchors and the valleys
+    through them too, lest the population have missed one that matters. Where too few of the final
+    draws are effective, they become trials, and others are drawn.
     """
     tails = _tails(wider, rng)
-    core = TMixture.of(population, _CLUSTERS, rng).joined(anchors.normals(0.0), _FROM_ANCHORS)
-    trial = _Pool(problem)
+    core = _first(problem, population, anchors, rng)
+    trial = _Pool(problem, tails)
     for _ in range(_ATTEMPTS):
-        core = _adapted(core, tails, trial, enough, rng)
-        final = _final(problem, _widened(core, tails), trial.share(), enough, rng)
+        core = _adapted(core, trial, enough, rng)
+        final = _Pool(problem, tails)
+        _fill(final, core, trial.share(), enough, rng)
         if final.weighted().effective_sample_size >= _POOR * enough:
             break
         trial.absorb(final)
     return final.weighted()
 
 
-def _adapted(
-    core: TMixture, tails: TMixture | None, trial: _Pool, enough: float, rng: np.random.Generator
+def _first(
+    problem: Problem, population: FloatArray, anchors: Anchors, rng: np.random.Generator
 ) -> TMixture:
+    """A mixture on the population, on the valleys through the anchors, and on the anchors."""
+    valleys = TMixture.of(along(problem, anchors, rng), _VALLEY_CLUSTERS, rng)
+    found = TMixture.of(population, _CLUSTERS, rng).mixed(valleys, _FROM_VALLEYS)
+    return found.joined(anchors.normals(0.0), _FROM_ANCHORS)
+
+
+def _adapted(core: TMixture, trial: _Pool, enough: float, rng: np.random.Generator) -> TMixture:
     """The mixture refitted to all trial draws, batch by batch."""
     for _ in range(_MOST_TRIALS):
-        trial.draw(_widened(core, tails), _TRIAL, rng)
+        trial.draw(core, _TRIAL, rng)
         weighted = trial.weighted()
         core = core.refitted(weighted.points.z, _to_fit(weighted))
         if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
             break
     return core
-
-
-def _widened(core: TMixture, tails: TMixture | None) -> TMixture:
-    return core.mixed(tails, _FROM_TAILS) if tails else core
 
 
 def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture | None:
@@ -153,22 +160,20 @@ def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture |
     return tails
 
 
-def _final(
-    problem: Problem, mixture: TMixture, share: float, enough: float, rng: np.random.Generator
-) -> _Pool:
+def _fill(
+    final: _Pool, core: TMixture, share: float, enough: float, rng: np.random.Generator
+) -> None:
     """Draws from one mixture, of which a `share` is expected to be effective.
 
     Their number is set beforehand: to stop as soon as the weights look even would prefer samples
     that have missed a large one.
     """
-    final = _Pool(problem)
     needed = max(enough, 1 / _AIMED_ERROR**2) / share
-    final.draw(mixture, int(np.clip(needed, _FEWEST, _MOST)), rng)
+    final.draw(core, int(np.clip(needed, _FEWEST, _MOST)), rng)
     for _ in range(_MOST_EXTENSIONS):
         if _suffices(final.weighted(), enough):
             break
-        final.draw(mixture, _EXTENSION, rng)
-    return final
+        final.draw(core, _EXTENSION, rng)
 
 
 def _suffices(weighted: Weighted, enough: float) -> bool:
@@ -187,32 +192,40 @@ def _to_fit(weighted: Weighted) -> FloatArray:
 
 
 class _Pool:
-    """All draws so far, each with the log density of the mixture of all batches' proposals."""
+    """All draws so far, each with the log density of the mixture of all batches' proposals.
 
-    def __init__(self, problem: Problem):
+    A proposal is a core of its own and what all have in common: the prior and the `tails`, whose
+    density at a draw is found once.
+    """
+
+    def __init__(self, problem: Problem, tails: TMixture | None):
         self._problem = problem
+        self._tails = tails
+        self._from_tails = _FROM_TAILS if tails else 0.0
         self._proposals: list[tuple[TMixture, int]] = []
         self._z: FloatArray = np.empty((0, problem.dimension))
         self._predicted: list[FloatArray] = []
-        self._log_prior: FloatArray = np.empty(0)
+        self._log_common: FloatArray = np.empty(0)
         self._log_posterior: FloatArray = np.empty(0)
         self._log_drawn: FloatArray = np.empty(0)
 
-    def draw(self, mixture: TMixture, draws: int, rng: np.random.Generator) -> None:
+    def draw(self, core: TMixture, draws: int, rng: np.random.Generator) -> None:
         """One more batch; draws outside of the prior are counted, not evaluated."""
         n = rng.binomial(draws, _FROM_PRIOR)
+        mixture = core.mixed(self._tails, _FROM_TAILS) if self._tails else core
         z = np.vstack([self._problem.coordinates.draw_prior(n, rng), mixture.draw(draws - n, rng)])
         log_prior = self._problem.coordinates.log_prior(z)
         inside = np.isfinite(log_prior)
         z, log_prior = z[inside], log_prior[inside]
         points = self._problem.evaluate(z)
         log_posterior = log_prior + self._problem.likelihood.marginal(points.predicted)
-        self._append([(mixture, draws)], z, [points.predicted], log_prior, log_posterior)
+        log_common = self._common(z, log_prior)
+        self._append([(core, draws)], z, [points.predicted], log_common, log_posterior)
 
     def absorb(self, other: _Pool) -> None:
-        """Takes over the draws of another pool of the same problem."""
+        """Takes over the draws of another pool of the same problem and tails."""
         self._append(
-            other._proposals, other._z, other._predicted, other._log_prior, other._log_posterior
+            other._proposals, other._z, other._predicted, other._log_common, other._log_posterior
         )
 
     def _append(
@@ -220,16 +233,16 @@ class _Pool:
         proposals: list[tuple[TMixture, int]],
         z: FloatArray,
         predicted: list[FloatArray],
-        log_prior: FloatArray,
+        log_common: FloatArray,
         log_posterior: FloatArray,
     ) -> None:
-        old = _log_drawn(proposals, self._z, self._log_prior)
+        old = self._drawn(proposals, self._z, self._log_common)
         self._proposals += proposals
-        new = _log_drawn(self._proposals, z, log_prior)
+        new = self._drawn(self._proposals, z, log_common)
         self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), new)
         self._z = np.vstack([self._z, z])
         self._predicted += predicted
-        self._log_prior = np.append(self._log_prior, log_prior)
+        self._log_common = np.append(self._log_common, log_common)
         self._log_posterior = np.append(self._log_posterior, log_posterior)
 
     def weighted(self) -> Weighted:
@@ -244,15 +257,21 @@ class _Pool:
         weighted = self.weighted()
         return weighted.effective_sample_size / weighted.draws
 
+    def _common(self, z: FloatArray, log_prior: FloatArray) -> FloatArray:
+        """Log density (n,) of the prior's and the tails' shares of every proposal."""
+        log_common = np.log(_FROM_PRIOR) + log_prior
+        if self._tails is None:
+            return np.asarray(log_common)
+        share = np.log1p(-_FROM_PRIOR) + np.log(_FROM_TAILS)
+        return np.asarray(np.logaddexp(log_common, share + self._tails.log_density(z)))
 
-def _log_drawn(
-    proposals: list[tuple[TMixture, int]], z: FloatArray, log_prior: FloatArray
-) -> FloatArray:
-    """Log of how many draws per volume (n,) the proposals, each of so many draws, put at `z`."""
-    parts = [np.log(k) + _log_proposal(mixture, z, log_prior) for mixture, k in proposals]
-    return np.asarray(logsumexp(parts, axis=0))
-
-
-def _log_proposal(mixture: TMixture, z: FloatArray, log_prior: FloatArray) -> FloatArray:
-    log_mixture = np.log1p(-_FROM_PRIOR) + mixture.log_density(z)
-    return np.asarray(np.logaddexp(np.log(_FROM_PRIOR) + log_prior, log_mixture))
+    def _drawn(
+        self, proposals: list[tuple[TMixture, int]], z: FloatArray, log_common: FloatArray
+    ) -> FloatArray:
+        """Log of how many draws per volume (n,) the proposals, each of so many, put at `z`."""
+        share = np.log1p(-_FROM_PRIOR) + np.log1p(-self._from_tails)
+        parts = [
+            np.log(draws) + np.logaddexp(log_common, share + core.log_density(z))
+            for core, draws in proposals
+        ]
+        return np.asarray(logsumexp(parts, axis=0))

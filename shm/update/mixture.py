@@ -81,7 +81,8 @@ class TMixture:
         """One step of expectation maximisation (Peel and McLachlan 2000) towards points (n, d).
 
         `weights` (n,) add to 1. Parts that no weight supports are dropped; a part that few
-        effective points support borrows covariance from the whole. The scales are somewhat widened.
+        effective points support stays near what it was: borrowed from the whole, it would no longer
+        fit into a narrow, curved valley. The scales are somewhat widened.
         """
         squares = self._squares(z)
         log_parts = self._log_parts(squares)
@@ -89,10 +90,10 @@ class TMixture:
         owned = weights[:, None] * parts / parts.sum(axis=1, keepdims=True)
         pull = (_DEGREES_OF_FREEDOM + z.shape[1]) / (_DEGREES_OF_FREEDOM + squares)
         kept = owned.sum(axis=0) > _NO_SHARE
-        whole = Normal.of(z, weights)
+        former = [part for part, keep in zip(self.parts, kept, strict=True) if keep]
         fitted = [
-            _fitted(z, own, own * u, whole)
-            for own, u in zip(owned.T[kept], pull.T[kept], strict=True)
+            _fitted(z, own, own * u, part)
+            for own, u, part in zip(owned.T[kept], pull.T[kept], former, strict=True)
         ]
         return TMixture(fitted, owned.sum(axis=0)[kept])
 
@@ -126,11 +127,11 @@ def _shrunk(cluster: FloatArray, whole: Normal) -> Normal:
     return Normal(cluster.mean(axis=0), (1 - borrowed) * own + borrowed * whole.covariance)
 
 
-def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, whole: Normal) -> Normal:
+def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal) -> Normal:
     """The t part of points `z` with their weights (n,) in it, plain and by distance."""
-    mean = pulled @ z / pulled.sum()
+    effective = owned.sum() ** 2 / (owned**2).sum()
+    kept = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
+    mean = (1 - kept) * (pulled @ z / pulled.sum()) + kept * former.mean
     away = z - mean
     own = _INFLATION * (away * pulled[:, None]).T @ away / owned.sum()
-    effective = owned.sum() ** 2 / (owned**2).sum()
-    borrowed = (z.shape[1] + 2) / (effective + z.shape[1] + 2)
-    return Normal(mean, (1 - borrowed) * own + borrowed * whole.covariance)
+    return Normal(mean, (1 - kept) * own + kept * former.covariance)

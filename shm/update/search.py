@@ -26,6 +26,7 @@ _LAST_STEPS = 80
 _FIRST_SIGMA = 0.02
 _APART = 0.1
 _DIFFERENCE = 1e-4
+_DAMPING = 1e-2
 _WIDEST = 0.4
 _INFLATION = 1.3
 
@@ -48,6 +49,12 @@ class Anchors:
         covariances = _INFLATION * np.linalg.inv(precision)
         return [Normal(z, covariance) for z, covariance in zip(self.z, covariances, strict=True)]
 
+    def log_evidence(self) -> FloatArray:
+        """Log of the posterior's integral around each anchor (m,), were it normal there."""
+        density = self.problem.log_posterior(self.problem.evaluate(self.z))
+        log_volume = [np.log(np.diag(part.factor)).sum() for part in self.normals(0.0)]
+        return np.asarray(density + log_volume + self.problem.dimension / 2 * np.log(2 * np.pi))
+
 
 def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None) -> Anchors:
     """The best distinct optima of `problem`; with a hint half of the starts do."""
@@ -63,18 +70,27 @@ def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None)
 
 
 def carried(
-    problem: Problem, z: FloatArray, sigma: float, rng: np.random.Generator, steps: int
+    problem: Problem,
+    z: FloatArray,
+    sigma: FloatArray | float,
+    rng: np.random.Generator,
+    steps: int,
+    start: FloatArray | None = None,
+    damping: float = _DAMPING,
 ) -> FloatArray:
-    """Draws `z` (m, d) of another posterior brought to this one's data, by a few damped steps.
+    """Draws `z` (m, d) of another distribution brought to this problem's data, by damped steps.
 
-    Each goes to the least-squares optimum for its own draw of the noise, of model error `sigma`,
-    with its old place as the centre of the prior (randomised maximum likelihood, Oliver, He and
-    Reynolds 1996): what the data say is made new, what they leave open is kept.
+    Each goes to the least-squares optimum for its own draw of the noise, of model error `sigma`
+    (m,), with its old place as the centre of the prior (randomised maximum likelihood, Oliver, He
+    and Reynolds 1996): what the data say is made new, what they leave open is kept. The way begins
+    at `start` (m, d) where it is given, else at the old place, and with that much `damping`.
     """
-    sigmas = np.full(len(z), sigma)
+    sigmas = np.broadcast_to(sigma, len(z))
     noise = _noise(problem, sigmas)
     errors = noise * rng.standard_normal(noise.shape)
-    return problem.coordinates.fold(_descend(problem, z, sigmas, steps, centre=z, errors=errors)[0])
+    begin = z if start is None else start
+    ends, _ = _descend(problem, begin, sigmas, steps, z, errors, damping)
+    return problem.coordinates.fold(ends)
 
 
 def _model_error(problem: Problem, z: FloatArray) -> FloatArray:
@@ -97,6 +113,7 @@ def _descend(
     steps: int,
     centre: FloatArray | float = 0.0,
     errors: FloatArray | float = 0.0,
+    first_damping: float = _DAMPING,
 ) -> tuple[FloatArray, FloatArray]:
     """All points `z` (m, d) moved downhill together, and their model errors `sigma` (m,) after.
 
@@ -108,7 +125,7 @@ def _descend(
         return residual, (residual**2).sum(axis=1) + ((z - centre) ** 2).sum(axis=1)
 
     noise = _noise(problem, sigma)
-    damping = np.full(len(z), 1e-2)
+    damping = np.full(len(z), first_damping)
     residual, cost = fit(z)
     for _ in range(steps):
         step = _step(_slopes(problem, z) / noise[..., None], residual, z - centre, damping)

@@ -86,7 +86,8 @@ class Cause:
     `log_bayes_factor` compares it with the baseline, averaged over its variants; `log_fit` is what
     the best fit gains in log likelihood and `log_occam` what its evidence pays for free parameters.
     `group` is the index of the group of causes that the data cannot tell apart, None for none.
-    `method` is how far it was taken: `screened`, `normal` or `sampled`.
+    `method` is how far it was taken: `screened`, `normal` or `sampled`. `also_at` are other places
+    at which it is about as likely.
     """
 
     effect: str
@@ -98,6 +99,7 @@ class Cause:
     parameters: tuple[EffectEstimate, ...]
     method: Literal["screened", "normal", "sampled"]
     group: int | None = None
+    also_at: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -59,16 +59,18 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=500)
     arguments = parser.parse_args()
     started = time.perf_counter()
-    covered, errors, widths = 0, [], []
+    covered, errors, widths, effective = 0, [], [], []
     for case in track(range(arguments.first, arguments.first + arguments.cases), "tests"):
         state, posterior = posterior_of(case, arguments.samples)
         low, high = np.quantile(posterior.tension_n, [0.05, 0.95])
         covered += int(low < state.tension_n < high)
         errors.append(abs(np.median(posterior.tension_n) / state.tension_n - 1))
         widths.append((high - low) / state.tension_n)
+        effective.append(posterior.effective_sample_size)
     print(f"90 % interval covers the truth in {covered} of {arguments.cases} tests")
     print(f"error of the median: {np.median(errors):.2%} (largest {max(errors):.2%})")
     print(f"width of the interval: median {np.median(widths):.2%}")
+    print(f"effective samples of {arguments.samples}: {min(effective):.0f} at least")
     print(f"{(time.perf_counter() - started) / arguments.cases:.1f} s a test")
 
 

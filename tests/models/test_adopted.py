@@ -154,7 +154,7 @@ def test_conditions_that_no_effect_follows_are_not_noticed() -> None:
     assert level.conditions(ModalTest("t", ())).amplitude == 1.0
 
 
-def test_a_known_mass_is_described_by_adopted_classes_and_by_no_other() -> None:
+def test_a_known_mass_lowers_the_modes_that_move_it() -> None:
     test = ModalTest("t", modes_of(HANGER_3, 1.0), added_mass=AddedMass(25.0, 6.0))
     model = build(MASS, HANGER_3)
     model.refuse(test)
@@ -162,8 +162,6 @@ def test_a_known_mass_is_described_by_adopted_classes_and_by_no_other() -> None:
     free = model.frequencies_hz(parameters(model), 3)
     assert loaded[0, 0, 0] < 0.99 * free[0, 0, 0]
     np.testing.assert_allclose(loaded[0, 0, 1], free[0, 0, 1], rtol=1e-4)  # a node of order 2
-    with pytest.raises(BadInput, match="25 kg"):
-        build("beam1", HANGER_3).refuse(test)
 
 
 def test_a_class_that_follows_the_temperature_refuses_a_test_without() -> None:

@@ -64,3 +64,18 @@ def test_a_normal_interval_holds_ninety_percent() -> None:
     interval = Interval.normal(10.0, 2.0)
     assert interval.high - 10.0 == pytest.approx(1.645 * 2.0, rel=1e-3)
     assert interval.scaled(0.5).width == pytest.approx(interval.width / 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("beam2", "beam2"),
+        ("beam1+point_mass@everywhere:x_m=3.397..3.402", "beam1 + point mass"),
+        (
+            "beam1+stiff_end_zones@arch_end.longitudinal+sag@everywhere.transverse",
+            "beam1 + stiff end zones (arch end, longitudinal) + sag (everywhere, transverse)",
+        ),
+    ],
+)
+def test_an_adopted_class_is_told_without_its_ranges(name: str, told: str) -> None:
+    assert words.model_class(name) == told

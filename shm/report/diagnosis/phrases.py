@@ -18,6 +18,7 @@ _PLACES = {
     "transverse": "in the transverse plane",
     "longitudinal": "in the longitudinal plane",
 }
+_MOST_PLACES = 2
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
 
 PHRASES: dict[str, Callable[[Sizes], str]] = {
@@ -80,7 +81,7 @@ def title(effect: str) -> str:
 
 def label(cause: Cause) -> str:
     """`rotational end flexibility (both ends)`, for tables and figures."""
-    parts = zip(cause.effects, _ats(cause), strict=True)
+    parts = zip(cause.effects, _ats(cause.at, cause), strict=True)
     return " + ".join(f"{title(effect)}{_in_brackets(at)}" for effect, at in parts)
 
 
@@ -93,9 +94,22 @@ def phrase(cause: Cause) -> str:
     """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
     clauses = [
         _clause(effect, at, own_estimates(cause, number))
-        for number, (effect, at) in enumerate(zip(cause.effects, _ats(cause), strict=True))
+        for number, (effect, at) in enumerate(
+            zip(cause.effects, _ats(cause.at, cause), strict=True)
+        )
     ]
-    return " together with ".join(clauses)
+    return " together with ".join(clauses) + _also(cause)
+
+
+def _also(cause: Cause) -> str:
+    """Where else it may act as well."""
+    if not cause.also_at:
+        return ""
+    places = [
+        " and ".join(_place(part) or "everywhere" for part in _ats(at, cause))
+        for at in cause.also_at[:_MOST_PLACES]
+    ]
+    return f" (about as likely: {words.listed(places)})"
 
 
 def _clause(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
@@ -118,10 +132,10 @@ def _place_part(part: str) -> str:
     return _PLACES.get(part, f"{start} {part}" if start else part)
 
 
-def _ats(cause: Cause) -> tuple[str, ...]:
-    """Where each effect of the cause acts."""
-    ats = tuple(cause.at.split(" + "))
-    return ats if len(ats) == len(cause.effects) else (cause.at,) * len(cause.effects)
+def _ats(at: str, cause: Cause) -> tuple[str, ...]:
+    """Where each effect of the cause acts, by `at`."""
+    ats = tuple(at.split(" + "))
+    return ats if len(ats) == len(cause.effects) else (at,) * len(cause.effects)
 
 
 def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:

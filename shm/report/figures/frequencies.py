@@ -89,10 +89,11 @@ def _model_error(data: HangerReport) -> str:
 
 def _caption(data: HangerReport) -> str:
     return (
-        f"Frequencies predicted by {data.posterior.model} after updating, over the measured ones "
-        "of the latest test. Bars: 90 % interval that the uncertainty of the parameters leaves; "
-        "dark boxes: that of the measurement, where known; light band: model error "
-        f"({_model_error(data)}). A mode outside the band is one that the model does not explain."
+        f"Frequencies predicted by {words.model_class(data.posterior.model)} after updating, over "
+        "the measured ones of the latest test. Bars: 90 % interval that the uncertainty of the "
+        "parameters leaves; dark boxes: that of the measurement, where known; light band: model "
+        f"error ({_model_error(data)}). A mode outside the band is one that the model does not "
+        "explain."
     )
 
 
