@@ -208,7 +208,8 @@ def _refuse_what_does_not_go_together(
 def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Recording:
     make = _listened if chosen["ambient"] else _hit
     recording = make(hanger, _state(hanger, chosen), chosen, rng)
-    return replace(recording, temperature_c=chosen["temperature_c"])
+    mass = _conditions(chosen).added_mass
+    return replace(recording, temperature_c=chosen["temperature_c"], added_mass=mass)
 
 
 def _state(hanger: Hanger, chosen: Chosen) -> HangerState:

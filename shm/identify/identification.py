@@ -146,6 +146,7 @@ def _test(
         time=min((r.time for r in records if r.time is not None), default=None),
         temperature_c=float(np.mean(temperatures)) if temperatures else NAN,
         amplitude=amplitude,
+        added_mass=next((r.added_mass for r in records if r.added_mass is not None), None),
     )
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from shm.documents import format_time
 from shm.errors import UsageError
 from shm.read.base import names_in
-from shm.read.header import CHANNEL_KEYS, KEYS
+from shm.read.header import CHANNEL_KEYS, KEYS, mass_entries
 from shm.read.units import ACCELERANCE, SI
 from shm.values import (
     Channel,
@@ -78,6 +78,7 @@ def layout_of(described: Recording | FrequencyResponse) -> Layout:
         "hanger": described.hanger,
         "time": format_time(described.time),
         "temperature_c": described.temperature_c,
+        **mass_entries(described.added_mass),
     }
     if isinstance(described, FrequencyResponse):
         return Layout(_response(described), _known(known))

@@ -16,6 +16,7 @@ _TIMES = {"t", "time", "times", "timedomain", "timevector", "timeaxis", "times_s
 _FREQUENCIES = {"f", "freq", "frequency", "frequencies", "frequencyhz", "freqdomain", "freqhz"}
 _SECONDS = {"s", "sec", "second", "seconds"}
 _RESPONSES = ("frf", "accelerance")
+_MASS = {"addedmasskg": "added_mass_kg", "addedmassatm": "added_mass_at_m"}
 _RATES = {
     "samplingratehz", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency",
     "samplingfreq", "samplefreq", "fs", "fshz", "timesamplerate",
@@ -51,7 +52,7 @@ def unit_in(variable: Variable) -> str:
 
 
 def facts(attributes: Mapping[str, object]) -> dict[str, object]:
-    """Hanger, time, temperature and sampling rate, in any of the spellings of loggers."""
+    """Hanger, time, temperature, known mass, sampling rate in any of the spellings of loggers."""
     found: dict[str, object] = {}
     for name, value in attributes.items():
         key = _bare(name)
@@ -59,6 +60,8 @@ def facts(attributes: Mapping[str, object]) -> dict[str, object]:
             found["hanger"] = value
         elif key == "temperaturec":
             found["temperature_c"] = value
+        elif key in _MASS:
+            found[_MASS[key]] = value
         elif key in _MOMENTS and not isinstance(value, (int, float)):
             found["time"] = value
         elif key in _RATES:

@@ -40,7 +40,15 @@ def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: floa
         if not header.leaves_out(name)
     )
     refuse_quantities([channel.quantity for channel in channels], path)
-    return Recording(str(path), channels, rate, header.hanger, header.time, header.temperature_c)
+    return Recording(
+        str(path),
+        channels,
+        rate,
+        header.hanger,
+        header.time,
+        header.temperature_c,
+        header.added_mass,
+    )
 
 
 def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
@@ -91,6 +99,7 @@ def peeked(
         hanger=attempt(lambda: header.hanger, None, found),
         time=attempt(lambda: header.time, None, found),
         temperature_c=attempt(lambda: header.temperature_c, NAN, found),
+        added_mass=attempt(lambda: header.added_mass, None, found),
         problems=tuple(found),
         left_out=(*left_out, *out),
     )

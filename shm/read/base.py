@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from shm.values import NAN, FrequencyResponse, Plane, Quantity, Recording
+from shm.values import NAN, AddedMass, FrequencyResponse, Plane, Quantity, Recording
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ class Peek:
     hanger: int | None = None
     time: datetime | None = None
     temperature_c: float = NAN
+    added_mass: AddedMass | None = None
     problems: tuple[str, ...] = ()
     lines: int = 0
     frequency_step_hz: float = NAN

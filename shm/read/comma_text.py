@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.documents import format_time
+from shm.read.header import mass_entries
 from shm.read.units import ACCELERANCE, SI
 from shm.values import Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 
@@ -50,6 +51,7 @@ def _heading(
         "hanger": described.hanger,
         "time": format_time(described.time),
         "temperature_c": _number(described.temperature_c),
+        **{key: _number(value) for key, value in mass_entries(described.added_mass).items()},
         **more,
     }
     lines = [f"# {key}: {value}" for key, value in known.items() if value not in (None, "")]

@@ -11,9 +11,16 @@ from pathlib import Path
 from shm.documents import parse_time
 from shm.errors import BadInput
 from shm.read.units import ACCELERANCE, KNOWN, SI, Unit, accelerance_si, unit_of
-from shm.values import NAN, PLANES, Plane, Quantity
+from shm.values import NAN, PLANES, AddedMass, Plane, Quantity
 
-KEYS = ("hanger", "time", "temperature_c", "sampling_rate_hz")
+KEYS = (
+    "hanger",
+    "time",
+    "temperature_c",
+    "added_mass_kg",
+    "added_mass_at_m",
+    "sampling_rate_hz",
+)
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
 _FACTOR_REMEDY = "Give a number other than 0: units of `unit` per recorded volt or count."
@@ -81,6 +88,25 @@ class Header:
         entry = self._given("temperature_c")
         remedy = "Give degrees Celsius, or leave it out."
         return NAN if entry is None else _number(entry, "temperature_c", remedy)
+
+    @property
+    def added_mass(self) -> AddedMass | None:
+        """The known mass that was clamped on; None where nothing says one."""
+        mass, place = self._given("added_mass_kg"), self._given("added_mass_at_m")
+        if mass is None and place is None:
+            return None
+        remedy = "Give both added_mass_kg and added_mass_at_m, from the deck end, or neither."
+        if mass is None or place is None:
+            only = mass or place
+            assert only is not None
+            raise only.refusal("a known mass needs its size and its place.", remedy)
+        mass_kg = _number(mass, "added_mass_kg", remedy)
+        x_m = _number(place, "added_mass_at_m", remedy)
+        if not mass_kg > 0:
+            raise mass.refusal(f"added_mass_kg = {mass.text} is not positive.", remedy)
+        if not x_m >= 0:
+            raise place.refusal(f"added_mass_at_m = {place.text} is below the deck end.", remedy)
+        return AddedMass(mass_kg, x_m)
 
     @property
     def sampling_rate_hz(self) -> float:
@@ -233,3 +259,10 @@ def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
     if math.isinf(number):
         raise entry.refusal(f"{key} = {entry.text!r} is not a number.", remedy, channel)
     return number
+
+
+def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
+    """The entries that say of a known mass; none where there is none."""
+    if added_mass is None:
+        return {}
+    return {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}

@@ -43,6 +43,7 @@ def frequency_response(
         header.hanger,
         header.time,
         header.temperature_c,
+        header.added_mass,
     )
 
 
@@ -82,6 +83,7 @@ def peeked(
         hanger=assemble.attempt(lambda: header.hanger, None, problems),
         time=assemble.attempt(lambda: header.time, None, problems),
         temperature_c=assemble.attempt(lambda: header.temperature_c, NAN, problems),
+        added_mass=assemble.attempt(lambda: header.added_mass, None, problems),
         problems=tuple(problems),
         lines=len(frequency),
         frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,

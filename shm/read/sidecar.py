@@ -31,7 +31,7 @@ from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
 from shm.read.content import unreadable
-from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, spread
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
 from shm.values import FrequencyResponse, Recording
 
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
@@ -137,6 +137,7 @@ def write_sidecar(
         *_line("hanger", described.hanger),
         *_line("time", described.time),
         *_line("temperature_c", described.temperature_c),
+        *(line for pair in mass_entries(described.added_mass).items() for line in _line(*pair)),
         *_line("sampling_rate_hz", sampling_rate_hz),
     ]
     for channel in channels:

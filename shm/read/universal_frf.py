@@ -46,6 +46,7 @@ def frequency_response(content: Content, path: Path) -> FrequencyResponse:
         header.hanger,
         header.time,
         header.temperature_c,
+        header.added_mass,
     )
 
 
@@ -64,6 +65,7 @@ def peek(content: Content, file_format: str, path: Path) -> Peek:
         hanger=header.hanger,
         time=header.time,
         temperature_c=header.temperature_c,
+        added_mass=header.added_mass,
         lines=sets[0].points,
         frequency_step_hz=_step(sets[0]) or NAN,
     )

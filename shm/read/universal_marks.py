@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shm.documents import format_time
-from shm.read.header import KEYS, Entry
+from shm.read.header import KEYS, Entry, mass_entries
 from shm.read.universal_sets import Content, FunctionSet
 from shm.values import FrequencyResponse, Plane, Recording
 
@@ -63,13 +63,15 @@ def id_lines(
 ) -> dict[str, str]:
     """The id lines of a set of ours."""
     time = described.time
+    moment = [f"time={format_time(time)}"] if time else []
+    moment += [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]
     known = {"hanger": described.hanger, "temperature_c": described.temperature_c, **own}
     pairs = [f"{key}={value}" for key, value in known.items() if _is_known(value)]
     return {
         "id1": name,
         "id2": "hammer test of a hanger",
         "id3": _date_text(time) if time else "NONE",
-        "id4": f"{_MARK} time={format_time(time)}" if time else "NONE",
+        "id4": " ".join([_MARK, *moment]) if moment else "NONE",
         "id5": " ".join([_MARK, "format=1", *pairs]),
     }
 

@@ -61,4 +61,5 @@ def _told(found: Found, path: Path) -> Found:
     """A member with what the sidecar of its archive says of the whole test."""
     said = entries_of_test(path)
     known = [key for key in ("hanger", "time", "temperature_c") if key in said.entries]
-    return replace(found, **{key: getattr(said, key) for key in known})
+    told = replace(found, **{key: getattr(said, key) for key in known})
+    return told if said.added_mass is None else replace(told, added_mass=said.added_mass)

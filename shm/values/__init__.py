@@ -38,7 +38,6 @@ from shm.values.kinds import (
     Verdict,
 )
 from shm.values.modes import (
-    AddedMass,
     ForeignMode,
     ModalTest,
     Mode,
@@ -54,6 +53,7 @@ from shm.values.posterior import (
     Selection,
 )
 from shm.values.recording import (
+    AddedMass,
     Channel,
     FrequencyResponse,
     Recording,

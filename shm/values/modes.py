@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import Literal
 
 from shm.values.kinds import NAN, Plane, Verdict
+from shm.values.recording import AddedMass
 
 
 @dataclass(frozen=True)
@@ -67,14 +68,6 @@ class QualityCheck:
     unit: str
     found: str
     remedy: str = ""
-
-
-@dataclass(frozen=True)
-class AddedMass:
-    """A known mass clamped on the hanger for one test."""
-
-    mass_kg: float
-    x_m: float
 
 
 @dataclass(frozen=True)

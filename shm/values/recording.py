@@ -8,6 +8,14 @@ from datetime import datetime
 from shm.values.kinds import NAN, ComplexArray, FloatArray, Plane, Quantity
 
 
+@dataclass(frozen=True)
+class AddedMass:
+    """A known mass clamped on the hanger for one test."""
+
+    mass_kg: float
+    x_m: float
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One sensor of a recording; `values` has shape (samples,), in N or m/s^2, NaN where bad.
@@ -37,6 +45,7 @@ class Recording:
     hanger: int | None = None
     time: datetime | None = None
     temperature_c: float = NAN
+    added_mass: AddedMass | None = None
 
     @property
     def force(self) -> Channel | None:
@@ -80,3 +89,4 @@ class FrequencyResponse:
     hanger: int | None = None
     time: datetime | None = None
     temperature_c: float = NAN
+    added_mass: AddedMass | None = None

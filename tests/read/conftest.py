@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shm.values import Channel, FrequencyResponse, Recording, ResponsePoint
+from shm.values import AddedMass, Channel, FrequencyResponse, Recording, ResponsePoint
 
 
 @pytest.fixture
@@ -26,6 +26,7 @@ def recording() -> Recording:
         hanger=3,
         time=datetime(2026, 5, 1, 10, 0, 30, 250000, tzinfo=UTC),
         temperature_c=-2.5,
+        added_mass=AddedMass(25.0, 3.6),
     )
 
 

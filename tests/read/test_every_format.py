@@ -32,6 +32,7 @@ def assert_same(found: Recording | FrequencyResponse, expected: Recording) -> No
     assert found.hanger == expected.hanger
     assert found.time == expected.time
     assert found.temperature_c == pytest.approx(expected.temperature_c, nan_ok=True)
+    assert found.added_mass == expected.added_mass
     assert found.sampling_rate_hz == pytest.approx(expected.sampling_rate_hz, rel=1e-12)
     for one, other in zip(found.channels, expected.channels, strict=True):
         assert (one.name, one.quantity, one.plane) == (other.name, other.quantity, other.plane)

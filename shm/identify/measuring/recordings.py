@@ -64,5 +64,6 @@ def _response(
         hanger=first.hanger,
         time=first.time,
         temperature_c=first.temperature_c,
+        added_mass=first.added_mass,
     )
     return response, average.spectra

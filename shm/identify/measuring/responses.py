@@ -88,6 +88,7 @@ def _merged(
         hanger=first.hanger,
         time=first.time,
         temperature_c=first.temperature_c,
+        added_mass=first.added_mass,
     )
     reason = "not-a-number lines in the band"
     return merged, tuple(

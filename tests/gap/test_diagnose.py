@@ -1,0 +1,136 @@
+"""The whole diagnosis: an answer with probabilities that add to 1, also of poor data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.diagnosis_document import diagnosis_document
+from shm.documents import dump
+from shm.errors import BadInput, UsageError
+from shm.gap import GapOptions, diagnose
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
+from tests.helpers.hangers import HANGER_3
+
+PLAIN = replace(HANGER_3, plate=None)
+CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
+ONE_TEST = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
+
+
+def planted(*effects: PlantedEffect, plan: CampaignPlan = ONE_TEST) -> tuple[ModalTest, ...]:
+    return campaign(PLAIN, HangerState(711e3), effects, plan, np.random.default_rng(101))
+
+
+def probabilities(found: Diagnosis) -> float:
+    causes = sum(cause.probability for cause in found.causes)
+    return causes + found.no_gap_probability + found.unexplained_probability
+
+
+@pytest.fixture(scope="module")
+def clamped_on() -> Diagnosis:
+    return diagnose(planted(CLAMP), PLAIN)
+
+
+def test_a_planted_clamp_is_named_with_its_size_and_place(clamped_on: Diagnosis) -> None:
+    assert clamped_on.leading is not None
+    assert clamped_on.leading.effect == "point_mass"
+    size = {each.name: each for each in clamped_on.leading.parameters}
+    assert size["mass_kg"].mean == pytest.approx(12.0, abs=4 * size["mass_kg"].sd)
+    assert size["x_m"].mean == pytest.approx(3.4, abs=4 * size["x_m"].sd)
+    assert clamped_on.groups == () or clamped_on.leading.group is not None
+
+
+def test_the_gap_shrinks_in_and_out_of_the_fit(clamped_on: Diagnosis) -> None:
+    shrunk = clamped_on.shrinkage
+    assert shrunk.rms_after_percent < 0.2 * shrunk.rms_before_percent
+    assert shrunk.held_out_after_percent < 0.3 * shrunk.held_out_before_percent
+    assert sum(row.share for row in clamped_on.where) == pytest.approx(1.0)
+
+
+def test_all_probabilities_add_to_one(clamped_on: Diagnosis) -> None:
+    assert probabilities(clamped_on) == pytest.approx(1.0)
+    assert probabilities(diagnose(planted()[:1], PLAIN)) == pytest.approx(1.0)
+
+
+def test_the_same_seed_gives_the_same_answer(clamped_on: Diagnosis) -> None:
+    again = replace(diagnose(planted(CLAMP), PLAIN), seconds=clamped_on.seconds)
+    assert dump(diagnosis_document(again)) == dump(diagnosis_document(clamped_on))
+
+
+def test_nothing_planted_is_no_gap() -> None:
+    found = diagnose(planted(), PLAIN)
+    assert found.leading is None
+    assert found.no_gap_probability > found.unexplained_probability
+    assert found.tension_after_n.mean == pytest.approx(found.tension_before_n.mean, rel=0.01)
+
+
+def test_an_effect_left_out_is_not_named_and_something_unknown_leads() -> None:
+    found = diagnose(planted(CLAMP), PLAIN, GapOptions(without=("point_mass",)))
+    assert "point_mass" not in [name for cause in found.causes for name in cause.effects]
+    assert found.left_out == ("point_mass",)
+    assert found.unexplained_probability > 0.5
+
+
+@pytest.mark.parametrize("baseline", ["beam2", "s1"])
+def test_other_classes_may_be_the_baseline(baseline: str) -> None:
+    plan = replace(ONE_TEST, modes=4)
+    found = diagnose(planted(CLAMP, plan=plan), PLAIN, GapOptions(baseline=baseline))
+    assert found.baseline == baseline
+    assert probabilities(found) == pytest.approx(1.0)
+
+
+def test_one_mode_only_is_refused_with_the_reason() -> None:
+    (test,) = planted()
+    with pytest.raises(BadInput, match="the tension alone can follow any one"):
+        diagnose([replace(test, modes=test.modes[:1])], PLAIN)
+
+
+def test_few_modes_are_answered_with_a_remark() -> None:
+    (test,) = planted()
+    found = diagnose([replace(test, modes=test.modes[:2])], PLAIN)
+    assert "Only 2 modes" in found.remarks[0]
+    assert found.leading is None
+    assert np.isnan(found.shrinkage.held_out_before_percent)
+
+
+def test_unknown_standard_deviations_are_estimated_and_said() -> None:
+    (test,) = planted(CLAMP)
+    unknown = replace(
+        test, modes=tuple(replace(mode, frequency_sd_hz=NAN, shape=()) for mode in test.modes)
+    )
+    found = diagnose([unknown], PLAIN)
+    assert "No frequency has a standard deviation" in found.remarks[0]
+    assert found.model_error_percent > 0
+
+
+def test_two_tests_that_contradict_each_other_make_something_unknown_likely() -> None:
+    (test,) = planted()
+    moved = tuple(
+        replace(mode, frequency_hz=mode.frequency_hz * (1.01 if mode.order == 3 else 1.0))
+        for mode in test.modes
+    )
+    found = diagnose([test, replace(test, id="other", modes=moved)], PLAIN)
+    assert "contradict each other" in found.remarks[0]
+    assert found.unexplained_probability > 0.5
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (GapOptions(without=("gremlins",)), "gremlins"),
+        (GapOptions(baseline="beam9"), "beam9"),
+        (GapOptions(hold_out=("t77",)), "t77"),
+    ],
+)
+def test_names_that_are_not_there_are_refused(options: GapOptions, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        diagnose(planted(), PLAIN, options)
+
+
+def test_an_owners_range_of_an_unknown_effect_is_refused() -> None:
+    wrong: Hanger = replace(PLAIN, effect_priors=(EffectPrior("gremlins", "mass_kg", 1.0, 2.0),))
+    with pytest.raises(BadInput, match="gremlins"):
+        diagnose(planted(), wrong)
