@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.gap.chances import Family, Tried, families, probabilities
 from shm.gap.contract import Fit
-from shm.gap.groups import grouped
+from shm.gap.groups import faces, grouped
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
@@ -101,7 +101,7 @@ def attributed(
 def _attribution(search: Search, kinds: Sequence[Family], chances: Sequence[float]) -> Attribution:
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
     flexible = [kind for kind in kinds if kind.flexible]
-    causes, groups = _with_groups(_explanations(kinds, chances, none))
+    causes, groups = _with_groups(search.problem, _explanations(kinds, chances, none))
     return Attribution(
         baseline=_fit([none]),
         no_gap_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k is none),
@@ -137,7 +137,7 @@ def _fit(kinds: Sequence[Family]) -> Fit:
 
 
 def _with_groups(
-    causes: tuple[Explanation, ...],
+    problem: GapProblem, causes: tuple[Explanation, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[tuple[str, ...], ...]]:
     """The causes with the indices of their groups, and the groups' names."""
     top = max((each.log_bayes_factor for each in causes), default=0.0)
@@ -149,7 +149,7 @@ def _with_groups(
         and each.log_bayes_factor > max(0.0, top - WITHIN_REACH)
         and not _idle(each, alone)
     ]
-    found = grouped([fit for _, fit in able])
+    found = grouped([faces(problem, fit) for _, fit in able])
     members = [tuple(able[i][0] for i in group) for group in found]
     names = tuple(tuple(causes[i].effect for i in group) for group in members)
     index = {i: number for number, group in enumerate(members) for i in group}

@@ -3,27 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from dataclasses import replace
+from itertools import combinations, product
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from shm.gap.contract import Fit, NoiseNode
+from shm.gap.coordinates import Branch
+from shm.gap.landscape import Landscape
 from shm.gap.likelihood import Likelihood
+from shm.gap.problem import GapProblem
 
 SAME_BELOW = 3.0
 """Expected log Bayes factor under which two causes count as not separable."""
 
 
-def grouped(fits: Sequence[Fit]) -> tuple[tuple[int, ...], ...]:
-    """Indices of `fits` that cannot be told apart, each group of two and more, in their order.
+NOTABLE_WITHIN = 1.6
+"""A peak with less than a fifth of the best one's evidence does not speak for its cause."""
 
-    Groups are connected: a cause that is like two others joins them.
+
+def faces(problem: GapProblem, fit: Fit) -> tuple[Fit, ...]:
+    """A fit as seen from each of its notable peaks, its best point first.
+
+    A mass that may sit in the middle or at an end looks like a stiff end from one of them only.
     """
-    links = np.eye(len(fits))
-    for i, j in combinations(range(len(fits)), 2):
-        links[i, j] = expected_log_bayes_factor(fits[i], fits[j]) < SAME_BELOW
+    best = max((peak.log_evidence for peak in fit.peaks), default=0.0)
+    notable = [peak for peak in fit.peaks if peak.log_evidence > best - NOTABLE_WITHIN]
+    if len(notable) < 2:
+        return (fit,)
+    landscape = Landscape(problem, fit.hypothesis)
+    views = landscape.views(np.array([p.w for p in notable]), np.array([p.signs for p in notable]))
+    branches = [Branch(peak.signs) for peak in notable]
+    others = [
+        replace(
+            fit,
+            z=branch.z(w[None])[0],
+            predicted=problem.observations.value - residual,
+            slopes=slopes / branch.stretch(w),
+        )
+        for branch, w, residual, slopes in zip(
+            branches, views.w, views.residual, views.slopes, strict=True
+        )
+    ]
+    return (fit, *others)
+
+
+def grouped(causes: Sequence[Sequence[Fit]]) -> tuple[tuple[int, ...], ...]:
+    """Indices of `causes` that cannot be told apart, each group of two and more, in their order.
+
+    A cause has one or several faces; one alike is enough. Groups are connected: a cause that is
+    like two others joins them.
+    """
+    links = np.eye(len(causes))
+    for i, j in combinations(range(len(causes)), 2):
+        pairs = product(causes[i], causes[j])
+        links[i, j] = any(expected_log_bayes_factor(*pair) < SAME_BELOW for pair in pairs)
     count, label = connected_components(csr_array(links), directed=False)
     members = [tuple(int(i) for i in np.flatnonzero(label == k)) for k in range(count)]
     return tuple(sorted(group for group in members if len(group) > 1))

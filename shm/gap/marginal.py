@@ -25,32 +25,37 @@ _NOTHING = 1e-30
 class Marginal:
     """Of `g` shifts of a prediction, with the linear parameters integrated out.
 
-    `visible` (g,): by how many standard deviations each moves the data beyond what the linear
-    parameters can follow. `log_likelihood` (g,) of the shifts as they are; `scale` (g,), up to 1.8
-    up or down, makes them fit best, with the log likelihood `log_peak` (g,); `log_mean` (g,) is
-    that of the mean likelihood over all these scales, evenly over their logarithm. `step` (g, d)
-    is where the linear parameters go with the scaled shifts.
+    `whole` (g,): by how many standard deviations each moves the data, `visible` (g,): by how many
+    beyond what the linear parameters can follow. `log_likelihood` (g,) of the shifts as they are;
+    `scale` (g,), up to 1.8 up or down, makes them fit best, with the log likelihood `log_peak`
+    (g,); `log_mean` (g,) is that of the mean likelihood over all these scales, evenly over their
+    logarithm. `step` (g, d) is where the linear parameters go with the scaled shifts, `follow`
+    (g, d) with the plain ones.
     """
 
+    whole: FloatArray
     visible: FloatArray
     log_likelihood: FloatArray
     scale: FloatArray
     log_peak: FloatArray
     log_mean: FloatArray
     step: FloatArray
+    follow: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class _Products:
     """Products of residual and shifts in each node: beyond what the linear parameters follow.
 
-    `cross` of residual and shifts and `shift` of these with themselves, (nodes, g); `height`
+    `cross` of residual and shifts and `shift` of these with themselves, (nodes, g), `whole` the
+    latter before anything follows; `height`
     (nodes,) is the log likelihood of the residual. `solved` (nodes, d, 1 + g): where the linear
     parameters go with each.
     """
 
     cross: FloatArray
     shift: FloatArray
+    whole: FloatArray
     height: FloatArray
     solved: FloatArray
 
@@ -73,14 +78,17 @@ def marginal(
     scale = scales[best, nodes]
     log_peak = np.asarray(logsumexp(peaks, axis=0))
     width = np.sqrt(2 * np.pi / own[best, nodes]) / scale
-    away = products.solved[best, :, 0] - scale[:, None] * products.solved[best, :, 1 + nodes]
+    residual, shifts = products.solved[best, :, 0], products.solved[best, :, 1 + nodes]
+    usual = _nominal(problem, likelihood, peaks.max(axis=1))
     return Marginal(
-        visible=np.sqrt(products.shift[_nominal(problem, likelihood, peaks.max(axis=1))]),
+        whole=np.sqrt(products.whole[usual]),
+        visible=np.sqrt(products.shift[usual]),
         log_likelihood=np.asarray(logsumexp(plain, axis=0)),
         scale=scale,
         log_peak=log_peak,
         log_mean=log_peak + np.log(np.minimum(width / _CELL, 1.0)),
-        step=away,
+        step=residual - scale[:, None] * shifts,
+        follow=residual - shifts,
     )
 
 
@@ -96,11 +104,12 @@ def _products(
     followed = (outer[:, :, :1] * solved).sum(axis=1)
     square = gram[:, d, d] + before.z @ before.z - followed[:, 0]
     own = np.einsum("kgg->kg", gram[:, d + 1 :, d + 1 :])
-    own = own - (outer[:, :, 1:] * solved[:, :, 1:]).sum(axis=1)
+    alone = own - (outer[:, :, 1:] * solved[:, :, 1:]).sum(axis=1)
     volume = np.linalg.slogdet(inner)[1]
     return _Products(
         cross=gram[:, d, d + 1 :] - followed[:, 1:],
-        shift=np.maximum(own, 0.0),
+        shift=np.maximum(alone, 0.0),
+        whole=own,
         height=likelihood.log_height - volume / 2 - square / 2,
         solved=solved,
     )

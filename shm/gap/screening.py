@@ -13,7 +13,7 @@ from shm.gap.options import Progress
 from shm.gap.problem import GapProblem
 from shm.gap.sensitivity import Scan, scan, superposed, truncate
 
-HOPELESS = 7.0
+HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
 HOPELESS_SHARE = 0.3
 STARTS = 3
 NOTHING_SEEN = 1.0
@@ -65,16 +65,22 @@ def tried_by_screening(
 
 
 def hopeful(
-    tried: Sequence[Tried], priors: Sequence[float], rival: float, gap: float, most: int
+    tried: Sequence[Tried],
+    priors: Sequence[float],
+    coarse: Sequence[bool],
+    rival: float,
+    gap: float,
+    most: int,
 ) -> tuple[Tried, ...]:
     """Those that may come near the likeliest, the best first, at most `most`.
 
     `priors` are the logarithms of theirs, `rival` the log of prior times evidence of the best so
-    far. The larger the gap (what the best gains in log evidence), the more a scan, which takes it
-    as linear, may be wrong.
+    far. A scan of several parameters is `coarse` and may be farther off. The larger the gap (what
+    the best gains in log evidence), the more a scan, which takes it as linear, may be wrong.
     """
     weighed = [each.log_evidence + prior for each, prior in zip(tried, priors, strict=True)]
     order = np.argsort(-np.array(weighed), kind="stable")[:most]
     best = max([rival, *weighed])
-    reach = max(HOPELESS, HOPELESS_SHARE * gap)
-    return tuple(tried[i] for i in order if weighed[i] > best - reach)
+    own = np.where(coarse, HOPELESS_IF_COARSE, HOPELESS)
+    reach = np.maximum(own, HOPELESS_SHARE * gap)
+    return tuple(tried[i] for i in order if weighed[i] > best - reach[i])

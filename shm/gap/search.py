@@ -127,8 +127,9 @@ class Search:
             return {}
         rough = self._rough(scans)
         priors = [log_prior(each.hypothesis, self.variants) for each in rough]
-        best = max(each.log_evidence for each in rough)
-        chosen = hopeful(rough, priors, rival, best - self.baseline.log_evidence, most)
+        coarse = [scans[each.hypothesis].share.shape[1] > 1 for each in rough]
+        gap = max(each.log_evidence for each in rough) - self.baseline.log_evidence
+        chosen = hopeful(rough, priors, coarse, rival, gap, most)
         found: dict[Hypothesis, Fit] = {}
         for hypothesis in (each.hypothesis for each in chosen):
             fraction = begin + (end - begin) * len(found) / len(chosen)

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import qmc
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.coordinates import Coordinates, is_place
+from shm.gap.coordinates import DEVIATIONS, Coordinates, is_place
 from shm.gap.marginal import Marginal, marginal
 from shm.gap.problem import GapProblem
 from shm.values import BoolArray, FloatArray, IntArray
@@ -29,6 +29,7 @@ _BINS = 8
 _LONGEST_STEP, _FARTHEST = 2.5, 4.0
 _APART = 0.12
 _HOPELESS, _HOPELESS_SHARE = 8.0, 0.3
+_BENT_STEPS, _STRAIGHT, _HOPELESSLY_FAR, _MOSTLY_FOLLOWED = 2, 1.0, 8.0, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,7 @@ def scan(problem: GapProblem, before: Fit, hypothesis: Hypothesis) -> Scan:
     share = _spread(parameters, _first_points(parameters))
     shift = _shift(problem, before, hypothesis, share)
     weight = np.full(len(share), 1 / len(share))
+    shift = _bent(problem, before, hypothesis, share, shift)
     found = _scan(problem, before, hypothesis, share, weight, shift)
     for half in _HALVES if parameters > 1 else ():
         peak = found.marginal.log_peak
@@ -136,7 +138,8 @@ def scan(problem: GapProblem, before: Fit, hypothesis: Hypothesis) -> Scan:
         kept *= (1 - volume) / max(kept.sum(), volume)
         weight = np.append(kept, np.full(len(closer), volume / len(closer)))
         share = np.vstack([share, closer])
-        shift = np.vstack([shift, _shift(problem, before, hypothesis, closer)])
+        further = _shift(problem, before, hypothesis, closer)
+        shift = np.vstack([shift, _bent(problem, before, hypothesis, closer, further)])
         found = _scan(problem, before, hypothesis, share, weight, shift)
     return found
 
@@ -148,6 +151,36 @@ def _shift(
     kept = np.repeat(problem.theta(before.hypothesis, before.z[None]), len(share), axis=0)
     theta = np.column_stack([kept, _effect(problem, before, hypothesis, share)])
     return np.asarray(problem.predict_at(hypothesis, theta) - before.predicted)
+
+
+def _bent(
+    problem: GapProblem,
+    before: Fit,
+    hypothesis: Hypothesis,
+    share: FloatArray,
+    shift: FloatArray,
+) -> FloatArray:
+    """The shifts (g, data) with the curvature on the way to where the bar's deviations follow.
+
+    A change of length that the bar's own length all but makes up for is hundreds of standard
+    deviations away from what is linear, and a few from what is seen.
+    """
+    first = problem.coordinates(before.hypothesis).linear[-DEVIATIONS:]
+    bent = shift.copy()
+    for _ in range(_BENT_STEPS):
+        solved = np.asarray(np.isfinite(bent).all(axis=1))
+        seen = marginal(problem, hypothesis, before, np.where(solved[:, None], bent, 0.0))
+        followed = np.abs(seen.follow[:, first]).max(axis=1)
+        far = (followed > _STRAIGHT) & (followed < _HOPELESSLY_FAR)
+        rows = np.flatnonzero(solved & far & (seen.visible < _MOSTLY_FOLLOWED * seen.whole))
+        if not len(rows):
+            break
+        moved = before.z + seen.follow[rows]
+        theta = problem.theta(before.hypothesis, moved)
+        theta = np.column_stack([theta, _effect(problem, before, hypothesis, share[rows])])
+        there = problem.predict_at(hypothesis, theta)
+        bent[rows] = there - before.predicted - seen.follow[rows] @ before.slopes.T
+    return bent
 
 
 def _effect(

@@ -25,10 +25,15 @@ def test_a_rival_that_can_follow_is_not_told_apart() -> None:
 def test_causes_alike_form_one_group_and_others_none() -> None:
     alike = [toy.fit(toy.stiffening(size), toy.tension()) for size in (2e-3, 2.01e-3)]
     apart = toy.fit(np.zeros(toy.design().size), toy.tension())
-    assert grouped([alike[0], apart, alike[1]]) == ((0, 2),)
+    assert grouped([[alike[0]], [apart], [alike[1]]]) == ((0, 2),)
 
 
 def test_groups_are_connected() -> None:
     steps = [toy.fit(toy.stiffening(k * 5e-5), np.zeros((toy.design().size, 1))) for k in range(3)]
     assert expected_log_bayes_factor(steps[0], steps[2]) > 3
-    assert grouped(steps) == ((0, 1, 2),)
+    assert grouped([[step] for step in steps]) == ((0, 1, 2),)
+
+
+def test_a_cause_of_two_faces_is_like_what_one_of_them_is_like() -> None:
+    one, other = (toy.fit(toy.stiffening(size), toy.tension()) for size in (0.0, 2e-3))
+    assert grouped([[one, other], [toy.fit(toy.stiffening(2e-3), toy.tension())]]) == ((0, 1),)

@@ -70,6 +70,19 @@ def test_the_scans_evidence_is_near_that_of_the_fit(
     assert found.starts(problem.coordinates(hypothesis), 2).shape[1] == len(fit.z)
 
 
+def test_the_scan_follows_the_bars_length_as_far_as_it_goes() -> None:
+    """Linear, a change of the length that the bar's own makes up for seems tens of nats worse."""
+    longer = Hypothesis((("effective_length", Variant("arch end", ends=(1,))),))
+    problem = problem_of(campaign(longer.effects, [0.35]))
+    rng = np.random.default_rng(1)
+    before = baseline_fit(problem, rng)
+    found = scan(problem, before, longer)
+    truncate(problem, found)
+    gained = fitted(problem, longer, rng).log_evidence - before.log_evidence
+    assert gained > 3
+    assert found.log_evidence - before.log_evidence == pytest.approx(gained, abs=1.5)
+
+
 def test_shapes_show_a_turned_sensor() -> None:
     turned = Variant("all sensors")
     problem = problem_of(campaign(shape_sd=0.01))

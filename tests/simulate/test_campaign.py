@@ -200,6 +200,16 @@ def test_the_size_is_the_square_root_of_the_least_chi_square(hanger: Hanger) -> 
     assert size_of(hanger, STATE, (clamp,), plan) == pytest.approx(exact, rel=0.02)
 
 
+@pytest.mark.parametrize("deviations", [-1.0, 2.0])
+def test_a_longer_bar_is_as_large_as_its_scatter_makes_it(
+    hanger: Hanger, deviations: float
+) -> None:
+    """At the arch end the change of length is the very deviation of the bar as made."""
+    change = deviations * hanger.scatter.length * hanger.length_m
+    longer = PlantedEffect("effective_length", "arch end", {"length_change_m": change})
+    assert size_of(hanger, STATE, (longer,), EXACT) == pytest.approx(abs(deviations), rel=0.02)
+
+
 def test_nothing_planted_has_no_size(hanger: Hanger) -> None:
     assert size_of(hanger, STATE, (), EXACT) == 0
 
