@@ -194,7 +194,7 @@ def test_the_size_is_the_square_root_of_the_least_chi_square(hanger: Hanger) -> 
         plain = logs((), 0.01 * z[0], Deviations(*(0.005 * z[1:])))
         return np.concatenate([(plain - data) / 1e-4, z[1:]])
 
-    best = least_squares(misfit, np.zeros(5), diff_step=1e-3, max_nfev=6)
+    best = least_squares(misfit, np.zeros(5), diff_step=np.full(5, 1e-3), max_nfev=6)
     exact = math.sqrt(2 * best.cost)
     assert 3 < exact < 30
     assert size_of(hanger, STATE, (clamp,), plan) == pytest.approx(exact, rel=0.02)
