@@ -7,7 +7,11 @@ from shm.gap.contract import Hypothesis
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 
-IN_BASELINE = {"beam2": ("rotational_end_flexibility",)}
+IN_BASELINE = {
+    "beam2": ("rotational_end_flexibility",),
+    "solid1": ("rotational_end_flexibility", "translational_end_flexibility"),
+    "solid2": ("rotational_end_flexibility",),
+}
 """Effects that a baseline class has as parameters of its own."""
 
 

@@ -21,14 +21,13 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.stats import beta
 
 from shm.gap.attribution import Attribution, Explanation, attributed
 from shm.gap.observations import observed
@@ -47,14 +46,12 @@ from shm.simulate import (
     size_of,
 )
 from shm.values import Hanger
+from tests.benchmarks.gap.outcomes import ABOUT, NONE, Case, Outcome, kept
+from tests.benchmarks.gap.table import fragment, marks
 from tests.benchmarks.identification.page import put
 
-NAMED, COVERED, NO_GAP, UNEXPLAINED, SECONDS = 0.90, (0.80, 0.98), 0.95, 0.80, 60.0
-ENOUGH = 20
 DRAWS_OF_A_CASE = 12
-ABOUT = 1.02
 WEAK = 0.02, 0.2
-NONE = "no effect"
 ROD = Hanger(
     id=3,
     length_m=12.0,
@@ -67,51 +64,6 @@ ROD = Hanger(
 )
 PLAN = CampaignPlan()
 DOCS = Path(__file__).parents[2] / "docs" / "gap_trial.md"
-HEADER = (
-    "effect",
-    "size",
-    "n",
-    "named first",
-    "first or in the group",
-    "size in its 90 % interval",
-    "tension off before, after",
-)
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is planted: an effect of the catalogue at a size in standard deviations, or nothing."""
-
-    effect: str
-    size: float
-    seed: int
-    without: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a diagnosis did on a case; `covered` is None where the size was not estimated."""
-
-    case: Case
-    planted: PlantedEffect | None
-    size: float = 0.0
-    first: bool = False
-    in_group: bool = False
-    led: bool = False
-    leader: str = ""
-    group: tuple[str, ...] = ()
-    probability: float = 0.0
-    no_gap: float = 0.0
-    unexplained: float = 0.0
-    covered: bool | None = None
-    p_value: float = 0.0
-    tension_before: float = 0.0
-    tension_after: float = 0.0
-    seconds: float = 0.0
-
-    @property
-    def left_out(self) -> bool:
-        return self.case.effect in self.case.without
 
 
 def solved(case: Case) -> Outcome:
@@ -207,117 +159,6 @@ def covered(
     return bool(low <= planted.values[name] <= high)
 
 
-def share(flags: Sequence[bool]) -> float:
-    return float(np.mean(flags)) if flags else float("nan")
-
-
-def of(flags: Sequence[bool]) -> str:
-    return f"{sum(flags)} of {len(flags)}" if flags else "-"
-
-
-def with_interval(flags: Sequence[bool]) -> str:
-    """The share with Jeffreys' 90 % interval."""
-    hits, misses = sum(flags), len(flags) - sum(flags)
-    low, high = (float(beta.ppf(each, hits + 0.5, misses + 0.5)) for each in (0.05, 0.95))
-    return f"{of(flags)}: {share(flags):.2f} ({low:.2f} to {high:.2f})"
-
-
-def sizes_said(wanted: float, outcomes: Sequence[Outcome]) -> str:
-    """The size wanted, or from which to which they are where the effect cannot be so small."""
-    sizes = [each.size for each in outcomes]
-    if not sizes or max(sizes) < ABOUT * wanted:
-        return f"{wanted:g}"
-    return f"{min(sizes):.0f} to {max(sizes):.0f}"
-
-
-def answered(outcome: Outcome) -> bool:
-    """Whether the answer is right: the effect or its group; something unknown if it is left out."""
-    if outcome.left_out:
-        return outcome.unexplained > max(outcome.probability, outcome.no_gap)
-    return outcome.first or outcome.in_group
-
-
-def quiet(outcome: Outcome) -> bool:
-    """Whether no gap leads."""
-    return not outcome.led and outcome.no_gap > outcome.unexplained
-
-
-def covers(outcomes: Sequence[Outcome]) -> list[bool]:
-    return [each.covered for each in outcomes if each.covered is not None]
-
-
-def row(name: str, size: str, outcomes: Sequence[Outcome]) -> tuple[str, ...]:
-    """A line of the table."""
-    before, after = (
-        100 * float(np.median([abs(getattr(each, name)) for each in outcomes]))
-        for name in ("tension_before", "tension_after")
-    )
-    return (
-        name,
-        size,
-        str(len(outcomes)),
-        of([each.first for each in outcomes]),
-        of([answered(each) for each in outcomes]),
-        of(covers(outcomes)),
-        f"{before:.2f} %, {after:.2f} %",
-    )
-
-
-def rows(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
-    """A line for every effect and size, in the order of the catalogue."""
-    kinds = sorted({(list(PLANTED).index(o.case.effect), o.case.size) for o in outcomes})
-    found = []
-    for index, size in kinds:
-        name = list(PLANTED)[index]
-        own = [o for o in outcomes if (o.case.effect, o.case.size) == (name, size)]
-        found.append(row(name, sizes_said(size, own), own))
-    return found
-
-
-def marks(outcomes: Sequence[Outcome]) -> list[tuple[str, str, bool]]:
-    """What is asked, what was found, whether it is met."""
-    planted = [each for each in outcomes if each.planted is not None]
-    empty = [each for each in outcomes if each.case.effect == NONE]
-    found = []
-    for size in sorted({each.case.size for each in planted}):
-        own = [each for each in planted if each.case.size == size]
-        right = [answered(each) for each in own]
-        least = UNEXPLAINED if own[0].left_out else NAMED
-        mark = f"{'unexplained' if own[0].left_out else 'named'}, size {size:g}, at least {least}"
-        found.append((mark, with_interval(right), share(right) >= least))
-        sizes = covers(own)
-        inside = len(sizes) < ENOUGH or COVERED[0] <= share(sizes) <= COVERED[1]
-        if sizes:
-            mark = f"size {size:g} in its 90 % interval, {COVERED[0]} to {COVERED[1]}"
-            found.append((mark, with_interval(sizes), inside))
-    if empty:
-        calm = [quiet(each) for each in empty]
-        mark = f"no gap leads where none is, at least {NO_GAP}"
-        found.append((mark, with_interval(calm), share(calm) >= NO_GAP))
-    seconds = [each.seconds for each in outcomes]
-    said = f"median {np.median(seconds):.1f}, largest {np.max(seconds):.1f}"
-    found.append((f"seconds of one core, below {SECONDS:g}", said, max(seconds) < SECONDS))
-    return found
-
-
-def fragment(outcomes: Sequence[Outcome]) -> str:
-    """Both tables for people."""
-    seeds = sorted({each.case.seed for each in outcomes})
-    lines = [
-        f"Seeds {seeds[0]} to {seeds[-1]}.",
-        "",
-        "| mark | found | met |",
-        "| --- | --- | --- |",
-    ]
-    lines += [
-        f"| {mark} | {found} | {'yes' if met else 'no'} |" for mark, found, met in marks(outcomes)
-    ]
-    lines += ["", f"| {' | '.join(HEADER)} |", f"| {' | '.join('---' for _ in HEADER)} |"]
-    planted = [each for each in outcomes if each.planted is not None]
-    lines += [f"| {' | '.join(cells)} |" for cells in rows(planted)]
-    return "\n".join(lines)
-
-
 def detail(outcome: Outcome) -> str:
     """One case in a line."""
     values = outcome.planted.values if outcome.planted else {}
@@ -329,15 +170,6 @@ def detail(outcome: Outcome) -> str:
         f" {outcome.unexplained:.2f}, alike {'/'.join(outcome.group)}, covered {outcome.covered},"
         f" p {outcome.p_value:.2f}, {outcome.seconds:.1f} s"
     )
-
-
-def kept(line: str) -> Outcome:
-    """An outcome from a line of the answers."""
-    fields = json.loads(line)
-    case, planted = fields.pop("case"), fields.pop("planted")
-    case["without"] = tuple(case["without"])
-    fields["group"] = tuple(fields["group"])
-    return Outcome(Case(**case), PlantedEffect(**planted) if planted else None, **fields)
 
 
 def arguments() -> argparse.Namespace:

@@ -8,8 +8,6 @@ import numpy as np
 
 from shm.values import FloatArray, Hanger
 
-DECK, ARCH = 0, 1
-
 
 @dataclass(frozen=True, eq=False)
 class Zone:

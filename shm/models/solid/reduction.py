@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.sparse import csc_array
 
 from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
@@ -23,6 +22,7 @@ from shm.values import BoolArray, FloatArray
 
 _REFERENCE_SPRING_N_M = 1e8
 _NEGLIGIBLE = 1e-6
+_LOST_IN_ROUNDING = 1e-14
 _CANDIDATES = 300
 _MOST_CORNERS = 128
 _MOST_POINTS = 200
@@ -108,11 +108,16 @@ class Reservoir:
         return self.compressed(self.size)[1]
 
     def compressed(self, unknowns: int) -> tuple[FloatArray, Projected]:
-        """The basis (reservoir, n) of the strongest directions, and the system on it."""
+        """The basis (reservoir, n) of the strongest directions, and the system on it.
+
+        Directions whose mass is lost in rounding, local motions of very high frequency, are left
+        out of it.
+        """
         strongest = np.linalg.svd(self.coordinates, full_matrices=False)[0][:, :unknowns]
         mass = strongest.T @ self.matrices[0] @ strongest
-        factor = np.linalg.cholesky(mass)
-        basis = solve_triangular(factor, strongest.T, lower=True).T
+        share, direction = np.linalg.eigh(mass)
+        kept = share > _LOST_IN_ROUNDING * share[-1]
+        basis = strongest @ (direction[:, kept] / np.sqrt(share[kept]))
         projected = basis.T @ self.matrices[1:] @ basis
         return basis, Projected((projected + projected.swapaxes(1, 2)) / 2)
 
