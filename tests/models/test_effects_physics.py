@@ -263,3 +263,9 @@ def test_an_axis_along_a_plane_is_a_spring_in_it(angle: float, plane: str) -> No
 def test_an_axis_at_45_degrees_makes_a_round_bar_swing_at_45_degrees() -> None:
     shape = solved(physical("skewed_principal_axes", "both ends", (6.0, 45.0))).shape
     np.testing.assert_allclose(np.abs(shape[..., 0]), np.abs(shape[..., 1]), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["rotational_end_flexibility", "translational_end_flexibility"])
+def test_springs_alike_in_both_planes_are_two_of_one_size(name: str) -> None:
+    one = frequencies(name, "deck end, both planes alike", (7.6,))
+    np.testing.assert_array_equal(one, frequencies(name, "deck end", (7.6, 7.6)))

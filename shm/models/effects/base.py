@@ -30,7 +30,8 @@ class Variant:
     """Where an effect acts: `ends` (deck 0, arch 1), `planes`, the index of a sensor, a test.
 
     `at` says it in words; `key` in a word that may stand in the name of a model class. `places_m`
-    are those of the sensors where the effect acts at each of them.
+    are those of the sensors where the effect acts at each of them. With `alike` one value serves
+    all its planes.
     """
 
     at: str = "everywhere"
@@ -39,6 +40,7 @@ class Variant:
     sensor: int | None = None
     test: str = ""
     places_m: tuple[float, ...] = ()
+    alike: bool = False
 
     @property
     def key(self) -> str:

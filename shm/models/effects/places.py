@@ -35,6 +35,24 @@ def ends_and_planes(survey: Survey) -> tuple[Variant, ...]:
     )
 
 
+def springs(survey: Survey) -> tuple[Variant, ...]:
+    """Of springs at the ends: those of `ends_and_planes`, and alike in both measured planes.
+
+    What holds an end round its axis gives way the same in all directions; two free springs would
+    pay for a freedom that it does not have.
+    """
+    both = len(survey.planes) == len(PLANES)
+    alike = tuple(
+        Variant(f"{at}, both planes alike", ends=where, alike=True) for at, where in _ENDS if both
+    )
+    return ends_and_planes(survey) + alike
+
+
+def free_planes(variant: Variant) -> tuple[int, ...]:
+    """The planes that have a spring of their own; the first stands for all where they are alike."""
+    return variant.planes[:1] if variant.alike else variant.planes
+
+
 def place_along(hanger: Hanger) -> Parameter:
     """The place of a local effect."""
     return Parameter(

@@ -37,13 +37,13 @@ class RotationalEndFlexibility(Effect):
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends_and_planes(survey)
+        return places.springs(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]
         return tuple(
             scales.rotational_stiffness(f"log10_k{first + plane}", hanger)
-            for plane in variant.planes
+            for plane in places.free_planes(variant)
         )
 
     def applied(
@@ -56,6 +56,7 @@ class RotationalEndFlexibility(Effect):
     ) -> PhysicalHanger:
         compliance = physical.rotational_compliance_rad_n_m.copy()
         for end in variant.ends:
-            for column, plane in enumerate(variant.planes):
+            for plane in variant.planes:
+                column = 0 if variant.alike else variant.planes.index(plane)
                 compliance[:, end, plane, plane] += 10.0 ** -values[:, column]
         return replace(physical, rotational_compliance_rad_n_m=compliance)

@@ -30,7 +30,7 @@ class TranslationalEndFlexibility(Effect):
     imitated_by = ("support_motion", "shear_and_rotary_inertia", "stiff_end_zones", "point_mass")
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends_and_planes(survey)
+        return places.springs(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]
@@ -45,7 +45,7 @@ class TranslationalEndFlexibility(Effect):
                 "3 to 3000 times T/L + 100 EI/L^3, what the bar itself resists with: what holds a "
                 "hanger is stiffer than the hanger, nobody knows by how many orders of magnitude.",
             )
-            for plane in variant.planes
+            for plane in places.free_planes(variant)
         )
 
     def applied(
@@ -58,7 +58,8 @@ class TranslationalEndFlexibility(Effect):
     ) -> PhysicalHanger:
         compliance = physical.translational_compliance_m_n.copy()
         for end in variant.ends:
-            for column, plane in enumerate(variant.planes):
+            for plane in variant.planes:
+                column = 0 if variant.alike else variant.planes.index(plane)
                 compliance[:, end, plane] += 10.0 ** -values[:, column]
         return replace(physical, translational_compliance_m_n=compliance)
 

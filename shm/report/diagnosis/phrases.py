@@ -17,6 +17,7 @@ _PLACES = {
     "all tests": "in all tests",
     "transverse": "in the transverse plane",
     "longitudinal": "in the longitudinal plane",
+    "both planes alike": "in both planes alike",
 }
 _MOST_PLACES = 2
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
