@@ -25,12 +25,8 @@ def laden_ratio(
     Of bars of `length_m` (n,) from the deck end at tensions (n,), on rotational springs at the deck
     and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
     """
-    springs = np.stack(springs_n_m_rad, axis=1)
-    bare = replace(
-        PhysicalHanger.clamped(hanger, tension_n),
-        arch_end_m=length_m,
-        rotational_compliance_rad_n_m=(1 / springs)[..., None] * np.eye(2),
-    )
+    bar = replace(PhysicalHanger.clamped(hanger, tension_n), arch_end_m=length_m)
+    bare = bar.on_springs(springs_n_m_rad)
     one = np.ones(len(tension_n))
     mass = PointMass(added_mass.x_m * one, added_mass.mass_kg * one)
     laden = replace(bare, masses=(mass,))

@@ -50,15 +50,14 @@ class Baseline:
         """The hangers of `theta` (n, parameters) before any effect, with that many sensors."""
         whole = self._whole(theta)
         tension_n = theta[:, self.names.index("theta_F")] * self.hanger.nominal_tension_n
-        springs = np.stack(self._model.springs_n_m_rad(whole), axis=1)
         clamped = PhysicalHanger.clamped(self.hanger, tension_n, sensors)
         deck_m, arch_m = _ends_m(self._model)
-        return replace(
+        bar = replace(
             clamped,
             deck_end_m=np.full(len(theta), deck_m),
             arch_end_m=np.full(len(theta), arch_m),
-            rotational_compliance_rad_n_m=(1 / springs)[..., None] * np.eye(2),
         )
+        return bar.on_springs(self._model.springs_n_m_rad(whole))
 
     def ratio(self, theta: FloatArray, modes: int) -> FloatArray:
         """The class's frequencies over those of the general model (n, 2, modes)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,6 +107,12 @@ class PhysicalHanger:
                 for each in hanger.turnbuckles
             ),
         )
+
+    def on_springs(self, springs_n_m_rad: tuple[FloatArray, FloatArray]) -> PhysicalHanger:
+        """The same on rotational springs at the deck and the arch end, each (n, planes)."""
+        springs = np.stack(springs_n_m_rad, axis=1)
+        compliance = (1 / springs)[..., None] * np.eye(2)
+        return replace(self, rotational_compliance_rad_n_m=compliance)
 
     @property
     def length_m(self) -> FloatArray:
