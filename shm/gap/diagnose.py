@@ -161,7 +161,9 @@ def _tension(
     draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in answer]
     counts = rng.multinomial(len(draws[0]), weight / weight.sum())
     mixed = [rng.choice(each, count) for each, count in zip(draws, counts, strict=True)]
-    return TensionEstimate(*_summary(np.concatenate(mixed)))
+    samples = np.concatenate(mixed)
+    low, high = (float(each) for each in np.quantile(samples, [0.025, 0.975]))
+    return TensionEstimate(*_summary(samples), low, high)
 
 
 def _summary(samples: FloatArray) -> tuple[float, float, float, float]:

@@ -118,13 +118,32 @@ class Shrinkage:
 
 
 @dataclass(frozen=True)
+class Outlier:
+    """A frequency that belongs neither to the model nor to any effect: a blunder, most likely.
+
+    `expected_hz` is what the other data say with its standard deviation; `probability` is that of
+    the blunder. The diagnosis sets it aside.
+    """
+
+    plane: Plane
+    order: int
+    test: str
+    measured_hz: float
+    expected_hz: float
+    expected_sd_hz: float
+    probability: float
+
+
+@dataclass(frozen=True)
 class TensionEstimate:
-    """Posterior of the tension under one explanation: mean, sd and 90 % interval."""
+    """Posterior of the tension under one explanation: mean, sd, 90 % and 95 % intervals."""
 
     mean: float
     sd: float
     q05: float
     q95: float
+    q025: float = NAN
+    q975: float = NAN
 
 
 @dataclass(frozen=True)
@@ -145,6 +164,7 @@ class Diagnosis:
     `fit_p_value` is the posterior predictive p-value of the leading explanation. `invisible` names
     the effects that these data cannot show, and why; `left_out` those that were taken out of the
     catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
+    `outliers` are frequencies that were set aside.
     """
 
     hanger: int | None
@@ -168,6 +188,7 @@ class Diagnosis:
     remarks: tuple[str, ...]
     seed: int
     seconds: float
+    outliers: tuple[Outlier, ...] = ()
 
     def claim(self, cause: Cause) -> float:
         """The probability of a cause together with those that the data cannot tell it from."""

@@ -1,0 +1,1 @@
+"""The gap diagnosis tried blind: cases are made and sealed, solved without the key, then scored."""

@@ -1,0 +1,152 @@
+"""What a blind trial of the gap diagnosis knows of its cases, and how it scores the answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from shm.values.diagnosis import Diagnosis
+from shm.values.kinds import NAN, Plane
+
+PlantedKind = Literal["none", "one", "two", "unknown"]
+"""Nothing, one effect of the catalogue, two of them, something that the catalogue lacks."""
+
+Richness = Literal["one plane", "two planes", "known mass", "shapes", "conditions", "everything"]
+"""What a case's tests measure: both planes from `two planes` on, and then what is named besides."""
+
+Way = Literal["modes", "recordings"]
+"""Whether a case holds identified modes, or recordings that are still to be identified."""
+
+
+@dataclass(frozen=True)
+class TrueEffect:
+    """What was planted: its name, where it acts, its parameters, its size by itself.
+
+    `size` is the square root of the best attainable chi-square difference.
+    """
+
+    name: str
+    at: str
+    values: Mapping[str, float]
+    size: float
+
+
+@dataclass(frozen=True)
+class TrueFrequency:
+    """The frequency that a test would have shown without any error."""
+
+    test: str
+    plane: Plane
+    order: int
+    frequency_hz: float
+
+
+@dataclass(frozen=True)
+class TrueCase:
+    """One case of the key. `size` is that of all effects together, 0 for none.
+
+    `tension_n` is the true tension, at the mean temperature and the reference level.
+    `left_out` are the effects that the second round takes out of the catalogue.
+    """
+
+    case: str
+    kind: PlantedKind
+    richness: Richness
+    way: Way
+    effects: tuple[TrueEffect, ...]
+    size: float
+    tension_n: float
+    frequencies: tuple[TrueFrequency, ...]
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the diagnosis said of a case, in the round with or without its effect.
+
+    `diagnosis` is None where it failed, and `failure` says why.
+    """
+
+    case: str
+    left_out: tuple[str, ...]
+    diagnosis: Diagnosis | None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Score:
+    """A figure with its 90 % interval (bootstrap over the cases), from `cases` cases."""
+
+    value: float
+    low: float = NAN
+    high: float = NAN
+    cases: int = 0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A score beside the bounds that it must keep; an infinite bound is none.
+
+    `richness` and `way` are empty where all count. `met` is None where too few cases speak.
+    """
+
+    name: str
+    score: Score
+    lower: float
+    upper: float
+    richness: Richness | Literal[""] = ""
+    way: Way | Literal[""] = ""
+    met: bool | None = None
+
+
+@dataclass(frozen=True)
+class CaseScore:
+    """One answer beside its truth, flattened for scores, figures and tables.
+
+    `first` and `first_two` say whether the planted effect is named first or among the first two of
+    all causes, `in_group` whether it is in the first's group, `detected` whether anything but no
+    gap leads. `leader` is what leads: a cause's name, `no gap` or `unexplained`;
+    `leading_probability` that of its group and `right` whether it is the truth or its group.
+    `truth_probability` is what was given to the truth. `covered` is whether the planted size lies
+    in its 90 % interval, None where it was not estimated at its place; `tension_covered` that of
+    the tension in its 95 % interval. Errors of the tension are fractions. `held_out_ratio` is the
+    error of held-out predictions of the true frequencies after over before.
+    """
+
+    case: str
+    kind: PlantedKind
+    richness: Richness
+    way: Way
+    size: float
+    planted: str
+    leader: str
+    leading_probability: float
+    right: bool
+    detected: bool
+    first: bool
+    first_two: bool
+    in_group: bool
+    truth_probability: float
+    no_gap: float
+    unexplained: float
+    covered: bool | None = None
+    tension_error_before: float = NAN
+    tension_error_after: float = NAN
+    tension_covered: bool | None = None
+    held_out_ratio: float = NAN
+    seconds: float = NAN
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class TrialScore:
+    """All scores of a trial: its marks, and each case in both rounds."""
+
+    cases: int
+    seed: int
+    key_sha256: str
+    answers_sha256: str
+    marks: tuple[Mark, ...]
+    first_round: tuple[CaseScore, ...]
+    left_out: tuple[CaseScore, ...] = ()
