@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from shm.simulate import (
     TestConditions,
     campaign_with_truth,
 )
+from shm.simulate.manufacture import GLOBAL
 from shm.values import AddedMass, Hanger
 
 LACKS: dict[str, dict[str, Any]] = {
@@ -100,7 +101,7 @@ def truth_document(truth: CampaignTruth, seed: int) -> dict[str, Any]:
     """What a campaign was made of; an infinite parameter is written as text."""
     return {
         "tension_n": truth.tension_n,
-        "deviations": asdict(truth.deviations),
+        "deviations": {name: getattr(truth.deviations, name) for name in GLOBAL},
         "effects": [
             {
                 "effect": effect.name,

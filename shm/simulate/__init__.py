@@ -10,22 +10,35 @@ from __future__ import annotations
 from shm.simulate.ambient import AmbientPlan, ambient_test
 from shm.simulate.campaign import (
     Campaign,
-    CampaignPlan,
     CampaignTruth,
+    bar_in_test,
     campaign,
     campaign_with_truth,
+    realised,
 )
-from shm.simulate.detectable import at_share, scaled_to, size_of
+from shm.simulate.detectable import at_share, scaled_to, scaled_together, size_of
 from shm.simulate.disturbances import DISTURBANCES, Planted
-from shm.simulate.effects import PLANTED, PlantedEffect, TestConditions, choices, drawn
+from shm.simulate.drawing import drawn_hanger
+from shm.simulate.effects import (
+    PLANTED,
+    UNLISTED,
+    PlantedEffect,
+    TestConditions,
+    choices,
+    drawn,
+)
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import SimulatedTest, hammer_test, simulated_test
-from shm.simulate.planted import Deviations, PlantedModes, planted_modes
+from shm.simulate.manufacture import Deviations, SensorError
+from shm.simulate.plan import CampaignPlan
+from shm.simulate.planted import PlantedModes, planted_modes
+from shm.simulate.reality import Reality
 from shm.simulate.state import HammerPlan, HangerState, spread_places_m
 
 __all__ = [
     "DISTURBANCES",
     "PLANTED",
+    "UNLISTED",
     "AmbientPlan",
     "Campaign",
     "CampaignPlan",
@@ -36,18 +49,24 @@ __all__ = [
     "Planted",
     "PlantedEffect",
     "PlantedModes",
+    "Reality",
+    "SensorError",
     "SimulatedTest",
     "TestConditions",
     "ambient_test",
     "at_share",
+    "bar_in_test",
     "campaign",
     "campaign_with_truth",
     "choices",
     "drawn",
+    "drawn_hanger",
     "hammer_test",
     "natural_frequencies",
     "planted_modes",
+    "realised",
     "scaled_to",
+    "scaled_together",
     "simulated_test",
     "size_of",
     "spread_places_m",

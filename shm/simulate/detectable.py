@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.campaign import CampaignPlan, noiseless
+from shm.simulate.campaign import noiseless
 from shm.simulate.effects import PlantedEffect, ranges_of
-from shm.simulate.planted import Deviations
+from shm.simulate.manufacture import GLOBAL, Deviations, SensorError, wave_sd
+from shm.simulate.plan import CampaignPlan
+from shm.simulate.reality import sd_factors
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger
 
 _DIFFERENCE = 1e-4  # of tension and deviations
 _STEPS, _LONGEST_STEP = 4, np.array([0.3, 6.0, 6.0, 6.0, 6.0])
-_BISECTIONS = 12
+_BENT_STEP = np.array([3e-3, 0.3, 0.3, 0.3, 0.3])  # below, the data go linearly
+_BENDING = 1 + len(GLOBAL)
+_PART = 0.3  # of a standard deviation, for what is linear
+_SHARES = 2**12
+_NEAR = 0.02  # of the size asked for, where a campaign has a reality
 
 
 def size_of(
@@ -28,17 +34,23 @@ def size_of(
 
     Data without noise, with and without the effects; those without are fitted to them by tension
     and by the bar's deviations with their priors. What bends, such as the length's deviation, is
-    followed by a few steps, each linearised (Gauss-Newton).
+    followed by a few steps, each linearised (Gauss-Newton). With a reality, effects follow their
+    own laws, standard deviations differ by mode, and the section's waves and the errors of sensors
+    are fitted too, with their priors; what was drawn of them is not told.
     """
     plain, slopes = _baseline(hanger, state, plan)
+    sds = sds_of(hanger, state, plan)
     wanted = _data(hanger, state, effects, plan, Deviations())
     place, left = np.zeros(slopes.shape[1]), np.zeros(0)
     for count in range(_STEPS):
         if count:
             there, made = _bar_at(hanger, state, place)
             plain = _data(hanger, there, (), plan, made)
-        step, left = _fitted(wanted.beyond(plain, plan), place, slopes)
-        place = place + step.clip(-_LONGEST_STEP, _LONGEST_STEP)
+        step, left = _fitted(wanted.beyond(plain, sds), place, slopes)
+        if plan.reality is not None and np.all(np.abs(step[:_BENDING]) < _BENT_STEP):
+            break
+        step = step[:_BENDING].clip(-_LONGEST_STEP, _LONGEST_STEP)
+        place[:_BENDING] += step
     return float(np.linalg.norm(left))
 
 
@@ -53,20 +65,52 @@ def scaled_to(
 
     Where there are several (the springs of both planes) they go together through their ranges. A
     signed parameter keeps its sign. Where the weakest physical value is larger already, it is that;
-    None where the strongest is smaller.
+    None where the strongest is smaller. With a reality the size is right to 2 %.
     """
-    low, high = 0.0, 1.0
-    if _size_at(low, hanger, state, effect, plan) >= size:
-        return at_share(low, hanger, effect)
-    if _size_at(high, hanger, state, effect, plan) < size:
+
+    def beyond(number: int) -> float:
+        found = _size_at(number / _SHARES, hanger, state, effect, plan)
+        return math.log(found / size) if found > 0 else -math.inf
+
+    low, high = (0, beyond(0)), (_SHARES, beyond(_SHARES))
+    if low[1] >= 0:
+        return at_share(0.0, hanger, effect)
+    if high[1] < 0:
         return None
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        if _size_at(middle, hanger, state, effect, plan) < size:
-            low = middle
-        else:
-            high = middle
-    return at_share((low + high) / 2, hanger, effect)
+    near = 0.0 if plan.reality is None else _NEAR
+    while high[0] - low[0] > 1:
+        number = _between(low, high)
+        found = (number, beyond(number))
+        if abs(found[1]) < near:
+            return at_share(number / _SHARES, hanger, effect)
+        low, high = (found, high) if found[1] < 0 else (low, found)
+    return at_share((low[0] + high[0]) / 2 / _SHARES, hanger, effect)
+
+
+def scaled_together(
+    size: float,
+    hanger: Hanger,
+    state: HangerState,
+    effects: Sequence[PlantedEffect],
+    plan: CampaignPlan,
+) -> tuple[PlantedEffect, ...] | None:
+    """Each effect by itself scaled to a size; None where one of them cannot be so large."""
+    found = []
+    for effect in effects:
+        scaled = scaled_to(size, hanger, state, effect, plan)
+        if scaled is None:
+            return None
+        found.append(scaled)
+    return tuple(found)
+
+
+def _between(low: tuple[int, float], high: tuple[int, float]) -> int:
+    """Where a line through two (number, value) would be 0, but in the inner three quarters."""
+    wide = high[0] - low[0]
+    rise = high[1] - low[1]
+    share = -low[1] / rise if 0 < rise < math.inf else 0.5
+    inner = min(max(share, 0.125), 0.875) if wide > 16 else share
+    return min(max(low[0] + round(inner * wide), low[0] + 1), high[0] - 1)
 
 
 def at_share(share: float, hanger: Hanger, effect: PlantedEffect) -> PlantedEffect:
@@ -108,12 +152,17 @@ def _bar_at(
     hanger: Hanger, state: HangerState, place: FloatArray
 ) -> tuple[HangerState, Deviations]:
     """The state with the tension, and the bar with the deviations, of a place."""
-    own = {
-        each.name: float(getattr(hanger.scatter, each.name) * sds)
-        for each, sds in zip(fields(Deviations), place[1:], strict=True)
-    }
+    section, density, length, modulus = (
+        float(getattr(hanger.scatter, each) * sds)
+        for each, sds in zip(GLOBAL, place[1:_BENDING], strict=True)
+    )
     tension = state.tension_n * float(np.exp(place[0]))
-    return replace(state, tension_n=tension), Deviations(**own)
+    return replace(state, tension_n=tension), Deviations(section, density, length, modulus)
+
+
+def _only(name: str) -> Deviations:
+    section, density, length, modulus = (_DIFFERENCE * (each == name) for each in GLOBAL)
+    return Deviations(section, density, length, modulus)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +172,7 @@ class _Data:
     frequency: FloatArray
     shape: FloatArray
 
-    def beyond(self, plain: _Data, plan: CampaignPlan) -> FloatArray:
+    def beyond(self, plain: _Data, sds: _Data) -> FloatArray:
         """How far these data are from plain ones, in standard deviations, (data,).
 
         A shape's length and sign are nobody's data.
@@ -132,23 +181,59 @@ class _Data:
         other = np.linalg.norm(plain.shape, axis=1)
         sign = np.where(np.sum(self.shape * plain.shape, axis=1) < 0, -1.0, 1.0)
         apart = self.shape * (sign * other / own)[:, None] - plain.shape
-        frequency = (self.frequency - plain.frequency) / plan.frequency_sd
-        return np.concatenate([frequency, apart.ravel() / plan.shape_sd])
+        frequency = (self.frequency - plain.frequency) / sds.frequency
+        return np.concatenate([frequency, (apart / sds.shape).ravel()])
+
+
+def sds_of(hanger: Hanger, state: HangerState, plan: CampaignPlan) -> _Data:
+    """Standard deviations of log frequencies (frequencies,) and of shapes (shapes, 1)."""
+    planes = [PLANES.index(plane) for plane in plan.planes]
+    once = sd_factors(hanger, state, plan)[planes].ravel()
+    factors = np.tile(once, len(plan.tests(hanger)))
+    shapes = factors if plan.shapes else factors[:0]
+    return _Data(plan.frequency_sd * factors, plan.shape_sd * shapes[:, None])
 
 
 @lru_cache(maxsize=64)
 def _baseline(hanger: Hanger, state: HangerState, plan: CampaignPlan) -> tuple[_Data, FloatArray]:
-    """Data without effects, and their change (data, 5) by one tension and by one standard
-    deviation of each deviation.
+    """Data without effects, and their change (data, 5 and more) by one tension and by one standard
+    deviation of each deviation, then of the section's waves and the errors of sensors.
     """
+    sds = sds_of(hanger, state, plan)
     plain = _data(hanger, state, (), plan, Deviations())
+
+    def slope(other: _Data, difference: float) -> FloatArray:
+        return np.asarray(other.beyond(plain, sds) / difference)
+
     tauter = replace(state, tension_n=state.tension_n * (1 + _DIFFERENCE))
-    slopes = [_data(hanger, tauter, (), plan, Deviations()).beyond(plain, plan) / _DIFFERENCE]
-    for each in fields(Deviations):
-        other = _data(hanger, state, (), plan, Deviations(**{each.name: _DIFFERENCE}))
-        scatter = float(getattr(hanger.scatter, each.name))
-        slopes.append(other.beyond(plain, plan) / _DIFFERENCE * scatter)
+    slopes = [slope(_data(hanger, tauter, (), plan, Deviations()), _DIFFERENCE)]
+    for each in GLOBAL:
+        scatter = float(getattr(hanger.scatter, each))
+        slopes.append(slope(_data(hanger, state, (), plan, _only(each)), _DIFFERENCE) * scatter)
+    for made, sensors in _nuisances(hanger, plan):
+        slopes.append(slope(_data(hanger, state, (), plan, made, sensors), _PART))
     return plain, np.array(slopes).T
+
+
+def _nuisances(
+    hanger: Hanger, plan: CampaignPlan
+) -> Iterator[tuple[Deviations, tuple[SensorError, ...]]]:
+    """A part of a standard deviation of each section's wave and of each error of a sensor."""
+    reality = plan.reality
+    if reality is None:
+        return
+    for own in np.eye(reality.section_waves) * _PART * wave_sd(reality):
+        yield Deviations(section_waves=tuple(float(each) for each in own)), ()
+    right = tuple(SensorError(place) for place in plan.places_m(hanger))
+    for index, sensor in enumerate(right if plan.shapes else ()):
+        gain = 1 + _PART * reality.gain_sd
+        for wrong in (
+            replace(sensor, gain=(gain, 1.0)),
+            replace(sensor, gain=(1.0, gain)),
+            replace(sensor, off_m=_PART * reality.place_sd_m),
+            replace(sensor, turn_rad=_PART * reality.turn_sd_rad),
+        ):
+            yield Deviations(), (*right[:index], wrong, *right[index + 1 :])
 
 
 def _data(
@@ -157,11 +242,12 @@ def _data(
     effects: Sequence[PlantedEffect],
     plan: CampaignPlan,
     deviations: Deviations,
+    sensors: Sequence[SensorError] = (),
 ) -> _Data:
     planes = [PLANES.index(plane) for plane in plan.planes]
     frequencies, shapes = [], []
     for test in plan.tests(hanger):
-        found = noiseless(hanger, state, effects, plan, test, deviations)
+        found = noiseless(hanger, state, effects, plan, test, deviations, sensors)
         frequencies.append(np.log(found.frequency_hz[planes]).ravel())
         seen = found.shape[planes] if plan.biaxial else _own(found.shape, planes)
         shapes.append(seen.reshape(len(planes) * plan.modes, -1))

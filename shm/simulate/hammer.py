@@ -11,6 +11,7 @@ from datetime import datetime
 import numpy as np
 
 from shm.errors import UsageError
+from shm.simulate.bar import Bar
 from shm.simulate.disturbances import DISTURBANCES, Channels, Disturbance, Lines, Motion, Planted
 from shm.simulate.disturbances.base import Scene, T, Verb
 from shm.simulate.effects import PlantedEffect, TestConditions
@@ -21,12 +22,13 @@ from shm.simulate.planted_motion import (
     planted_bar,
     planted_plane_modes,
     seen_by_turned,
+    shifted,
 )
 from shm.simulate.pulse import force_of, pulse_of
 from shm.simulate.response import accelerations
 from shm.simulate.state import HammerPlan, HangerState, check
 from shm.simulate.strikes import Strike, draw_schedule
-from shm.values import NAN, PLANES, Hanger, Recording
+from shm.values import NAN, PLANES, FloatArray, Hanger, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +88,32 @@ def simulated_test(
     conditions: TestConditions | None = None,
 ) -> SimulatedTest:
     """The same with what was planted where."""
+    bar = planted_bar(hanger, state, plan, effects, conditions or TestConditions())
+    return struck(hanger, state, plan, rng, bar, disturbances=disturbances)
+
+
+def struck(
+    hanger: Hanger,
+    state: HangerState,
+    plan: HammerPlan,
+    rng: np.random.Generator,
+    bar: Bar | None,
+    *,
+    disturbances: Sequence[str] = (),
+    shifts: FloatArray | None = None,
+) -> SimulatedTest:
+    """A hammer test of a bar in which everything is planted; None is that of the state alone.
+
+    `shifts` (planes, modes) are fractions by which the lowest modes' frequencies differ in this
+    test from the bar's.
+    """
     check(hanger, state, plan)
     stages = _Stages(disturbances, rng)
-    bar = planted_bar(hanger, state, plan, effects, conditions or TestConditions())
     plan = by_logger(plan, bar)
     scene = Scene(hanger, state, plan, draw_schedule(hanger, plan, rng), bar)
     scene = replace(scene, schedule=stages.run("schedule", scene.schedule, scene))
-    motion = stages.run("motion", _motion(scene), scene)
+    modes = _modes(scene) if shifts is None else shifted(_modes(scene), shifts)
+    motion = stages.run("motion", _motion(scene, modes), scene)
     lines = stages.run("lines", _lines(motion, scene), scene)
     channels: Channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
     channels = stages.run("channels", channels, scene)
@@ -138,10 +159,9 @@ def _refuse_unless_hit(names: Sequence[str]) -> None:
         )
 
 
-def _motion(scene: Scene) -> Motion:
+def _motion(scene: Scene, modes: tuple[PlaneModes, ...]) -> Motion:
     """Modes, pulses and noise-free accelerations."""
     plan, state = scene.plan, scene.state
-    modes = _modes(scene)
     pulses = tuple(
         pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.blows
     )

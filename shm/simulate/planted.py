@@ -9,22 +9,9 @@ import numpy as np
 
 from shm.simulate.bar import Bar, bar_modes, bar_of
 from shm.simulate.effects import PlantedEffect, TestConditions, planted
+from shm.simulate.manufacture import Deviations, SensorError, as_made
 from shm.simulate.state import HangerState
 from shm.values import FloatArray, Hanger
-
-
-@dataclass(frozen=True)
-class Deviations:
-    """By which fractions a bar as made differs from its description.
-
-    Bending stiffness goes with modulus and the square of the section (an area), mass with density
-    and section; turnbuckles keep theirs. A longer bar ends farther from the deck.
-    """
-
-    section: float = 0.0
-    density: float = 0.0
-    length: float = 0.0
-    modulus: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +28,27 @@ class PlantedModes:
     damping_ratio: FloatArray
 
 
+def bar_under(
+    hanger: Hanger,
+    state: HangerState,
+    effects: Sequence[PlantedEffect],
+    conditions: TestConditions,
+    places_m: Sequence[float],
+    *,
+    deviations: Deviations | None = None,
+    sensors: Sequence[SensorError] = (),
+    own_laws: bool = False,
+) -> Bar:
+    """The bar under the conditions of one test, as made, with effects and turned sensors.
+
+    Raises UsageError for an effect that cannot be.
+    """
+    bar = as_made(bar_of(hanger, state), deviations or Deviations())
+    bar = planted(bar, effects, conditions, hanger, places_m, own_laws=own_laws)
+    turned = tuple((each.x_m, each.turn_rad) for each in sensors)
+    return replace(bar, turned_rad=bar.turned_rad + turned)
+
+
 def planted_modes(
     hanger: Hanger,
     state: HangerState,
@@ -50,45 +58,30 @@ def planted_modes(
     places_m: Sequence[float],
     *,
     deviations: Deviations | None = None,
+    sensors: Sequence[SensorError] = (),
+    own_laws: bool = False,
 ) -> PlantedModes:
     """The lowest `modes` modes of each plane under the conditions of one test.
 
-    Frequencies are right to 1e-5. Raises UsageError for an effect that cannot be.
+    `sensors` are the errors of all sensors in the order of the places, or none; with `own_laws`
+    effects follow other laws than the catalogue's. Frequencies are right to 1e-5. Raises UsageError
+    for an effect that cannot be.
     """
-    bar = _as_made(bar_of(hanger, state), deviations or Deviations())
-    bar = planted(bar, effects, conditions, hanger, places_m)
-    found = bar_modes(bar, modes, places_m)
+    bar = bar_under(
+        hanger, state, effects, conditions, places_m,
+        deviations=deviations, sensors=sensors, own_laws=own_laws,
+    )  # fmt: skip
+    true = [each.x_m + each.off_m for each in sensors] or places_m
+    gain = np.array([each.gain for each in sensors] or 1.0)
+    found = bar_modes(bar, modes, true)
     return PlantedModes(
         np.array([own.angular_frequency_rad_s for own in found]) / (2 * np.pi) * bar.clock_factor,
-        np.array([_seen(bar, own.at(places_m), places_m) for own in found]),
+        np.array([_seen(bar, own.at(true), places_m, gain) for own in found]),
         np.array([bar.damping_ratio + own.added_damping_ratio for own in found]),
     )
 
 
-def _as_made(bar: Bar, by: Deviations) -> Bar:
-    bending = (1 + by.modulus) * (1 + by.section) ** 2
-    mass = (1 + by.section) * (1 + by.density)
-    own = bar.bending_stiffness_n_m2
-    return replace(
-        bar,
-        arch_end_m=bar.deck_end_m + bar.length_m * (1 + by.length),
-        bending_stiffness_n_m2=(own[0] * bending, own[1] * bending),
-        mass_per_length_kg_m=bar.mass_per_length_kg_m * mass,
-        stretches=tuple(
-            replace(
-                each,
-                stiffness_factor=(
-                    each.stiffness_factor[0] / bending,
-                    each.stiffness_factor[1] / bending,
-                ),
-                mass_factor=each.mass_factor / mass,
-            )
-            for each in bar.stretches
-        ),
-    )
-
-
-def _seen(bar: Bar, moved: FloatArray, places_m: Sequence[float]) -> FloatArray:
+def _seen(bar: Bar, moved: FloatArray, places_m: Sequence[float], gain: FloatArray) -> FloatArray:
     """Components at turned sensors, (modes, places, 2), of (places, planes, modes)."""
     if not len(places_m):
         return np.zeros((moved.shape[2], 0, 2))
@@ -96,7 +89,7 @@ def _seen(bar: Bar, moved: FloatArray, places_m: Sequence[float]) -> FloatArray:
     c, s = np.cos(angle), np.sin(angle)
     transverse, longitudinal = moved[:, 0], moved[:, 1]
     turned = np.stack([c * transverse + s * longitudinal, c * longitudinal - s * transverse], -1)
-    flat = np.moveaxis(turned, 1, 0)
+    flat = np.moveaxis(turned, 1, 0) * gain
     largest = np.argmax(np.abs(flat).reshape(len(flat), -1), axis=1)
     scale = flat.reshape(len(flat), -1)[np.arange(len(flat)), largest]
     return np.asarray(flat / scale[:, None, None])

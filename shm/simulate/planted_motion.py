@@ -72,6 +72,25 @@ def planted_plane_modes(
     return _of_plane(found[0], 0), _of_plane(found[1], 1)
 
 
+def shifted(modes: Sequence[PlaneModes], by: FloatArray) -> tuple[PlaneModes, ...]:
+    """The modes of each plane with the lowest frequencies changed by fractions (planes, modes).
+
+    Where both planes hold the same modes, those of the first plane count.
+    """
+    return tuple(
+        _shifted(own, by[0 if own.other is not None else plane]) for plane, own in enumerate(modes)
+    )
+
+
+def _shifted(modes: PlaneModes, by: FloatArray) -> PlaneModes:
+    factor = np.ones(len(modes.angular_frequency_rad_s))
+    factor[: len(by)] += by[: len(factor)]
+    other = None if modes.other is None else _shifted(modes.other, by)
+    return replace(
+        modes, angular_frequency_rad_s=modes.angular_frequency_rad_s * factor, other=other
+    )
+
+
 def seen_by_turned(
     bar: Bar | None, accelerations: FloatArray, places_m: Sequence[float]
 ) -> FloatArray:

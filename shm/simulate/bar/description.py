@@ -5,41 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from shm.simulate.bar.parts import Attached, Mass, Pair, PartTime, Profile, Spring, Stretch
 from shm.simulate.pieces import pieces_of
 from shm.simulate.state import HangerState
 from shm.values import Hanger
 
-Pair = tuple[float, float]
 _SOFT = 1e-9  # of EI/L: a spring that stands for a hinge
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """A part of the bar whose bending stiffness, by plane, and mass are multiplied.
-
-    Parts may overlap.
-    """
-
-    start_m: float
-    end_m: float
-    stiffness_factor: Pair = (1.0, 1.0)
-    mass_factor: float = 1.0
-
-
-@dataclass(frozen=True)
-class Mass:
-    """A mass clamped on."""
-
-    x_m: float
-    mass_kg: float
-
-
-@dataclass(frozen=True)
-class Spring:
-    """A spring against something that stands still; its stiffness in each plane."""
-
-    x_m: float
-    stiffness_n_m: Pair
 
 
 @dataclass(frozen=True)
@@ -48,8 +19,9 @@ class BarEnd:
 
     `turning_rad_n_m` is the compliance of the rotations against moments, `cross_rad_n_m` between
     the planes, 0 for a clamped end. `held_n_m` is the spring against deflection, infinite for an
-    end that does not move; `support_mass_kg` moves with it. `loss_factor` is that
-    of the joint.
+    end that does not move; `support_mass_kg` moves with it. What moves may have a second
+    mode that adds to the end's deflection, by plane (spring, mass), mass 0 for none. `loss_factor`
+    is that of the joint.
     """
 
     turning_rad_n_m: Pair = (0.0, 0.0)
@@ -57,6 +29,7 @@ class BarEnd:
     held_n_m: Pair = (math.inf, math.inf)
     support_mass_kg: Pair = (0.0, 0.0)
     loss_factor: Pair = (0.0, 0.0)
+    second_mode: tuple[Pair, Pair] = ((0.0, 0.0), (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -67,7 +40,9 @@ class Bar:
     1/(kappa G A), `rotary_inertia_kg_m` rho I; `sag_parameter` Irvine's lambda squared in each
     plane; `damping_ratio` that of every mode without the joints'. The logger reports frequencies
     times `clock_factor`; the sensor at a place of `turned_rad` is turned about the bar's axis, from
-    transverse to longitudinal.
+    transverse to longitudinal. `tension_share` is the tension in each plane's tests over
+    `tension_n`. With `sags_as_it_bends` the sagging shape is the bar's own under its weight, else a
+    string's.
     """
 
     deck_end_m: float
@@ -85,6 +60,11 @@ class Bar:
     damping_ratio: float = 0.0
     clock_factor: float = 1.0
     turned_rad: tuple[tuple[float, float], ...] = ()
+    profiles: tuple[Profile, ...] = ()
+    attached: tuple[Attached, ...] = ()
+    part_time: tuple[PartTime, ...] = ()
+    tension_share: Pair = (1.0, 1.0)
+    sags_as_it_bends: bool = False
 
     @property
     def length_m(self) -> float:

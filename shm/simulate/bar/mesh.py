@@ -47,7 +47,17 @@ def mesh_of(bar: Bar, places_m: Sequence[float], elements: int) -> Mesh:
         inside = (each.start_m < middle) & (middle < each.end_m)
         stiffness[:, inside] *= np.array(each.stiffness_factor)[:, None]
         mass[inside] *= each.mass_factor
+    for profile in bar.profiles:
+        stiffness *= [
+            _between(profile.x_m, own, middle)
+            for own in zip(*profile.stiffness_factor, strict=True)
+        ]
+        mass *= _between(profile.x_m, profile.mass_factor, middle)
     return Mesh(nodes, stiffness, mass)
+
+
+def _between(x_m: Sequence[float], factor: Sequence[float], places_m: FloatArray) -> FloatArray:
+    return np.asarray(np.interp(places_m, x_m, factor, left=1.0, right=1.0))
 
 
 def interpolation(nodes_m: FloatArray, x_m: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -66,12 +76,25 @@ def interpolation(nodes_m: FloatArray, x_m: FloatArray) -> tuple[IntArray, Float
     return element, np.array(weights)
 
 
+def slopes(nodes_m: FloatArray, x_m: float) -> tuple[int, FloatArray]:
+    """The element of a place on the bar, and the bar's slope there (4,) with its ends' deflection
+    and rotation.
+    """
+    element = int(np.clip(np.searchsorted(nodes_m, x_m) - 1, 0, len(nodes_m) - 2))
+    size = nodes_m[element + 1] - nodes_m[element]
+    s = (x_m - nodes_m[element]) / size
+    bent = (6 * s**2 - 6 * s) / size
+    return element, np.array([bent, 1 - 4 * s + 3 * s**2, -bent, 3 * s**2 - 2 * s])
+
+
 def _special(bar: Bar, places_m: Sequence[float], elements: int) -> list[float]:
     """Ends, edges and, where they keep their distance, all places within, sorted."""
     length, layer = bar.length_m, _layer_m(bar)
     found = [bar.deck_end_m, bar.arch_end_m]
     edges = [edge for each in bar.stretches for edge in (each.start_m, each.end_m)]
+    edges += [place for profile in bar.profiles for place in profile.x_m]
     points = [mass.x_m for mass in bar.masses] + [spring.x_m for spring in bar.springs]
+    points += [each.x_m for each in bar.attached]
     bends = [x_m + step for x_m in points for step in _steps(layer, length / elements)]
     for wanted, apart in (
         (edges, _SAME * length),

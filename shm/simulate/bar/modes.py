@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from shm.simulate.bar.description import Bar, BarEnd, Pair, Spring
-from shm.simulate.bar.mesh import interpolation, mesh_of
+from shm.simulate.bar.description import Bar, BarEnd
+from shm.simulate.bar.mesh import mesh_of
+from shm.simulate.bar.part_time import alternatives, with_part_time
+from shm.simulate.bar.parts import Pair, Spring
 from shm.simulate.bar.problem import Solved, solved
+from shm.simulate.bar.shapes import BarModes
 from shm.values import BoolArray, FloatArray, IntArray
 
 # The frequency of a Hermite element errs by (wave number x size)^4/1440, 2e-6 in the highest mode;
@@ -20,35 +23,6 @@ _LEAST_ELEMENTS = 160
 _ELEMENTS_PER_MODE = 24
 _TIMES_FOR_SHEAR = 3
 _SPARE_MODES = 4
-
-
-@dataclass(frozen=True, eq=False)
-class BarModes:
-    """Modes that belong to one plane, mass-normalised, ascending.
-
-    `angular_frequency_rad_s` (modes,); `nodes_m` (nodes,); `deflection` and `rotation` (planes,
-    nodes, modes) in kg^-1/2 and kg^-1/2/m; `added_damping_ratio` (modes,) is what joints add.
-    """
-
-    angular_frequency_rad_s: FloatArray
-    nodes_m: FloatArray
-    deflection: FloatArray
-    rotation: FloatArray
-    added_damping_ratio: FloatArray
-
-    def at(self, places_m: Sequence[float]) -> FloatArray:
-        """Deflections, (places, planes, modes); 0 beyond the ends."""
-        places = np.asarray(places_m, float)
-        beyond = (places < self.nodes_m[0]) | (places > self.nodes_m[-1])
-        element, weights = interpolation(self.nodes_m, np.where(beyond, self.nodes_m[0], places))
-        ends = (
-            self.deflection[:, element],
-            self.rotation[:, element],
-            self.deflection[:, element + 1],
-            self.rotation[:, element + 1],
-        )
-        seen = np.einsum("wx,wpxm->xpm", weights, np.array(ends))
-        return np.where(beyond[:, None, None], 0.0, seen)
 
 
 def bar_modes(
@@ -65,6 +39,12 @@ def bar_modes(
     largest share of kinetic energy in the support, is left out unless `with_supports`. The mesh is
     `refined` times as fine as the accuracy asks for. Raises UsageError where the bar buckles.
     """
+    if bar.part_time:
+        own, *others = (
+            bar_modes(each, modes, places_m, with_supports=with_supports, refined=refined)
+            for each in alternatives(bar)
+        )
+        return with_part_time(bar, own, others)
     plain = replace(bar, clock_factor=1.0, turned_rad=(), damping_ratio=0.0)
     places = tuple(sorted(places_m))
     elements = refined * _elements(bar, modes)
@@ -103,6 +83,7 @@ def _of_one_plane(bar: Bar, plane: int) -> Bar:
             held_n_m=alike(end.held_n_m),
             support_mass_kg=alike(end.support_mass_kg),
             loss_factor=alike(end.loss_factor),
+            second_mode=(end.second_mode[plane], end.second_mode[plane]),
         )
 
     return replace(
@@ -114,6 +95,14 @@ def _of_one_plane(bar: Bar, plane: int) -> Bar:
         ),
         springs=tuple(Spring(each.x_m, alike(each.stiffness_n_m)) for each in bar.springs),
         sag_parameter=alike(bar.sag_parameter),
+        tension_share=alike(bar.tension_share),
+        profiles=tuple(
+            replace(each, stiffness_factor=tuple(alike(own) for own in each.stiffness_factor))
+            for each in bar.profiles
+        ),
+        attached=tuple(
+            replace(each, planes=(0, 1)) for each in bar.attached if plane in each.planes
+        ),
     )
 
 
@@ -124,6 +113,8 @@ def _alone(
     """Modes of the transverse plane, the other plane's components 0."""
     mesh = mesh_of(bar, places_m, elements)
     supports = sum(end.support_mass_kg[0] > 0 for end in bar.ends)
+    supports += sum(end.second_mode[0][1] > 0 for end in bar.ends)
+    supports += sum(len(each.modes) for each in bar.attached)
     spare = _SPARE_MODES + supports if supports and not with_supports else 0
     found = solved(bar, mesh, (0,), modes + spare)
     kept = _hangers_own(bar, found, () if with_supports else (0,))
@@ -167,6 +158,9 @@ def _hangers_own(bar: Bar, found: Solved, planes: tuple[int, ...]) -> IntArray:
             if mass > 0:
                 share = mass * found.deflection[number, -index] ** 2
                 own[int(np.argmax(np.where(own, share, -math.inf)))] = False
+    for square, share in zip(found.others_squares, found.elsewhere, strict=True):
+        if planes and square < found.squares[-1]:
+            own[int(np.argmax(np.where(own, share, -math.inf)))] = False
     return np.flatnonzero(own)
 
 

@@ -14,7 +14,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 from shm.errors import UsageError
 from shm.simulate.bar.description import Bar, BarEnd
 from shm.simulate.bar.elements import load_of, mass_of, stiffness_of
-from shm.simulate.bar.mesh import Mesh, interpolation
+from shm.simulate.bar.mesh import Mesh, interpolation, slopes
+from shm.simulate.bar.others import Others, others_of, tied
 from shm.values import FloatArray
 
 
@@ -24,7 +25,8 @@ class Solved:
 
     `squares` (modes,) of the angular frequency; `deflection` and `rotation` (planes, nodes, modes);
     `moved` (planes, modes) is twice the kinetic energy in each plane at unit frequency;
-    `added_damping_ratio` (modes,).
+    `elsewhere` (freedoms, modes) the same in what vibrates beside bar and supports, whose own
+    squares are `others_squares` (freedoms,); `added_damping_ratio` (modes,).
     """
 
     squares: FloatArray
@@ -32,6 +34,8 @@ class Solved:
     rotation: FloatArray
     moved: FloatArray
     added_damping_ratio: FloatArray
+    elsewhere: FloatArray
+    others_squares: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +51,27 @@ class _Joint:
 def solved(bar: Bar, mesh: Mesh, planes: Sequence[int], modes: int) -> Solved:
     """The lowest modes of the planes; raises UsageError where the bar buckles."""
     joints = [joint for end in (0, 1) for joint in _joints(bar.ends[end], end, planes)]
-    turn, springs, weights = _unknowns(bar, mesh, planes, joints)
+    others = others_of(bar, mesh, planes)
+    turn, springs, weights = _unknowns(bar, mesh, planes, joints, others)
     matrices = [_matrices(bar, mesh, plane) for plane in planes]
     mass = _diagonal_blocks([each[1] for each in matrices])
     stiffness = turn.T @ _diagonal_blocks([each[0] for each in matrices]) @ turn
+    stiffness = tied(stiffness + diags_array(springs), turn, others)
     sags = turn.T @ _sags(bar, mesh, planes)
+    if bar.sags_as_it_bends and np.any(sags):
+        sags = _as_it_bends(bar, mesh, stiffness, turn, sags)
     reduced_mass = turn.T @ mass @ turn + diags_array(weights)
-    squares, vectors = _lowest(stiffness + diags_array(springs), reduced_mass, sags, modes)
+    squares, vectors = _lowest(stiffness, reduced_mass, sags, modes)
+    first = len(vectors) - len(others.masses_kg)
     full = (turn @ vectors).reshape(len(planes), len(mesh.nodes_m), 2, modes)
     return Solved(
         squares,
         full[:, :, 0],
         full[:, :, 1],
         _moved(full.reshape(len(planes), -1, modes), [each[1] for each in matrices]),
-        _damping(joints, vectors, squares),
+        _damping(joints, vectors[first - len(joints) : first], squares),
+        np.array(others.masses_kg)[:, None] * vectors[first:] ** 2,
+        others.squares,
     )
 
 
@@ -69,11 +80,15 @@ def _matrices(bar: Bar, mesh: Mesh, plane: int) -> tuple[Any, Any]:
     bending = bar.bending_stiffness_n_m2[plane] * mesh.stiffness_factor[plane]
     shear, size = bar.shear_compliance_1_n, mesh.size_m
     per_length = bar.mass_per_length_kg_m * mesh.mass_factor
-    stiffness = stiffness_of(size, bending, shear, bar.tension_n)
+    stiffness = stiffness_of(size, bending, shear, bar.tension_n * bar.tension_share[plane])
     mass = mass_of(size, bending, shear, per_length, bar.rotary_inertia_kg_m)
     springs = [(each.x_m, each.stiffness_n_m[plane]) for each in bar.springs]
     _add_at_points(stiffness, mesh, springs)
     _add_at_points(mass, mesh, [(each.x_m, each.mass_kg) for each in bar.masses])
+    for each in bar.masses:
+        if each.rotary_inertia_kg_m2 and mesh.nodes_m[0] <= each.x_m <= mesh.nodes_m[-1]:
+            element, slope = slopes(mesh.nodes_m, each.x_m)
+            mass[element] += each.rotary_inertia_kg_m2 * np.outer(slope, slope)
     return _assembled(stiffness), _assembled(mass)
 
 
@@ -119,10 +134,10 @@ def _joints(end: BarEnd, index: int, planes: Sequence[int]) -> list[_Joint]:
 
 
 def _unknowns(
-    bar: Bar, mesh: Mesh, planes: Sequence[int], joints: Sequence[_Joint]
+    bar: Bar, mesh: Mesh, planes: Sequence[int], joints: Sequence[_Joint], others: Others
 ) -> tuple[Any, FloatArray, FloatArray]:
     """What the bar's 2 nodes x planes freedoms are of the unknowns (sparse), and what springs and
-    masses act on these (unknowns,). The joints' unknowns are the last.
+    masses act on these (unknowns,). The joints' unknowns are the last but for the others'.
     """
     a_plane = 2 * len(mesh.nodes_m)
     springs, weights = np.zeros(a_plane * len(planes)), np.zeros(a_plane * len(planes))
@@ -141,14 +156,20 @@ def _unknowns(
         rows.append(node + a_plane * np.arange(len(planes)))
         columns.append(np.full(len(planes), len(kept) + order))
         shares.append(joint.direction)
+    first = len(kept) + len(joints)
+    for own, freedom in enumerate(others.adds_to):
+        if freedom >= 0:
+            rows.append(np.array([freedom]))
+            columns.append(np.array([first + own]))
+            shares.append(np.ones(1))
     entries = (np.concatenate(rows), np.concatenate(columns))
-    shape = (a_plane * len(planes), len(kept) + len(joints))
+    shape = (a_plane * len(planes), first + len(others.masses_kg))
     turn = csc_array((np.concatenate(shares), entries), shape=shape)
     stiff = np.array([joint.stiffness_n_m_rad for joint in joints])
     return (
         turn,
-        np.concatenate([springs[kept], stiff]),
-        np.concatenate([weights[kept], 0 * stiff]),
+        np.concatenate([springs[kept], stiff, others.springs_n_m]),
+        np.concatenate([weights[kept], 0 * stiff, others.masses_kg]),
     )
 
 
@@ -168,6 +189,32 @@ def _sags(bar: Bar, mesh: Mesh, planes: Sequence[int]) -> FloatArray:
         strength = bar.sag_parameter[plane] * bar.tension_n / bar.length_m**3
         vectors[number * a_plane : (number + 1) * a_plane, number] = math.sqrt(strength) * area
     return vectors
+
+
+def _as_it_bends(bar: Bar, mesh: Mesh, stiffness: Any, turn: Any, sags: FloatArray) -> FloatArray:
+    """The vectors of `_sags` (unknowns, planes) for the shape in which the bar itself hangs.
+
+    Moved by that shape it stretches as much as a string does whose motion has the same area.
+    """
+    bent = splu(stiffness.tocsc()).solve(sags)
+    tight = turn.T @ _tightened(bar, mesh, turn @ bent)
+    stretch, area = np.sum(bent * tight, axis=0), np.sum(bent * sags, axis=0)
+    return np.asarray(tight * np.divide(area, stretch, out=np.zeros_like(area), where=stretch > 0))
+
+
+def _tightened(bar: Bar, mesh: Mesh, bent: FloatArray) -> FloatArray:
+    """The tension's part of the stiffness times deflections, (freedoms, planes).
+
+    A bar that hangs as y under a unit load stretches by the integral of T y' w' when it moves by w:
+    a string's y makes that the area of w.
+    """
+    size, bending, shear = mesh.size_m, bar.bending_stiffness_n_m2, bar.shear_compliance_1_n
+    blocks = []
+    for own in range(bent.shape[1]):
+        stiff = bending[own] * mesh.stiffness_factor[own]
+        tight = stiffness_of(size, stiff, shear, bar.tension_n)
+        blocks.append(_assembled(tight - stiffness_of(size, stiff, shear, 0.0)))
+    return np.asarray(_diagonal_blocks(blocks) @ bent)
 
 
 def _lowest(
@@ -202,12 +249,12 @@ def _moved(full: FloatArray, masses: Sequence[Any]) -> FloatArray:
     )
 
 
-def _damping(joints: Sequence[_Joint], vectors: FloatArray, squares: FloatArray) -> FloatArray:
+def _damping(joints: Sequence[_Joint], turns: FloatArray, squares: FloatArray) -> FloatArray:
     """Half the loss factor: each joint's times its share of the mode's strain energy.
 
     C. D. Johnson and D. A. Kienholz, AIAA Journal 20 (1982).
     """
     loss = np.zeros_like(squares)
-    for joint, turned in zip(joints, vectors[len(vectors) - len(joints) :], strict=True):
+    for joint, turned in zip(joints, turns, strict=True):
         loss += joint.loss_factor * joint.stiffness_n_m_rad * turned**2
     return np.asarray(loss / squares / 2)

@@ -20,10 +20,14 @@ from shm.simulate.effects.base import (
     Where,
     where_of,
 )
+from shm.simulate.effects.laws import LAWS
+from shm.simulate.unlisted import UNLISTED
 from shm.values import PLANES, Hanger
 
 __all__ = [
+    "LAWS",
     "PLANTED",
+    "UNLISTED",
     "PlantedEffect",
     "Range",
     "TestConditions",
@@ -77,17 +81,21 @@ def planted(
     conditions: TestConditions,
     hanger: Hanger,
     places_m: Sequence[float],
+    *,
+    own_laws: bool = False,
 ) -> Bar:
     """The bar with the effects, one after the other, and the test's known mass.
 
-    Raises UsageError for an effect, place or parameter that does not exist.
+    With `own_laws` they follow those of `LAWS`, where there is one. Raises UsageError for an
+    effect, place or parameter that does not exist.
     """
     scene = Scene(Where(), conditions, hanger, tuple(places_m))
     for effect in effects:
         if _vanishes(effect, ranges_of(effect, hanger)):
             continue
         own = replace(scene, where=where_of(effect.at))
-        bar = _known(effect.name).apply(bar, effect.values, own)
+        law = LAWS.get(effect.name) if own_laws else None
+        bar = (law or _known(effect.name).apply)(bar, effect.values, own)
     if conditions.added_mass is not None:
         known = {"mass_kg": conditions.added_mass.mass_kg, "x_m": conditions.added_mass.x_m}
         bar = along.clamp(bar, known, scene)
@@ -148,6 +156,7 @@ def drawn(name: str, at: str, hanger: Hanger, rng: np.random.Generator) -> Plant
 
 
 def _known(name: str) -> Plantable:
-    if name not in PLANTED:
+    known = {**PLANTED, **UNLISTED}
+    if name not in known:
         raise UsageError(f"{name!r} is no effect.", remedy=f"Use one of {', '.join(PLANTED)}.")
-    return PLANTED[name]
+    return known[name]
