@@ -16,6 +16,7 @@ from shm.values import (
     EffectEstimate,
     GapPlace,
     NextMeasurement,
+    Outlier,
     Residual,
     Shrinkage,
     TensionEstimate,
@@ -51,6 +52,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "invisible": [{"effect": name, "why": why} for name, why in diagnosis.invisible],
         "left_out": list(diagnosis.left_out),
         "remarks": list(diagnosis.remarks),
+        "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
     }
 
 
@@ -63,7 +65,10 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 
 
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
-    """A diagnosis back from its document."""
+    """A diagnosis back from its document.
+
+    One from before outliers and 95 % intervals were told has none of them.
+    """
     return Diagnosis(
         **_values(Diagnosis, {name: document[name] for name in _PLAIN}),
         tests=tuple(document["tests"]),
@@ -79,6 +84,7 @@ def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
         invisible=tuple((each["effect"], each["why"]) for each in document["invisible"]),
         left_out=tuple(document["left_out"]),
         remarks=tuple(document["remarks"]),
+        outliers=tuple(_noun(Outlier, each) for each in document.get("outliers", ())),
     )
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from shm.gap.chances import Family, Tried, families, probabilities
 from shm.gap.contract import Fit
-from shm.gap.groups import faces, grouped
+from shm.gap.groups import SAME_BELOW, faces, grouped
+from shm.gap.imitation import imitated_share, visible_shifts
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
@@ -48,8 +49,9 @@ class Attribution:
 
     `explanations` are the effects that were tried and the pairs that called for it, best first;
     `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior
-    predictive p-value of the leading explanation that has no remainder. `invisible` names the
-    effects that these data cannot show, and why.
+    predictive p-value of the leading explanation that has no remainder. A part of
+    `unexplained_probability` is that of something unknown that passes for an effect of the
+    catalogue. `invisible` names the effects that these data cannot show, and why.
     """
 
     baseline: Fit
@@ -93,19 +95,26 @@ def attributed(
     tried = search.with_unknown(search.singles())
     if search.calls_for_pairs(tried):
         tried = search.with_pairs(tried)
-    kinds = families(search.with_sampled(tried), search.variants)
+    kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     progress("weighing", 1.0)
-    return _attribution(search, kinds, [float(chance) for chance in probabilities(kinds)])
+    likeliest = _fit([kind for kind in kinds if not kind.flexible])
+    imitated = imitated_share(visible_shifts(search.scans), search.baseline, likeliest)
+    chances, passing = probabilities(kinds, imitated)
+    return _attribution(search, kinds, [float(chance) for chance in chances], passing)
 
 
-def _attribution(search: Search, kinds: Sequence[Family], chances: Sequence[float]) -> Attribution:
+def _attribution(
+    search: Search, kinds: Sequence[Family], chances: Sequence[float], passing: float
+) -> Attribution:
+    """`passing` is the probability of something unknown that passes for one of the effects."""
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
     flexible = [kind for kind in kinds if kind.flexible]
     causes, groups = _with_groups(search.problem, _explanations(kinds, chances, none))
     return Attribution(
         baseline=_fit([none]),
         no_gap_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k is none),
-        unexplained_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k.flexible),
+        unexplained_probability=passing
+        + sum(c for k, c in zip(kinds, chances, strict=True) if k.flexible),
         unexplained=_fit(flexible),
         explanations=causes,
         groups=groups,
@@ -143,17 +152,21 @@ def _with_groups(
     top = max((each.log_bayes_factor for each in causes), default=0.0)
     alone = {each.effect: each.log_bayes_factor for each in causes}
     able = [
-        (index, each.best.fit)
+        (index, each.best.fit, top - each.log_bayes_factor < SAME_BELOW)
         for index, each in enumerate(causes)
-        if each.best.fit is not None
-        and each.log_bayes_factor > max(0.0, top - WITHIN_REACH)
-        and not _idle(each, alone)
+        if each.best.fit is not None and _reached(each, top) and not _idle(each, alone)
     ]
-    found = grouped([faces(problem, fit) for _, fit in able])
+    found = grouped([faces(problem, fit) for _, fit, _ in able], [near for *_, near in able])
     members = [tuple(able[i][0] for i in group) for group in found]
     names = tuple(tuple(causes[i].effect for i in group) for group in members)
     index = {i: number for number, group in enumerate(members) for i in group}
     return tuple(replace(each, group=index.get(i)) for i, each in enumerate(causes)), names
+
+
+def _reached(cause: Explanation, top: float) -> bool:
+    """Whether these data leave a cause a chance beside the best one, of log Bayes factor `top`."""
+    level = cause.log_bayes_factor
+    return level > top - SAME_BELOW or level > max(0.0, top - WITHIN_REACH)
 
 
 def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:

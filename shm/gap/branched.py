@@ -121,10 +121,11 @@ def _moved(part: Normal, w: FloatArray, owned: FloatArray) -> Normal:
     total = owned.sum()
     if total <= 0:
         return part
-    mean = owned @ w / total
-    effective = total**2 / (owned**2).sum()
+    share = owned / total
+    mean = share @ w
+    effective = 1 / (share**2).sum()
     kept = (w.shape[1] + 2) / (effective + w.shape[1] + 2)
-    own = (owned[:, None] * (w - mean)).T @ (w - mean) / total
+    own = (share[:, None] * (w - mean)).T @ (w - mean)
     centre = (1 - kept) * mean + kept * part.mean
     return Normal(centre, _INFLATION * ((1 - kept) * own + kept * part.covariance))
 

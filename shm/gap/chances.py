@@ -83,10 +83,23 @@ def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, 
     return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
 
 
-def probabilities(candidates: Sequence[Family]) -> FloatArray:
-    """Of each family, (families,); they add to 1."""
+def probabilities(candidates: Sequence[Family], imitated: float = 0.0) -> tuple[FloatArray, float]:
+    """Of each family, (families,), and of something unknown that passes for one of the effects.
+
+    All add to 1. The share `imitated` of what is unknown does to the data what a single effect
+    does, any of them as likely; of the rest the same share does what a pair does, and what is left
+    is as free as the flexible remainder.
+    """
     log = np.array([each.log_evidence + each.log_prior for each in candidates])
-    return np.asarray(np.exp(log - logsumexp(log)))
+    flexible = np.array([each.flexible for each in candidates])
+    effects = np.where(flexible, 0, [each.effects for each in candidates])
+    free = 1 - imitated
+    weight = np.exp(log - log.max()) * np.where(flexible, free**2, 1.0)
+    as_single = imitated * UNKNOWN / SINGLE * weight[effects == 1].sum()
+    as_pair = free * imitated * UNKNOWN / PAIR * weight[effects == 2].sum()
+    passing = float(as_single + as_pair)
+    whole = weight.sum() + passing
+    return np.asarray(weight / whole), float(passing / whole)
 
 
 def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:

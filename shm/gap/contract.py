@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+import numpy as np
+
 from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
 
@@ -62,14 +64,26 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Of the data about a prediction: `frequency` (F, F), and `shape` (S,), the variances.
+    """Of the data about a prediction: `frequency` (F, F), and of the components of shapes.
 
-    Components of shapes err independently, frequencies do not: a model error is the same in all
-    tests.
+    Those err independently with the variances `shape` (S,), and together by k errors of sensors,
+    which repeat in every mode and test: `shape_loads` (S, k) is what one standard deviation of each
+    does. So the covariance of shapes is diag(shape) + shape_loads shape_loads'.
     """
 
     frequency: FloatArray
     shape: FloatArray
+    shape_loads: FloatArray
+
+    @property
+    def shape_variance(self) -> FloatArray:
+        """The whole variance (S,) of each component."""
+        return np.asarray(self.shape + (self.shape_loads**2).sum(axis=1))
+
+    def part(self, frequencies: IntArray, components: IntArray) -> Covariance:
+        """Of some frequencies and some components of shapes, by index."""
+        own = self.frequency[np.ix_(frequencies, frequencies)]
+        return Covariance(own, self.shape[components], self.shape_loads[components])
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,7 +161,7 @@ class Coordinates:
 
 def _grown(parameter: Parameter, value: FloatArray, factor: FloatArray) -> FloatArray:
     if parameter.spread == "uniform":
-        return np.asarray(value - np.log10(factor))
+        return np.asarray(value - np.sign(parameter.zero) * np.log10(factor))
     return np.asarray(value / factor if np.isinf(parameter.zero) else value * factor)
 
 

@@ -7,20 +7,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.attribution import Attribution, Explanation, attributed
+from shm.gap.answer import answered
+from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
-from shm.gap.remarks import usable
+from shm.gap.remarks import doubtful, set_aside, usable
+from shm.gap.setting_aside import cleared, outliers, with_outliers
 from shm.gap.shrinkage import held_out, shrinkage
 from shm.gap.trends import trends
 from shm.gap.where import residuals
-from shm.models import build
+from shm.models import check_baseline
 from shm.models.effects import check_effect_priors
 from shm.values import (
+    NAN,
     Cause,
     Diagnosis,
     EffectEstimate,
@@ -57,16 +60,19 @@ def diagnose(
     options = options or GapOptions()
     started = time.perf_counter()
     check_effect_priors(hanger)
-    build(options.baseline, hanger)
+    check_baseline(options.baseline, hanger)
     found = usable(tests, hanger)
-    problem = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
+    whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
     rng = np.random.default_rng(options.seed)
-    attribution = attributed(
-        problem, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
-    )
+    clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
+    problem, attribution = clear.problem, clear.attribution
     progress("shrinkage", _ATTRIBUTION)
+    answer = answered(attribution)
     before, leading = attribution.baseline, attribution.leading
     after = leading.best.fit if leading else None
+    aside, doubted = (
+        outliers(clear, errors, answer[0][1]) for errors in (clear.aside, clear.doubted)
+    )
     held = held_out(problem, before, after, options.hold_out, rng)
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))
@@ -75,7 +81,7 @@ def diagnose(
         hanger=hanger.id,
         baseline=options.baseline,
         tests=tuple(test.id for test in found.tests),
-        where=residuals(problem, before, after, held),
+        where=with_outliers(clear, residuals(problem, before, after, held), before, after),
         trends=trends(problem, before),
         places=places(problem, before),
         no_gap_probability=attribution.no_gap_probability,
@@ -85,14 +91,15 @@ def diagnose(
         invisible=attribution.invisible,
         left_out=options.without,
         fit_p_value=attribution.p_value,
-        model_error_percent=100 * _answer(attribution)[0][1].model_error,
+        model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
         tension_before_n=_tension(problem, [(1.0, before)], rng),
-        tension_after_n=_tension(problem, _answer(attribution), rng),
+        tension_after_n=_tension(problem, answer, rng),
         next_measurements=following,
-        remarks=found.remarks,
+        remarks=(*found.remarks, *set_aside(aside), *doubtful(doubted)),
         seed=options.seed,
         seconds=time.perf_counter() - started,
+        outliers=aside,
     )
 
 
@@ -127,23 +134,6 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
     )
 
 
-def _answer(attribution: Attribution) -> list[tuple[float, Fit]]:
-    """The fits, with their probabilities, of what the diagnosis claims.
-
-    All members of the leading group: which of them it is, the data cannot tell.
-    """
-    leading = attribution.leading
-    if leading is None:
-        no_gap = attribution.no_gap_probability >= attribution.unexplained_probability
-        return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
-    group = [
-        each
-        for each in attribution.explanations
-        if each is leading or (each.group is not None and each.group == leading.group)
-    ]
-    return [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
-
-
 def _contenders(attribution: Attribution) -> list[Fit]:
     """The fits that further measurements should tell apart, the likeliest first."""
     weighed = [(attribution.no_gap_probability, attribution.baseline)]
@@ -156,7 +146,9 @@ def _contenders(attribution: Attribution) -> list[Fit]:
 def _tension(
     problem: GapProblem, answer: Sequence[tuple[float, Fit]], rng: np.random.Generator
 ) -> TensionEstimate:
-    """The tension over all fits of an answer, each with its weight."""
+    """The tension over all fits of an answer, each with its weight; NaN of a bar without any."""
+    if not problem.hanger.nominal_tension_n:
+        return TensionEstimate(NAN, NAN, NAN, NAN)
     weight = np.array([weight for weight, _ in answer])
     draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in answer]
     counts = rng.multinomial(len(draws[0]), weight / weight.sum())

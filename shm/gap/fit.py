@@ -94,9 +94,14 @@ def _draws(found: list[Optimum], rng: np.random.Generator) -> FloatArray:
     counts = rng.multinomial(_DRAWS, np.exp(log - logsumexp(log)))
     return np.vstack(
         [
-            each.branch.z(
-                rng.multivariate_normal(each.w, each.covariance, count, method="cholesky")
-            )
+            each.branch.z(_scattered(each, count, rng))
             for each, count in zip(found, counts, strict=True)
         ]
     )
+
+
+def _scattered(optimum: Optimum, count: int, rng: np.random.Generator) -> FloatArray:
+    """Draws (count, d) by the curvature's own factor: its inverse may be too uneven for one."""
+    factor = np.linalg.cholesky(optimum.curvature)
+    normal = rng.standard_normal((count, len(optimum.w)))
+    return np.asarray(optimum.w + np.linalg.solve(factor.T, normal.T).T)

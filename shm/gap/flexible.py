@@ -8,12 +8,14 @@ extra variance of every component. Sizes are log-uniform, so that a remainder pa
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from shm.gap.contract import Covariance, Design, NoiseNode, Observations
+from shm.gap.contract import Design, NoiseNode, Observations
 from shm.gap.noise import nodes
+from shm.gap.repeated import Repeated
 from shm.values import FloatArray
 
 LARGEST_FREQUENCY = 0.1
@@ -26,12 +28,14 @@ PLAIN_NODES = 3
 SD_UNKNOWN = 1e-3
 
 
-def flexible_nodes(observations: Observations) -> tuple[NoiseNode, ...]:
+def flexible_nodes(
+    observations: Observations, repeated: Repeated | None = None
+) -> tuple[NoiseNode, ...]:
     """The unknown errors together with a remainder, in place of the unknown errors alone.
 
     Their weights add to 1. A remainder of the frequencies, of the shapes and of both are as likely.
     """
-    plain = _thinned(nodes(observations))
+    plain = _thinned(nodes(observations, repeated))
     kinds = _kinds(observations)
     log_share = -np.log(len(kinds))
     return tuple(
@@ -60,7 +64,8 @@ def _kinds(observations: Observations) -> list[list[tuple[FloatArray, FloatArray
 def _with_remainder(
     node: NoiseNode, frequency: FloatArray, shape: FloatArray, log_share: np.float64
 ) -> NoiseNode:
-    covariance = Covariance(node.covariance.frequency + frequency, node.covariance.shape + shape)
+    own = node.covariance
+    covariance = replace(own, frequency=own.frequency + frequency, shape=own.shape + shape)
     return NoiseNode(covariance, float(node.log_weight + log_share), node.model_error)
 
 

@@ -59,7 +59,7 @@ def foreseen(problem: GapProblem, fit: Fit, design: Design, errors: Errors) -> F
     predicted = predicted * _agreement(design, predicted, predicted[0])
     ahead, back = np.split(predicted[1:], 2)
     spread = (ahead - back).T / (2 * _STEP_IN_SDS)
-    return _given_the_old(problem.observations, fit, design, errors, predicted[0], spread)
+    return _given_the_old(problem, fit, design, errors, predicted[0], spread)
 
 
 def divergence(one: Foresight, other: Foresight) -> float:
@@ -94,7 +94,7 @@ def _around(problem: GapProblem, fit: Fit, roots: FloatArray) -> FloatArray:
 
 
 def _given_the_old(
-    observations: Observations,
+    problem: GapProblem,
     fit: Fit,
     design: Design,
     errors: Errors,
@@ -102,19 +102,24 @@ def _given_the_old(
     spread: FloatArray,
 ) -> Foresight:
     """Condition predictions `mean` (data,) and `spread` (data, d) on the errors of the old data."""
+    observations = problem.observations
     old, new = observations.design.frequencies, design.frequencies
     variance = errors.repeated**2
+    was, will = problem.repeated, problem.section_of(design)
     shared = variance * _same_modes(design, observations.design)
-    among_old = variance * _same_modes(observations.design, observations.design)
+    shared += will @ was.section.T
+    among_old = variance * _same_modes(observations.design, observations.design) + was.frequency
     gain = np.linalg.solve(among_old + np.diag(errors.sd[:old] ** 2), shared.T).T
     mean, spread = mean.copy(), spread.copy()
     mean[:new] += gain @ (observations.value - fit.predicted)[:old]
     spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[:old]
-    shapes = errors.sd[old:]
+    shapes = np.hypot(errors.sd[old:], np.linalg.norm(was.sensors, axis=1))
     shape_sd = np.median(shapes) if shapes.size else _USUAL_SHAPE_SD
     sd = np.repeat([np.median(errors.sd[:old]), shape_sd], [new, len(mean) - new])
     noise = np.diag(sd**2)
-    noise[:new, :new] += variance * _same_modes(design, design) - gain @ shared.T
+    read = problem.readings_of(design)
+    among_new = variance * _same_modes(design, design) + will @ will.T + read @ read.T
+    noise[:new, :new] += among_new - gain @ shared.T
     return Foresight(design, mean, spread @ spread.T + noise)
 
 

@@ -17,7 +17,9 @@ from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 
 SAME_BELOW = 3.0
-"""Expected log Bayes factor under which two causes count as not separable."""
+"""Log Bayes factor, expected or found, under which two causes count as not separable: evidence of
+less than twenty to one is not strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+"""
 
 
 NOTABLE_WITHIN = 1.6
@@ -50,14 +52,20 @@ def faces(problem: GapProblem, fit: Fit) -> tuple[Fit, ...]:
     return (fit, *others)
 
 
-def grouped(causes: Sequence[Sequence[Fit]]) -> tuple[tuple[int, ...], ...]:
+def grouped(
+    causes: Sequence[Sequence[Fit]], near: Sequence[bool] | None = None
+) -> tuple[tuple[int, ...], ...]:
     """Indices of `causes` that cannot be told apart, each group of two and more, in their order.
 
-    A cause has one or several faces; one alike is enough. Groups are connected: a cause that is
-    like two others joins them.
+    A cause has one or several faces; one alike is enough. Those that are `near` the best by the
+    evidence found are one group, whatever better data would say. Groups are connected: a cause that
+    is like two others joins them.
     """
-    links = np.eye(len(causes))
+    close = np.array(near if near is not None else [False] * len(causes), dtype=bool)
+    links = np.eye(len(causes)) + np.outer(close, close)
     for i, j in combinations(range(len(causes)), 2):
+        if links[i, j]:
+            continue
         pairs = product(causes[i], causes[j])
         links[i, j] = any(expected_log_bayes_factor(*pair) < SAME_BELOW for pair in pairs)
     count, label = connected_components(csr_array(links), directed=False)

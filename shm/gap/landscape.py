@@ -12,6 +12,9 @@ from shm.gap.problem import GapProblem
 from shm.values import BoolArray, FloatArray
 
 _DIFFERENCE = 1e-4
+_STEEPEST = 1e3
+"""Slopes beyond this are cliffs: where a support's own mode crosses one of the bar, the names of
+the two change places. Nothing can be followed over them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,7 @@ class Landscape:
         slopes[:, :, moved] = np.moveaxis(residual[0] - residual[1:], 0, -1) / _DIFFERENCE
         likelihood = self.likelihood.log(residual[0])
         likelihood = np.where(np.isfinite(slopes).all(axis=(1, 2)), likelihood, -np.inf)
+        slopes[np.abs(slopes) > _STEEPEST] = 0.0
         return Views(w, residual[0], slopes, likelihood + log_normal(w))
 
 

@@ -1,7 +1,8 @@
 """How likely residuals are when the size of the errors is one of several possibilities.
 
 The frequencies' covariances fall apart into blocks (as a rule one mode in all tests), which are
-factored once each. Possibilities that share a covariance share the work.
+factored once each. What sensors do to all shapes alike is of low rank and follows by Woodbury's
+identity. Possibilities that share a covariance share the work.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.special import logsumexp
 
-from shm.gap.contract import NoiseNode
+from shm.gap.contract import Covariance, NoiseNode
 from shm.values import FloatArray, IntArray
 
 _LOG_2_PI = float(np.log(2 * np.pi))
@@ -38,6 +39,41 @@ class _Blocks:
         """Adds C^-1 X of columns X (data, c) to `total` (nodes, F, c)."""
         white = self._whitening @ columns[self._rows]
         total[:, self._rows] += np.swapaxes(self._whitening, 2, 3) @ white
+
+
+class ShapeErrors:
+    """Covariances diag(v) + U U' of shapes, K of them, with variances v (S,) and loads U (S, k).
+
+    By Woodbury's identity the inverse is diag(1/v) - T'T with T (k, S) = chol(1 + U'U/v)^-1 U'/v;
+    `log_volume` (K,) is half the log determinant.
+    """
+
+    def __init__(self, covariances: Sequence[Covariance]):
+        variance = np.array([each.shape for each in covariances])
+        loads = np.array([each.shape_loads for each in covariances])
+        self.precision: FloatArray = 1 / variance
+        weighted = np.swapaxes(loads * self.precision[:, :, None], 1, 2)
+        inner = np.linalg.cholesky(np.eye(loads.shape[2]) + weighted @ loads)
+        self._shared: FloatArray = np.linalg.solve(inner, weighted).astype(np.float64)
+        own = np.log(np.einsum("kii->ki", inner)).sum(axis=1)
+        self.log_volume: FloatArray = own + np.log(variance).sum(axis=1) / 2
+
+    def weighed(self, columns: FloatArray) -> FloatArray:
+        """C^-1 X (K, S, c) of columns X (S, c)."""
+        shared = np.swapaxes(self._shared, 1, 2) @ (self._shared @ columns)
+        return np.asarray(self.precision[:, :, None] * columns - shared)
+
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """r' C^-1 r (n, K) of residuals (n, S)."""
+        shared = self._shared @ residual.T
+        return np.asarray(residual**2 @ self.precision.T - np.einsum("kjn,kjn->nk", shared, shared))
+
+    def gram(self, columns: FloatArray) -> FloatArray:
+        """X' C^-1 X (n, K, c, c) of columns X (n, S, c)."""
+        weighted = columns[:, None] * self.precision[:, :, None]
+        shared = self._shared @ columns[:, None]
+        own = np.swapaxes(weighted, 2, 3) @ columns[:, None]
+        return np.asarray(own - np.swapaxes(shared, 2, 3) @ shared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,21 +102,22 @@ class Likelihood:
     def __init__(self, nodes: Sequence[NoiseNode]):
         self.nodes = tuple(nodes)
         self.log_weight = np.array([node.log_weight for node in nodes])
-        unique, self._frequency_of = _distinct([node.covariance.frequency for node in nodes])
-        shapes, self._shape_of = _distinct([node.covariance.shape for node in nodes])
-        self._covariances: FloatArray = np.array(unique)
-        self._shape_precision: FloatArray = 1 / np.array(shapes)
+        covariances = [node.covariance for node in nodes]
+        unique, self._frequency_of = _distinct([(each.frequency,) for each in covariances])
+        shapes, self._shape_of = _distinct([(c.shape, c.shape_loads) for c in covariances])
+        self._covariances: FloatArray = np.array([covariances[k].frequency for k in unique])
+        self._shape = ShapeErrors([covariances[k] for k in shapes])
         self.frequencies = self._covariances.shape[1]
         self._blocks = [_Blocks(rows, self._covariances) for rows in _rows(self._covariances)]
         volume = np.sum([each.log_volume for each in self._blocks], axis=0)[self._frequency_of]
-        volume = volume + np.log(np.array(shapes)).sum(axis=1)[self._shape_of] / 2
-        data = self.frequencies + self._shape_precision.shape[1]
+        volume = volume + self._shape.log_volume[self._shape_of]
+        data = self.frequencies + self._shape.precision.shape[1]
         self.log_height: FloatArray = self.log_weight - volume - data * _LOG_2_PI / 2
 
     def by_node(self, residual: FloatArray) -> FloatArray:
         """Log likelihood and log weight of each node, (n, nodes); -inf where it is not finite."""
         finite = np.asarray(np.isfinite(residual).all(axis=1))
-        squares = self._squares(np.where(finite[:, None], residual, 0.0))
+        squares = self.squares(np.where(finite[:, None], residual, 0.0))
         return np.where(finite[:, None], self.log_height - squares / 2, -np.inf)
 
     def log(self, residual: FloatArray) -> FloatArray:
@@ -90,7 +127,7 @@ class Likelihood:
     def gram(self, columns: FloatArray) -> FloatArray:
         """X' C^-1 X (n, nodes, c, c) of columns X (n, data, c)."""
         frequency = self._frequency_gram(columns[:, : self.frequencies])[:, self._frequency_of]
-        shape = self._shape_gram(columns[:, self.frequencies :])[:, self._shape_of]
+        shape = self._shape.gram(columns[:, self.frequencies :])[:, self._shape_of]
         return np.asarray(frequency + shape)
 
     def weighed(self, columns: FloatArray) -> Weighed:
@@ -98,16 +135,16 @@ class Likelihood:
         frequency = np.zeros((len(self._covariances), self.frequencies, columns.shape[1]))
         for block in self._blocks:
             block.add_weighed(columns, frequency)
-        shape = self._shape_precision[:, :, None] * columns[self.frequencies :]
+        shape = self._shape.weighed(columns[self.frequencies :])
         return Weighed(frequency, shape, self._frequency_of, self._shape_of)
 
-    def _squares(self, residual: FloatArray) -> FloatArray:
+    def squares(self, residual: FloatArray) -> FloatArray:
         """Squared whitened residuals (n, nodes)."""
         frequency = np.zeros((len(residual), len(self._covariances)))
         for block in self._blocks:
             white = block.whitened(residual[:, : self.frequencies])
             frequency += np.einsum("kbln,kbln->nk", white, white)
-        shape = residual[:, self.frequencies :] ** 2 @ self._shape_precision.T
+        shape = self._shape.squares(residual[:, self.frequencies :])
         return np.asarray(frequency[:, self._frequency_of] + shape[:, self._shape_of])
 
     def _frequency_gram(self, columns: FloatArray) -> FloatArray:
@@ -121,11 +158,6 @@ class Likelihood:
             total += white @ np.swapaxes(white, 2, 3)
         return np.swapaxes(total, 0, 1)
 
-    def _shape_gram(self, columns: FloatArray) -> FloatArray:
-        """(n, distinct variances, c, c) of columns (n, S, c)."""
-        weighted = columns[:, None] * self._shape_precision[:, :, None]
-        return np.asarray(np.swapaxes(weighted, 2, 3) @ columns[:, None])
-
 
 def _rows(covariances: FloatArray) -> list[IntArray]:
     """Rows of the blocks that no covariance connects, those of one length together."""
@@ -136,13 +168,13 @@ def _rows(covariances: FloatArray) -> list[IntArray]:
     return [np.array([m for m in members if len(m) == length]) for length in lengths]
 
 
-def _distinct(arrays: Sequence[FloatArray]) -> tuple[list[FloatArray], IntArray]:
-    """The arrays that differ and, for each of all, which of them it is."""
-    found: dict[bytes, int] = {}
-    kept: list[FloatArray] = []
+def _distinct(arrays: Sequence[tuple[FloatArray, ...]]) -> tuple[list[int], IntArray]:
+    """Indices of those that differ and, for each of all, which of them it is."""
+    found: dict[tuple[bytes, ...], int] = {}
+    kept: list[int] = []
     index = np.empty(len(arrays), dtype=np.int64)
     for k, each in enumerate(arrays):
-        index[k] = found.setdefault(each.tobytes(), len(found))
+        index[k] = found.setdefault(tuple(part.tobytes() for part in each), len(found))
         if index[k] == len(kept):
-            kept.append(each)
+            kept.append(k)
     return kept, index

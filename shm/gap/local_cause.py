@@ -61,10 +61,9 @@ def local_causes(problem: GapProblem) -> tuple[LocalCause, ...]:
     return tuple(_anywhere(problem, name, kind) for name, kind in _KINDS.items())
 
 
-def flexible_ends(problem: GapProblem) -> tuple[LocalCause, LocalCause]:
-    """The deck end and the arch end, each turning alike in all planes that were measured."""
-    deck, arch = (_flexible_end(problem, end) for end in (0, 1))
-    return deck, arch
+def flexible_ends(problem: GapProblem) -> tuple[LocalCause, ...]:
+    """The ends that are clamped, each turning alike in all planes that were measured."""
+    return tuple(_flexible_end(problem, end) for end in problem.hanger.supports.ends("clamped"))
 
 
 def _anywhere(problem: GapProblem, name: str, kind: str) -> LocalCause:

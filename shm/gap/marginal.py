@@ -96,18 +96,19 @@ def _products(
     likelihood: Likelihood, before: Fit, residual: FloatArray, shift: FloatArray
 ) -> _Products:
     d = len(before.z)
-    gram = likelihood.gram(np.column_stack([before.slopes, residual, shift.T])[None])[0]
+    columns = np.column_stack([before.slopes, residual])
+    gram = likelihood.weighed(columns).products(np.vstack([columns.T, shift]))
     # The prior is d more data, of value 0 and standard deviation 1.
-    inner, outer = gram[:, :d, :d] + np.eye(d), gram[:, :d, d:]
+    inner, outer = gram[:, :d, :d] + np.eye(d), np.swapaxes(gram[:, d:, :d], 1, 2).copy()
     outer[:, :, 0] -= before.z
-    solved = np.linalg.solve(inner, outer)
+    solved: FloatArray = np.linalg.solve(inner, outer).astype(np.float64)
     followed = (outer[:, :, :1] * solved).sum(axis=1)
     square = gram[:, d, d] + before.z @ before.z - followed[:, 0]
-    own = np.einsum("kgg->kg", gram[:, d + 1 :, d + 1 :])
+    own = likelihood.squares(shift).T
     alone = own - (outer[:, :, 1:] * solved[:, :, 1:]).sum(axis=1)
     volume = np.linalg.slogdet(inner)[1]
     return _Products(
-        cross=gram[:, d, d + 1 :] - followed[:, 1:],
+        cross=gram[:, d + 1 :, d] - followed[:, 1:],
         shift=np.maximum(alone, 0.0),
         whole=own,
         height=likelihood.log_height - volume / 2 - square / 2,

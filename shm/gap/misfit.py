@@ -23,8 +23,9 @@ class Misfit:
     at several temperatures, are taken together: `rows` (distinct,) are one of each kind, `value`
     and `sd` their weighted means, and the chi-square of their `scatter` about these is left over in
     any case. `deviation` (distinct,) is that of the values from the middle of the prior, to first
-    order; `slopes` (distinct, d) are those of the baseline and `weighted` the same over `sd`;
-    `inner` (d, d) is the covariance of the parameters. `data` counts all data; `least_scale` is the
+    order; `slopes` (distinct, p) are those of the baseline's d parameters and then, as further
+    parameters z, of the errors that repeat; `weighted` is the same over `sd`, `inner` (p, p) the
+    covariance of all p. `own` is d. `data` counts all data; `least_scale` is the
     least chi-square of a datum that is taken for noise.
     """
 
@@ -35,6 +36,7 @@ class Misfit:
     slopes: FloatArray
     weighted: FloatArray
     inner: FloatArray
+    own: int
     scatter: float
     data: int
     least_scale: float
@@ -46,16 +48,17 @@ class Misfit:
         precision = identification_sd(observations, before) ** -2
         sd = np.asarray(np.bincount(kind, precision) ** -0.5)
         value = np.bincount(kind, precision * observations.value) * sd**2
-        slopes = before.slopes[rows]
+        slopes = np.column_stack([before.slopes, problem.repeated.loads])[rows]
         weighted = slopes / sd[:, None]
         return cls(
             rows=rows,
             value=value,
             sd=sd,
-            deviation=value - before.predicted[rows] + slopes @ before.z,
+            deviation=value - before.predicted[rows] + before.slopes[rows] @ before.z,
             slopes=slopes,
             weighted=weighted,
             inner=np.asarray(np.linalg.inv(np.eye(slopes.shape[1]) + weighted.T @ weighted)),
+            own=len(before.z),
             scatter=float(precision @ (observations.value - value[kind]) ** 2),
             data=len(kind),
             least_scale=1.0 if np.isfinite(observations.sd).any() else _LEAST_SCALE,
@@ -69,7 +72,7 @@ class Misfit:
         return np.asarray(products - np.einsum("ij,ij->i", left @ self.inner, right))
 
     def parameters(self, deviation: FloatArray) -> FloatArray:
-        """The baseline's likeliest parameters z (n, d) for deviations (n, distinct)."""
+        """The likeliest parameters z (n, p) for deviations (n, distinct)."""
         return np.asarray((deviation / self.sd) @ self.weighted @ self.inner)
 
     @property
@@ -78,10 +81,14 @@ class Misfit:
         deviation = self.deviation[None]
         return float(self.products(deviation, deviation)[0]) + self.scatter
 
-    def at(self, predicted: FloatArray, baseline: FloatArray) -> FloatArray:
-        """The chi-square (n,) of predictions (n, distinct) by the baseline's z (n, d)."""
+    def repeated(self, z: FloatArray) -> FloatArray:
+        """What errors that repeat add to predictions (n, distinct) at parameters z (n, p)."""
+        return np.asarray(z[:, self.own :] @ self.slopes[:, self.own :].T)
+
+    def at(self, predicted: FloatArray, z: FloatArray) -> FloatArray:
+        """The chi-square (n,) of predictions (n, distinct) at parameters z (n, p)."""
         error = (self.value - predicted) / self.sd
-        return np.asarray((error**2).sum(axis=1) + (baseline**2).sum(axis=1)) + self.scatter
+        return np.asarray((error**2).sum(axis=1) + (z**2).sum(axis=1)) + self.scatter
 
     def log_likelihood(self, chi_square: FloatArray) -> FloatArray:
         """Of causes that leave `chi_square` (n,), relative to none at all.

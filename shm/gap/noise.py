@@ -1,43 +1,109 @@
 """The unknown errors of the data: a few possibilities, each a covariance with a prior weight.
 
-The frequencies err by their identification, independently, and by a small model error that belongs
-to a mode and so repeats in every test: cov = diag(sd^2) + sigma^2 [same plane and order]. sigma has
-a half-normal prior: the general model agrees with independent finite elements to 1e-5, and what is
-much larger than that is a gap, not scatter. Where no standard deviations are given there is instead
-one unknown standard deviation for all, log-uniform; where some are, both. Unknowns are integrated
-by the trapezoidal rule over their logarithm.
+The frequencies err by their identification, independently, by a small model error that belongs to a
+mode and so repeats in every test, and by what repeats in any case (`shm.gap.repeated`):
+cov = factor^2 diag(sd^2) + sigma^2 [same plane and order] + repeated. sigma has a half-normal
+prior: the general model agrees with independent finite elements to 1e-5, and what is much larger
+than that is a gap, not scatter. Stated standard deviations rest on a few hits and are themselves
+uncertain: those of one mode in several tests are drawn together as far as they differ by chance,
+and `factor`, what is left and common to all, has a log-normal prior; a wide one would take a gap
+for noise. That of the shapes is taken from their own scatter between tests. Where no standard
+deviations are given there is instead one unknown standard deviation for all, log-uniform; where
+some are, both. Unknowns are integrated by the trapezoidal rule over their logarithm.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
-from shm.values import FloatArray
+from shm.gap.repeated import Repeated
+from shm.values import FloatArray, IntArray
 
 MODEL_ERROR_SCALE = 2e-5
 MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))
 SD_LOWER, SD_UPPER = 1e-4, 3e-2
-_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 1e-4, 8
+FACTOR_SPREAD = 0.08
+"""Of the logarithm of true over stated standard deviations, common to all frequencies."""
+
+_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 1e-4, 5
+_SHAPES_SPREAD = 0.2
+_CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
 _SDS, _SDS_OF_SOME = 32, 12
-_SIGMAS_OF_SOME = 7
+_WILD, _LEAST_SCATTER = 3.0, 0.5
+_SETTLED = 0.06
+_FEWEST = 3
+_HERMITE = ((-1.732, 1 / 6), (0.0, 2 / 3), (1.732, 1 / 6))
 
 
-def nodes(observations: Observations) -> tuple[NoiseNode, ...]:
+def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple[NoiseNode, ...]:
     """The possibilities for `observations`; their weights add to 1."""
-    sd = observations.sd[: observations.design.frequencies]
-    shape = observations.sd[observations.design.frequencies :] ** 2
-    known = np.isfinite(sd)
-    same = same_mode(observations.design)
+    repeated = repeated or Repeated.none(observations.design)
+    observations = replace(observations, sd=drawn_together(observations))
+    stated = observations.sd[observations.design.frequencies :] ** 2
     return tuple(
         NoiseNode(
-            Covariance(np.diag(np.where(known, sd, common) ** 2) + sigma**2 * same, shape),
+            Covariance(frequency + repeated.frequency, factor**2 * stated, repeated.sensors),
             float(np.log(weight * share)),
+            error,
+        )
+        for frequency, weight, error in _of_frequencies(observations)
+        for factor, share in _factors_of_shapes(observations)
+    )
+
+
+def _of_frequencies(observations: Observations) -> list[tuple[FloatArray, float, float]]:
+    """Covariances (F, F) of what does not repeat in any case, weights, and the errors they mean."""
+    sd = observations.sd[: observations.design.frequencies]
+    known, same = np.isfinite(sd), same_mode(observations.design)
+    return [
+        (
+            np.diag(np.where(known, factor * sd, common) ** 2) + sigma**2 * same,
+            float(of_common * of_factor * of_sigma),
             float(sigma if known.any() else common),
         )
-        for common, share in zip(*_unknown_sds(known), strict=True)
-        for sigma, weight in zip(*_model_errors(known), strict=True)
-    )
+        for common, of_common in zip(*_unknown_sds(known), strict=True)
+        for factor, of_factor in zip(*_factors(known), strict=True)
+        for sigma, of_sigma in zip(*_model_errors(known), strict=True)
+    ]
+
+
+def drawn_together(observations: Observations) -> FloatArray:
+    """Standard deviations (data,), those of one mode in all tests drawn to their root mean square.
+
+    All the way where their logarithms scatter no more than chance makes them, hardly where they
+    scatter much more (James and Stein's shrinkage). Components of a shape keep their proportions.
+    """
+    design = observations.design
+    count, mode = design.frequencies, _modes(design)
+    frequency, shape = observations.sd[:count], observations.sd[count:]
+    of = np.unique(design.shape_mode, return_inverse=True)[1]
+    size = np.sqrt(np.bincount(of, shape**2) / np.maximum(np.bincount(of), 1))
+    factor = _drawn(mode[np.unique(design.shape_mode)], size) / size
+    return np.concatenate([_drawn(mode, frequency), shape * factor[of]])
+
+
+def _modes(design: Design) -> IntArray:
+    """A number (F,) for each plane and order."""
+    orders = int(design.frequency_order.max()) + 1
+    return np.asarray(design.frequency_plane * orders + design.frequency_order)
+
+
+def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
+    """Positive values (n,) drawn to the root mean square of their group; NaN stays."""
+    drawn = sd.copy()
+    known = np.isfinite(sd)
+    for each in np.unique(group[known]):
+        rows = known & (group == each)
+        if rows.sum() < _FEWEST:
+            continue
+        scatter = np.var(np.log(sd[rows]), ddof=1)
+        kept = 1 - _CHANCE / max(scatter, _CHANCE)
+        centre = np.sqrt(np.mean(sd[rows] ** 2))
+        drawn[rows] = centre * (sd[rows] / centre) ** kept
+    return drawn
 
 
 def same_mode(design: Design) -> FloatArray:
@@ -54,11 +120,64 @@ def _unknown_sds(known: FloatArray) -> tuple[FloatArray, FloatArray]:
     return values, _trapezoidal(np.ones(len(values)))
 
 
+def _factors(known: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values of true over stated standard deviations of frequencies, and their weights."""
+    if not known.any():
+        return np.ones(1), np.ones(1)
+    away, share = np.array(_HERMITE).T
+    return np.exp(FACTOR_SPREAD * away), share
+
+
+def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
+    """The same for shapes, with weights: from their scatter between tests of one added mass.
+
+    One value where they leave little doubt, else three (Gauss and Hermite's). Scatter beyond three
+    standard deviations counts as three, lest a shape that changes from test to test pass for it.
+    """
+    scatter, freedom = _between_tests(observations)
+    precision = _SHAPES_SPREAD**-2 + 2 * freedom
+    centre = 2 * freedom * np.log(scatter) / precision if freedom else 0.0
+    spread = precision**-0.5
+    if len(observations.design.shape_mode) == 0 or spread < _SETTLED:
+        return [(float(np.exp(centre)), 1.0)]
+    return [(float(np.exp(centre + spread * away)), share) for away, share in _HERMITE]
+
+
+def _between_tests(observations: Observations) -> tuple[float, float]:
+    """The scatter of shapes about their means over tests, in stated sds, and its freedom."""
+    design = observations.design
+    mode = design.shape_mode
+    masses = [each.added_mass for each in design.conditions]
+    mass = np.array([masses.index(each) for each in masses])[design.frequency_test[mode]]
+    keys = np.stack(
+        [
+            mass,
+            design.frequency_plane[mode],
+            design.frequency_order[mode],
+            design.shape_place,
+            design.shape_component,
+        ]
+    )
+    kind = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
+    value, sd = observations.value[design.frequencies :], observations.sd[design.frequencies :]
+    count = np.bincount(kind)
+    mean = np.bincount(kind, value) / np.maximum(count, 1)
+    several = count[kind] > 1
+    if not several.any():
+        return 1.0, 0.0
+    away = ((value - mean[kind]) / sd)[several] / np.sqrt(1 - 1 / count[kind][several])
+    # Scaling to unit length takes one degree of freedom from each shape.
+    kept = 1 - len(np.unique(mode)) / len(mode)
+    freedom = kept * float(np.sum(1 - 1 / count[kind][several]))
+    scatter = float(np.sqrt(np.mean(np.minimum(away**2, _WILD**2)) / kept))
+    return max(scatter, _LEAST_SCATTER), freedom
+
+
 def _model_errors(known: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Values of sigma and their weights; no sigma where all standard deviations are unknown."""
     if not known.any():
         return np.zeros(1), np.ones(1)
-    values = np.geomspace(_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS if known.all() else _SIGMAS_OF_SOME)
+    values = np.geomspace(_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS)
     density = values * np.exp(-((values / MODEL_ERROR_SCALE) ** 2) / 2)
     # Below its smallest value the prior is flat: its integral there is the density by logarithm.
     return values, _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))

@@ -19,6 +19,7 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3
 _FEWEST_FREQUENCIES = 2
+_FEWEST_READINGS = 2
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,28 @@ def _conditions(tests: Sequence[ModalTest]) -> tuple[Conditions, ...]:
     known = np.isfinite(temperature)
     reference = temperature[known].mean() if known.any() else 0.0
     shift = np.where(known, temperature - reference, 0.0)
+    shift_read = _tension_shifts(tests)
     amplitude = [test.amplitude if np.isfinite(test.amplitude) else 1.0 for test in tests]
     return tuple(
-        Conditions(test.id, float(shift[t]), float(amplitude[t]), test.added_mass)
+        Conditions(
+            test.id, float(shift[t]), float(amplitude[t]), test.added_mass, *shift_read[t].tolist()
+        )
         for t, test in enumerate(tests)
     )
+
+
+def _tension_shifts(tests: Sequence[ModalTest]) -> FloatArray:
+    """Tension read less the mean of all readings, and its standard deviation (tests, 2).
+
+    The level of all readings is left open, as is an error that they share. A test without a reading
+    is taken at the mean, and where fewer than two tests have one it says nothing.
+    """
+    read = np.array([(test.tension_read_n, test.tension_read_sd_n) for test in tests])
+    known = np.isfinite(read).all(axis=1)
+    if known.sum() < _FEWEST_READINGS:
+        return np.zeros((len(tests), 2))
+    read[:, 0] -= read[known, 0].mean()
+    return np.where(known[:, None], read, 0.0)
 
 
 def _components(index: int, mode: Mode) -> list[_Component]:

@@ -19,7 +19,7 @@ from shm.values import FloatArray, GapPlace
 _PLACES_A_HALF_WAVE = 5
 _FEWEST_PLACES = 31
 _PASSES = 2
-_PASSES_OF_AN_END = 8
+_PASSES_OF_AN_END = 16
 _FINE = 1440
 _BINS = 180
 _LEAST_GAIN = 6.0
@@ -64,6 +64,8 @@ def _place(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) 
 def _end(problem: GapProblem, before: Fit, misfit: Misfit) -> GapPlace | None:
     """The end that would have to turn."""
     ends = flexible_ends(problem)
+    if not ends:
+        return None
     changes = [tried(problem, before, misfit, end, _PASSES_OF_AN_END) for end in ends]
     found = _judged(misfit, np.concatenate([change.left(misfit) for change in changes]))
     if found is None:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import stats
 
 from shm.gap.contract import Covariance, Design, Fit, Observations
+from shm.gap.likelihood import ShapeErrors
 from shm.values import FloatArray
 
 DRAWS = 100
@@ -26,8 +27,8 @@ def predictive_p_value(observations: Observations, fit: Fit, noise: Covariance) 
         _p_value(residual[:, :count], noise.frequency, _means(observations.design)),
     ]
     if noise.shape.size:
-        distance = np.sum(residual[:, count:] ** 2 / noise.shape, axis=1)
-        misfits.append(float(np.mean(stats.chi2.sf(distance, noise.shape.size))))
+        distance = ShapeErrors([noise]).squares(residual[:, count:])[:, 0]
+        misfits.append(float(np.mean(stats.chi2.sf(distance, _freedom(observations.design)))))
     return min(1.0, len(misfits) * min(misfits))
 
 
@@ -42,6 +43,11 @@ def _p_value(residual: FloatArray, covariance: FloatArray, means: FloatArray) ->
     lower = np.linalg.cholesky(means @ covariance @ means.T)
     whitened = np.linalg.solve(lower, means @ residual.T)
     return float(np.mean(stats.chi2.sf(np.sum(whitened**2, axis=0), len(means))))
+
+
+def _freedom(design: Design) -> int:
+    """Of the components of shapes; scaling to unit length takes one from each shape."""
+    return len(design.shape_mode) - len(np.unique(design.shape_mode))
 
 
 def _means(design: Design) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from shm.gap.coordinates import DEVIATIONS, Coordinates, cut
 from shm.gap.flexible import flexible_nodes
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
+from shm.gap.readings import reading_loads
+from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
 from shm.gap.shapes import ShapeScaling
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Variant, parameters_of
@@ -19,6 +22,8 @@ from shm.models.hanger import HangerModes
 from shm.values import BoolArray, FloatArray, Hanger, IntArray
 
 Effects = tuple[tuple[str, Variant], ...]
+
+_TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
 
 
 class GapProblem:
@@ -92,8 +97,39 @@ class GapProblem:
         flexible = hypothesis.flexible
         if flexible not in self._likelihoods:
             make = flexible_nodes if flexible else nodes
-            self._likelihoods[flexible] = Likelihood(make(self.observations))
+            self._likelihoods[flexible] = Likelihood(make(self.observations, self.repeated))
         return self._likelihoods[flexible]
+
+    @cached_property
+    def repeated(self) -> Repeated:
+        """What the errors that repeat do to the data, from the baseline near the data."""
+        length_m = self.hanger.length_m
+        sensors = sensor_loads(self.observations, self._predicted_near, length_m)
+        return Repeated(self.section_of(self.design), self.readings_of(self.design), sensors)
+
+    def readings_of(self, design: Design) -> FloatArray:
+        """What errors of tensions read do to the frequencies of a design: loads (F, tests)."""
+        return reading_loads(design, lambda of: self._predicted_near(of)[: of.frequencies])
+
+    def section_of(self, design: Design) -> FloatArray:
+        """What the section along the bar does to the frequencies of a design: loads (F, k)."""
+        theta = self.theta(Hypothesis(), self._near)[:, : len(self._baseline.names)]
+        alike = self._baseline.physical(np.repeat(theta, STRETCHES + 1, axis=0), 0)
+        return section_loads(design, alike, self.hanger)
+
+    def _predicted_near(self, design: Design) -> FloatArray:
+        """The data (data,) that the baseline near the measured ones predicts of a design."""
+        return np.asarray(self.predict(Hypothesis(), self._near, design)[0])
+
+    @cached_property
+    def _near(self) -> FloatArray:
+        """A point z (1, d) of the baseline at the tension that fits the frequencies best."""
+        coordinates = self.coordinates(Hypothesis())
+        z = np.zeros((len(_TENSIONS), coordinates.dimension))
+        z[:, coordinates.tension] = np.array(_TENSIONS)[:, None]
+        count = self.design.frequencies
+        apart = (self.predict(Hypothesis(), z) - self.observations.value)[:, :count]
+        return z[[int(np.sum(apart**2, axis=1).argmin())]]
 
     def part(self, rows: BoolArray | IntArray) -> GapProblem:
         """The same problem on some of the frequencies; a mode's shape goes with its frequency.

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from shm.gap.contract import Fit
+from shm.gap.contract import Fit, NoiseNode
+from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.values import BoolArray, FloatArray, IntArray
 
@@ -18,16 +19,12 @@ _SHORTER = 0.3
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """The data `rows` of a fold that stay in the fit, of which the first are frequencies.
-
-    `frequency` is their precision matrix, `shape` the precisions of the components of shapes.
-    """
+    """The data `rows` of a fold that stay in the fit, of which the first are frequencies."""
 
     rows: IntArray
     value: FloatArray
     slopes: FloatArray
-    frequency: FloatArray
-    shape: FloatArray
+    errors: Likelihood
 
     @classmethod
     def of(cls, problem: GapProblem, fit: Fit, kept: BoolArray) -> _Part:
@@ -39,16 +36,13 @@ class _Part:
             rows,
             problem.observations.value[rows],
             fit.slopes[rows],
-            np.asarray(np.linalg.inv(fit.noise.frequency[np.ix_(frequency, frequency)])),
-            1 / fit.noise.shape[shape],
+            Likelihood([NoiseNode(fit.noise.part(frequency, shape), 0.0, fit.model_error)]),
         )
 
     def weighed(self, data: FloatArray) -> FloatArray:
         """The precision of the data times `data` (rows, ...)."""
-        count = len(self.frequency)
-        return np.concatenate(
-            [self.frequency @ data[:count], (self.shape * data[count:].T).T], axis=0
-        )
+        found = self.errors.weighed(data.reshape(len(data), -1))
+        return np.concatenate([found.frequency[0], found.shape[0]]).reshape(data.shape)
 
     @cached_property
     def information(self) -> FloatArray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 from shm.errors import BadInput
-from shm.values import PLANES, Hanger, ModalTest, Mode
+from shm.values import PLANES, Hanger, ModalTest, Mode, Outlier
 
 _FEW_FREQUENCIES = 4
 _CONTRADICTION_SD = 6.0
@@ -178,9 +178,12 @@ def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
 
 def _alike(one: ModalTest, other: ModalTest) -> bool:
     """Whether nothing is known to differ between the tests' conditions."""
-    if one.added_mass != other.added_mass:
+    read_n = abs(one.tension_read_n - other.tension_read_n)
+    if one.added_mass != other.added_mass or read_n > 0:
         return False
     if abs(one.temperature_c - other.temperature_c) > _SAME_TEMPERATURE_K:
+        return False
+    if abs(one.tension_read_n - other.tension_read_n) > 0:
         return False
     levels = sorted([one.amplitude, other.amplitude])
     return not levels[1] > _SAME_LEVEL * levels[0]
@@ -203,3 +206,33 @@ def _worst_difference(one: ModalTest, other: ModalTest) -> tuple[str, float, flo
 
 def _listed(names: Sequence[str]) -> str:
     return f"test {names[0]}" if len(names) == 1 else f"tests {', '.join(names)}"
+
+
+def set_aside(outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """Of frequencies that the diagnosis did without."""
+    return tuple(
+        f"{each.plane.capitalize()} {each.order} of test {each.test}, {each.measured_hz:g} Hz, is "
+        f"set aside as a gross error (probability {_probability(each)}): {_expected(each)}. A "
+        f"wrong mode, a tone or a slip; look at the recording again."
+        for each in outliers
+    )
+
+
+def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """Of frequencies that may be gross errors, but were kept."""
+    return tuple(
+        f"{each.plane.capitalize()} {each.order} of test {each.test}, {each.measured_hz:g} Hz, may "
+        f"be a gross error (probability {_probability(each)}): {_expected(each)}. It is kept, and "
+        f"the answer may lean on it; look at the recording again."
+        for each in outliers
+    )
+
+
+def _expected(outlier: Outlier) -> str:
+    sd_hz = outlier.expected_sd_hz
+    digits = max(0, 1 - math.floor(math.log10(sd_hz))) if sd_hz > 0 else 3
+    return f"the other data expect {outlier.expected_hz:.{digits}f} +- {sd_hz:.{digits}f} Hz"
+
+
+def _probability(outlier: Outlier) -> str:
+    return f"{outlier.probability:.2f}" if outlier.probability < 0.995 else "over 0.99"

@@ -47,16 +47,16 @@ def paired(
 
 
 def tried_by_screening(
-    problem: GapProblem, baseline: Fit, scans: Mapping[Hypothesis, Scan]
+    problem: GapProblem, before: Fit, scans: Mapping[Hypothesis, Scan]
 ) -> tuple[Tried, ...]:
-    """What the scans say, the best first: gains on the baseline, so that they stand beside fits."""
-    nothing = marginal(problem, Hypothesis(), baseline, np.zeros((1, len(baseline.predicted))))
-    best = Tried.fitted(baseline, len(baseline.z))
+    """What scans on top of a fit say, the best first, as gains on it to stand beside fits."""
+    nothing = marginal(problem, Hypothesis(), before, np.zeros((1, len(before.predicted))))
+    best = Tried.fitted(before, len(before.z))
     level = float(nothing.log_likelihood[0])
     tried = [
         Tried(
             hypothesis,
-            baseline.log_evidence + found.log_evidence - level,
+            before.log_evidence + found.log_evidence - level,
             best.log_fit + float(found.marginal.log_peak.max()) - level,
         )
         for hypothesis, found in scans.items()

@@ -11,6 +11,7 @@ from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.hypotheses import hypotheses, invisible
+from shm.gap.laws import law_gain
 from shm.gap.options import GapOptions, Progress
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
@@ -23,8 +24,8 @@ MOST_FITS = 30
 MOST_SAMPLED = 5
 LEADERS = 3
 MOST_PAIRS = 8
-POOR_FIT = 0.05
 SUPPORTED = 2.0
+LAWS_WITHIN = 60.0
 DROWNED = "Even at its largest it would drown in the errors of these data."
 
 
@@ -56,8 +57,10 @@ class Search:
         )
         self.variants = _counts(tuple(self.scans))
         rival = self.baseline.log_evidence + log_prior(Hypothesis(), self.variants)
-        fits = self._fitted(self.scans, rival, MOST_FITS, 0.4, 0.6)
-        rest = [t for t in self._rough(self.scans) if t.hypothesis not in fits]
+        rough = tried_by_screening(self.problem, self.baseline, self.scans)
+        nothing = self.baseline.log_evidence
+        fits = self._fitted(self.scans, rough, nothing, rival, MOST_FITS, 0.4, 0.6)
+        rest = [each for each in rough if each.hypothesis not in fits]
         return [self._tried(self.baseline), *map(self._tried, fits.values()), *rest]
 
     def with_unknown(self, tried: list[Tried]) -> list[Tried]:
@@ -66,25 +69,24 @@ class Search:
         return [*tried, *(self._flexible(fit) for fit in fits if fit is not None)]
 
     def calls_for_pairs(self, tried: Sequence[Tried]) -> bool:
-        """Whether the best single effect explains something, and not everything."""
-        leaders = self.leaders(tried)
-        if not leaders or leaders[0].best.fit is None:
-            return False
-        leader = leaders[0].best.fit
-        rest = [each.log_evidence for each in tried if each.hypothesis.flexible]
-        helped = leader.log_evidence > self.baseline.log_evidence + SUPPORTED
-        poor = max(rest) > leader.log_evidence - SUPPORTED
-        return helped and (poor or self.p_value(leader) < POOR_FIT)
+        """Whether the best single effect explains something, so that a second may explain more."""
+        fits = [leader.best.fit for leader in self.leaders(tried)[:1]]
+        level = self.baseline.log_evidence + SUPPORTED
+        return any(fit is not None and fit.log_evidence > level for fit in fits)
 
     def with_pairs(self, tried: list[Tried]) -> list[Tried]:
-        """Adds the best pairs of a leading effect with another one, all fitted."""
+        """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
         scans: dict[Hypothesis, Scan] = {}
-        for family in self.leaders(tried):
-            if family.best.fit is not None:
-                scans |= _new(paired(self.problem, family.best.fit, self.scans), scans)
+        rough: list[Tried] = []
+        for fit in (family.best.fit for family in self.leaders(tried)):
+            if fit is not None:
+                found = _new(paired(self.problem, fit, self.scans), scans)
+                rough += tried_by_screening(self.problem, fit, found)
+                scans |= found
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
-        fits = list(self._fitted(scans, rival, MOST_PAIRS, 0.7, 0.85).values())
+        single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
+        fits = list(self._fitted(scans, rough, single, rival, MOST_PAIRS, 0.7, 0.85).values())
         first = sorted(fits, key=lambda fit: -fit.log_evidence)[:1]
         return [*tried, *map(self._tried, fits), *map(self._flexible, first)]
 
@@ -97,6 +99,16 @@ class Search:
         chosen = sorted(near, key=lambda h: -weight[h])[:MOST_SAMPLED]
         better = {h: able[h].fit for h in chosen}
         return [self._sampled(each, better.get(each.hypothesis)) for each in tried]
+
+    def with_laws(self, tried: list[Tried]) -> list[Tried]:
+        """Allows for the error of the effects' own laws, where it may decide something."""
+        first = max(each.log_evidence for each in tried)
+        return [
+            replace(each, log_evidence=each.log_evidence + self._law_gain(each))
+            if each.log_evidence > first - LAWS_WITHIN
+            else each
+            for each in tried
+        ]
 
     @property
     def invisible(self) -> tuple[tuple[str, str], ...]:
@@ -117,18 +129,22 @@ class Search:
     def _fitted(
         self,
         scans: Mapping[Hypothesis, Scan],
+        rough: Sequence[Tried],
+        without: float,
         rival: float,
         most: int,
         begin: float,
         end: float,
     ) -> dict[Hypothesis, Fit]:
-        """Fits, from the scans' best points, of what stands a chance."""
-        if not scans:
+        """Fits, from the scans' best points, of what stands a chance.
+
+        `rough` is what the scans say, `without` the log evidence without what was scanned.
+        """
+        if not rough:
             return {}
-        rough = self._rough(scans)
         priors = [log_prior(each.hypothesis, self.variants) for each in rough]
         coarse = [scans[each.hypothesis].share.shape[1] > 1 for each in rough]
-        gap = max(each.log_evidence for each in rough) - self.baseline.log_evidence
+        gap = max(each.log_evidence for each in rough) - without
         chosen = hopeful(rough, priors, coarse, rival, gap, most)
         found: dict[Hypothesis, Fit] = {}
         for hypothesis in (each.hypothesis for each in chosen):
@@ -143,13 +159,15 @@ class Search:
         self._reached = max(self._reached, fraction)
         self.progress(label, self._reached)
 
-    def _rough(self, scans: Mapping[Hypothesis, Scan]) -> tuple[Tried, ...]:
-        return tried_by_screening(self.problem, self.baseline, scans)
-
     def _flexible(self, base: Fit) -> Tried:
         self._tell("something unknown", 0.65)
         hypothesis = replace(base.hypothesis, flexible=True)
         return self._tried(fitted(self.problem, hypothesis, self.rng, base.z[None]))
+
+    def _law_gain(self, tried: Tried) -> float:
+        if tried.fit is None or tried.hypothesis.flexible or not tried.hypothesis.effects:
+            return 0.0
+        return law_gain(self.problem.observations, self.baseline, tried.fit)
 
     def _tried(self, fit: Fit) -> Tried:
         return Tried.fitted(fit, len(self.baseline.z))

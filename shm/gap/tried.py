@@ -19,11 +19,11 @@ _SHORTER = 0.3
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Sizes (n,) of a cause and the baseline's z (n, d) with them, what they leave (n,), and the
-    change about them."""
+    """Sizes (n,) of a cause and the parameters z (n, p) of the misfit with them, what they leave
+    (n,), and the change about them."""
 
     size: FloatArray
-    baseline: FloatArray
+    z: FloatArray
     left: FloatArray
     change: Change
 
@@ -39,7 +39,7 @@ class _State:
         size, left = (
             np.where(better, getattr(other, name), getattr(self, name)) for name in ("size", "left")
         )
-        return _State(size, np.where(rows, other.baseline, self.baseline), left, change), better
+        return _State(size, np.where(rows, other.z, self.z), left, change), better
 
 
 def tried(
@@ -56,8 +56,8 @@ def tried(
         wanted = np.maximum(state.change.sizes(misfit), _SMALLEST_SHARE * cause.small)
         rest = state.change.deviation - wanted[:, None] * state.change.per_size
         size = state.size + length * (wanted - state.size)
-        step = misfit.parameters(rest) - state.baseline
-        moved = _at(problem, misfit, cause, state.baseline + length[:, None] * step, size)
+        step = misfit.parameters(rest) - state.z
+        moved = _at(problem, misfit, cause, state.z + length[:, None] * step, size)
         state, better = state.better_of(moved)
         length = np.where(better, 1.0, _SHORTER * length)
     return state.change
@@ -66,24 +66,27 @@ def tried(
 def _without(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) -> _State:
     """No cause yet, but what a small one would do."""
     count = len(cause.places_m)
-    baseline = np.repeat(before.z[None], count, axis=0)
-    small = cause.predicted(problem, baseline, np.full(count, cause.small))
+    z = np.zeros((count, misfit.slopes.shape[1]))
+    z[:, : misfit.own] = before.z
+    small = cause.predicted(problem, z[:, : misfit.own], np.full(count, cause.small))
     per_size = (small - before.predicted)[:, misfit.rows] / cause.small
     change = Change(np.repeat(misfit.deviation[None], count, axis=0), per_size, cause.largest)
-    return _State(np.zeros(count), baseline, np.full(count, misfit.total), change)
+    left = misfit.at(before.predicted[misfit.rows][None], z)
+    return _State(np.zeros(count), z, left, change)
 
 
 def _at(
     problem: GapProblem,
     misfit: Misfit,
     cause: LocalCause,
-    baseline: FloatArray,
+    z: FloatArray,
     size: FloatArray,
 ) -> _State:
     here, further = (
-        cause.predicted(problem, baseline, each)[:, misfit.rows] for each in (size, _FURTHER * size)
+        cause.predicted(problem, z[:, : misfit.own], each)[:, misfit.rows] + misfit.repeated(z)
+        for each in (size, _FURTHER * size)
     )
     per_size = (further - here) / ((_FURTHER - 1) * size[:, None])
-    expected = baseline @ misfit.slopes.T + size[:, None] * per_size
+    expected = z @ misfit.slopes.T + size[:, None] * per_size
     change = Change(misfit.value - here + expected, per_size, cause.largest)
-    return _State(size, baseline, misfit.at(here, baseline), change)
+    return _State(size, z, misfit.at(here, z), change)

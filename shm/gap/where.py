@@ -53,7 +53,7 @@ def residuals(
 
 def identification_sd(observations: Observations, fit: Fit) -> FloatArray:
     """Standard deviations (data,); those that nobody gave are what `fit` takes for the errors."""
-    total = np.concatenate([np.diag(fit.noise.frequency), fit.noise.shape])
+    total = np.concatenate([np.diag(fit.noise.frequency), fit.noise.shape_variance])
     return np.where(np.isfinite(observations.sd), observations.sd, np.sqrt(total))
 
 

@@ -41,10 +41,13 @@ def observations(value: FloatArray, of: Design | None = None) -> Observations:
 
 
 def noise(rng: np.random.Generator) -> FloatArray:
-    """Errors (data,) of the identification."""
+    """Errors (data,) of the identification; of shapes what scaling to unit length leaves."""
     own = design()
     sd = observations(np.zeros(own.size)).sd
-    return np.asarray(sd * rng.standard_normal(own.size))
+    errors = sd * rng.standard_normal(own.size)
+    shapes = errors[own.frequencies :].reshape(-1, 2 * PLACES)
+    shapes -= shapes.mean(axis=1, keepdims=True)
+    return np.asarray(errors)
 
 
 def tension(size: float = 0.2) -> FloatArray:
@@ -81,7 +84,9 @@ def fit(predicted: FloatArray, slopes: FloatArray, name: str = "") -> Fit:
     """A fit that sits at the origin of its coordinates, nothing drawn."""
     own = design()
     known = Covariance(
-        np.eye(own.frequencies) * FREQUENCY_SD**2, np.full(len(own.shape_mode), SHAPE_SD**2)
+        np.eye(own.frequencies) * FREQUENCY_SD**2,
+        np.full(len(own.shape_mode), SHAPE_SD**2),
+        np.zeros((len(own.shape_mode), 0)),
     )
     parameters = slopes.shape[1]
     return Fit(

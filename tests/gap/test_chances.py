@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.chances import NO_GAP, SINGLE, Tried, families, probabilities
+from shm.gap.chances import NO_GAP, SINGLE, UNKNOWN, Tried, families, probabilities
 from shm.gap.contract import Hypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
@@ -22,14 +22,14 @@ def _tried(
 
 def test_probabilities_add_to_one() -> None:
     tried = [_tried(0.0), _tried(1.0, "a"), _tried(3.0, "b"), _tried(2.0, flexible=True)]
-    assert probabilities(families(tried, {"a": 1, "b": 1})).sum() == pytest.approx(1.0)
+    assert probabilities(families(tried, {"a": 1, "b": 1}))[0].sum() == pytest.approx(1.0)
 
 
 def test_an_effect_does_not_gain_by_having_more_variants() -> None:
     once = [_tried(0.0), _tried(2.0, "a"), _tried(2.0, "b")]
     often = [_tried(0.0), _tried(2.0, "a"), *(_tried(2.0, "b", at=f"{k}") for k in range(9))]
-    few = probabilities(families(once, {"a": 1, "b": 1}))
-    many = probabilities(families(often, {"a": 1, "b": 9}))
+    few, _ = probabilities(families(once, {"a": 1, "b": 1}))
+    many, _ = probabilities(families(often, {"a": 1, "b": 9}))
     assert sorted(many) == pytest.approx(sorted(few))
 
 
@@ -43,11 +43,19 @@ def test_with_evidence_for_nothing_the_priors_stand() -> None:
     chances = dict(
         zip(
             [family.name for family in families(tried, {"a": 1, "b": 1})],
-            probabilities(families(tried, {"a": 1, "b": 1})),
+            probabilities(families(tried, {"a": 1, "b": 1}))[0],
             strict=True,
         )
     )
     assert chances[""] / chances["a"] == pytest.approx(NO_GAP / (SINGLE / 2))
+
+
+def test_what_is_unknown_may_pass_for_an_effect() -> None:
+    tried = [_tried(0.0), _tried(30.0, "a"), _tried(0.0, "b"), _tried(20.0, flexible=True)]
+    kinds = families(tried, {"a": 1, "b": 1})
+    chances, passing = probabilities(kinds, 0.6)
+    assert chances.sum() + passing == pytest.approx(1.0)
+    assert passing / chances[0] == pytest.approx(0.6 * UNKNOWN / SINGLE, rel=1e-6)
 
 
 def test_the_best_variant_comes_first() -> None:

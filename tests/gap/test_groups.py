@@ -37,3 +37,9 @@ def test_groups_are_connected() -> None:
 def test_a_cause_of_two_faces_is_like_what_one_of_them_is_like() -> None:
     one, other = (toy.fit(toy.stiffening(size), toy.tension()) for size in (0.0, 2e-3))
     assert grouped([[one, other], [toy.fit(toy.stiffening(2e-3), toy.tension())]]) == ((0, 1),)
+
+
+def test_causes_that_the_evidence_found_leaves_near_the_best_are_one_group() -> None:
+    causes = [[toy.fit(toy.stiffening(size), toy.tension())] for size in (0.0, 2e-3, 4e-3)]
+    assert grouped(causes) == ()
+    assert grouped(causes, [True, False, True]) == ((0, 2),)

@@ -9,9 +9,19 @@ import pytest
 from scipy import integrate, stats
 from scipy.special import logsumexp
 
-from shm.gap.contract import NoiseNode, Observations
+from shm.gap.contract import Covariance, NoiseNode, Observations
 from shm.gap.likelihood import Likelihood
-from shm.gap.noise import MEAN_MODEL_ERROR, MODEL_ERROR_SCALE, SD_LOWER, SD_UPPER, nodes, same_mode
+from shm.gap.noise import (
+    FACTOR_SPREAD,
+    MEAN_MODEL_ERROR,
+    MODEL_ERROR_SCALE,
+    SD_LOWER,
+    SD_UPPER,
+    drawn_together,
+    nodes,
+    same_mode,
+)
+from shm.gap.repeated import Repeated
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 
@@ -28,10 +38,25 @@ def _dense(found: tuple[NoiseNode, ...], residual: FloatArray) -> float:
     logs = [
         node.log_weight
         + stats.multivariate_normal.logpdf(residual[:count], None, node.covariance.frequency)
-        + np.sum(stats.norm.logpdf(residual[count:], scale=np.sqrt(node.covariance.shape)))
+        + stats.multivariate_normal.logpdf(residual[count:], None, _shape(node.covariance))
         for node in found
     ]
     return float(logsumexp(logs))
+
+
+def _shape(covariance: Covariance) -> FloatArray:
+    loads = covariance.shape_loads
+    return np.asarray(np.diag(covariance.shape) + loads @ loads.T)
+
+
+def _repeated(found: Observations) -> Repeated:
+    """Some errors that repeat: two of the frequencies, five of the shapes."""
+    rng = np.random.default_rng(8)
+    return Repeated(
+        1e-4 * rng.standard_normal((found.design.frequencies, 2)),
+        np.zeros((found.design.frequencies, 0)),
+        0.01 * rng.standard_normal((len(found.design.shape_mode), 5)),
+    )
 
 
 @pytest.mark.parametrize("sd", [2e-4, None])
@@ -54,8 +79,8 @@ def test_the_mean_model_error_is_that_of_its_prior() -> None:
     assert mean == pytest.approx(MEAN_MODEL_ERROR, rel=0.1)
 
 
-def test_the_model_error_is_integrated_right() -> None:
-    """Closed form for one mode in one test: the integral over sigma by quadrature."""
+def test_the_model_error_and_the_factor_are_integrated_right() -> None:
+    """Closed form for one mode in one test: the double integral by quadrature."""
     own = toy.design()
     few = replace(
         own,
@@ -68,15 +93,16 @@ def test_the_model_error_is_integrated_right() -> None:
     )
     found = Likelihood(nodes(Observations(few, np.zeros(1), np.array([1e-4]))))
 
-    def integrand(sigma: float, residual: float) -> float:
-        return float(
-            stats.norm.pdf(residual, scale=np.hypot(1e-4, sigma))
-            * stats.halfnorm.pdf(sigma, scale=MODEL_ERROR_SCALE)
-        )
-
+    log_factor = np.linspace(np.log(0.5), np.log(2.0), 121)
+    factor = np.exp(log_factor)[:, None]
+    sigma = np.linspace(0, 1.5e-4, 301)
+    prior = stats.halfnorm.pdf(sigma, scale=MODEL_ERROR_SCALE) * stats.norm.pdf(
+        log_factor[:, None], scale=FACTOR_SPREAD
+    )
     for residual in (0.0, 1e-4, 3e-4):
-        exact = integrate.quad(integrand, 0, 5e-4, (residual,), points=[5e-5, 1e-4])[0]
-        assert found.log(np.array([[residual]]))[0] == pytest.approx(np.log(exact), abs=0.03)
+        values = prior * stats.norm.pdf(residual, scale=np.hypot(1e-4 * factor, sigma))
+        exact = integrate.trapezoid(integrate.trapezoid(values, sigma), log_factor)
+        assert found.log(np.array([[residual]]))[0] == pytest.approx(np.log(exact), abs=0.12)
 
 
 def test_an_unknown_standard_deviation_is_integrated_over_its_range() -> None:
@@ -97,7 +123,7 @@ def test_an_unknown_standard_deviation_is_integrated_over_its_range() -> None:
         - log_integral
         - np.log(2 * np.log(SD_UPPER / SD_LOWER))
         - count / 2 * np.log(2 * np.pi)
-        + np.sum(stats.norm.logpdf(0, scale=found.sd[count:]))
+        + np.sum(stats.norm.logpdf(0, scale=np.sqrt(own.nodes[0].covariance.shape)))
     )
     assert own.log(residual[None])[0] == pytest.approx(exact, abs=0.05)
 
@@ -107,16 +133,18 @@ def test_where_some_standard_deviations_are_unknown_both_unknowns_are_integrated
     found.sd[:5] = np.nan
     kinds = nodes(found)
     assert logsumexp([node.log_weight for node in kinds]) == pytest.approx(0)
-    known = {float(node.covariance.frequency[8, 8] - node.model_error**2) for node in kinds}
-    assert max(known) - min(known) < 1e-15
-    assert len({float(node.covariance.frequency[0, 0]) for node in kinds}) == len(kinds)
+    factors = np.array(
+        [np.sqrt(node.covariance.frequency[8, 8] - node.model_error**2) / 2e-4 for node in kinds]
+    )
+    assert len(np.unique(factors.round(6))) == 3
+    assert len({float(node.covariance.frequency[0, 0]) for node in kinds}) == len(kinds) / 3
 
 
 @pytest.mark.parametrize("shuffled", [False, True])
 def test_the_likelihood_is_that_of_the_full_covariance(shuffled: bool) -> None:
     found = _observations()
     rng = np.random.default_rng(2)
-    kinds = nodes(found)
+    kinds = nodes(found, _repeated(found))[::4]
     if shuffled:
         order = rng.permutation(found.design.frequencies)
         kinds = tuple(
@@ -130,21 +158,25 @@ def test_the_likelihood_is_that_of_the_full_covariance(shuffled: bool) -> None:
         )
     residual = found.sd * rng.standard_normal((3, found.design.size))
     exact = [_dense(kinds, each) for each in residual]
-    np.testing.assert_allclose(Likelihood(kinds).log(residual), exact, rtol=1e-9)
+    np.testing.assert_allclose(Likelihood(kinds).log(residual), exact, rtol=1e-10)
 
 
 def test_products_are_those_of_the_full_covariance() -> None:
     found, rng = _observations(), np.random.default_rng(3)
-    kinds = nodes(found)
+    kinds = nodes(found, _repeated(found))
     own = Likelihood(kinds)
     columns = rng.standard_normal((found.design.size, 3))
     count = found.design.frequencies
     weighed = own.weighed(columns).products(columns.T)
-    for node, gram, product in zip(kinds, own.gram(columns[None])[0], weighed, strict=True):
+    squares = own.squares(columns.T).T
+    for node, gram, product, square in zip(
+        kinds, own.gram(columns[None])[0], weighed, squares, strict=True
+    ):
         exact = columns[:count].T @ np.linalg.solve(node.covariance.frequency, columns[:count])
-        exact += columns[count:].T @ (columns[count:] / node.covariance.shape[:, None])
+        exact += columns[count:].T @ np.linalg.solve(_shape(node.covariance), columns[count:])
         np.testing.assert_allclose(gram, exact, rtol=1e-8)
         np.testing.assert_allclose(product, exact, rtol=1e-8)
+        np.testing.assert_allclose(square, np.diag(exact), rtol=1e-8)
 
 
 def test_a_prediction_that_failed_has_no_likelihood_and_spoils_no_other() -> None:
@@ -154,3 +186,61 @@ def test_a_prediction_that_failed_has_no_likelihood_and_spoils_no_other() -> Non
     log = Likelihood(nodes(found)).log(residual)
     assert log[0] == -np.inf
     assert np.isfinite(log[1])
+
+
+def test_the_scatter_of_shapes_between_tests_says_how_wrong_their_sds_are() -> None:
+    found = toy.observations(np.zeros(toy.design().size))
+    count = found.design.frequencies
+    shapes = _drawn_shapes(found, 1.3 * toy.SHAPE_SD, np.random.default_rng(5))
+    value = np.concatenate([np.zeros(count), shapes])
+    (factor,) = {
+        round(float(np.sqrt(node.covariance.shape[0]) / toy.SHAPE_SD), 6)
+        for node in nodes(replace(found, value=value))
+    }
+    assert factor == pytest.approx(1.3, rel=0.07)
+
+
+def test_one_test_leaves_the_sds_of_shapes_open() -> None:
+    own = toy.design()
+    first = own.frequency_test[own.shape_mode] == 0
+    one = replace(
+        own,
+        shape_mode=own.shape_mode[first],
+        shape_place=own.shape_place[first],
+        shape_component=own.shape_component[first],
+    )
+    found = toy.observations(np.zeros(one.size), one)
+    factors = {float(node.covariance.shape[0]) for node in nodes(found)}
+    assert len(factors) == 3
+    assert min(factors) < toy.SHAPE_SD**2 < max(factors)
+
+
+def _drawn_shapes(found: Observations, sd: float, rng: np.random.Generator) -> FloatArray:
+    """Unit shapes, alike in all tests, measured with errors of `sd` and scaled again."""
+    design = found.design
+    components = 2 * toy.PLACES
+    modes = design.frequencies // toy.TESTS
+    true = rng.standard_normal((1, modes, components))
+    true /= np.linalg.norm(true, axis=2, keepdims=True)
+    measured = true + sd * rng.standard_normal((toy.TESTS, modes, components))
+    measured /= np.linalg.norm(measured, axis=2, keepdims=True)
+    return np.asarray(measured.ravel())
+
+
+def test_sds_that_differ_by_chance_are_drawn_together() -> None:
+    """Twenty degrees of freedom a test: what is drawn is nearer to the truth by far."""
+    found, rng = _observations(), np.random.default_rng(6)
+    stated = found.sd * np.sqrt(rng.chisquare(20, len(found.sd)) / 20)
+    shapes = np.repeat(stated[: found.design.frequencies], 2 * toy.PLACES) * toy.SHAPE_SD / 2e-4
+    stated[found.design.frequencies :] = shapes
+    drawn = drawn_together(replace(found, sd=stated))
+    assert np.std(np.log(drawn / found.sd)) < 0.75 * np.std(np.log(stated / found.sd))
+
+
+def test_sds_that_differ_from_test_to_test_are_kept() -> None:
+    found = _observations()
+    stated = found.sd.copy()
+    frequencies = stated[: found.design.frequencies]
+    frequencies *= np.array([0.3, 1.0, 3.0])[found.design.frequency_test]
+    drawn = drawn_together(replace(found, sd=stated))
+    np.testing.assert_allclose(drawn, stated, rtol=0.06)

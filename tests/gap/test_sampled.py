@@ -41,7 +41,7 @@ def _conditional_log_evidence(
     log = [
         node.log_weight
         + _normal(shifted, node.covariance.frequency + slopes @ np.swapaxes(slopes, 1, 2))
-        for node in nodes(problem.observations)
+        for node in nodes(problem.observations, problem.repeated)
     ]
     return np.asarray(logsumexp(log, axis=0))
 

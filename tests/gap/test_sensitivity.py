@@ -10,6 +10,7 @@ from shm.gap.fit import baseline_fit, fitted
 from shm.gap.noise import MEAN_MODEL_ERROR, nodes
 from shm.gap.sensitivity import VISIBLE, scan, truncate
 from shm.models.effects import Variant
+from shm.values import FloatArray
 from tests.helpers.gap_campaigns import campaign, problem_of
 
 STIFFER = Hypothesis((("bending_stiffness", Variant()),))
@@ -22,12 +23,17 @@ def test_a_shift_counts_only_beyond_what_the_baseline_can_follow() -> None:
     problem, rng = problem_of(campaign()), np.random.default_rng(1)
     before = baseline_fit(problem, rng)
     found = scan(problem, before, STIFFER)
-    node = min(
-        nodes(problem.observations), key=lambda n: abs(np.log(n.model_error / MEAN_MODEL_ERROR))
-    )
-    covariance = node.covariance.frequency + before.slopes @ before.slopes.T
-    square = np.einsum("gi,ig->g", found.shift, np.linalg.solve(covariance, found.shift.T))
-    np.testing.assert_allclose(found.visible, np.sqrt(square), rtol=1e-4)
+    possible = nodes(problem.observations, problem.repeated)
+    away = np.abs(np.log([node.model_error / MEAN_MODEL_ERROR for node in possible]))
+    usual = [node for node, each in zip(possible, away, strict=True) if each < away.min() + 1e-6]
+    visible = [_visible(node.covariance.frequency, before.slopes, found.shift) for node in usual]
+    off = [np.abs(found.visible / each - 1).max() for each in visible]
+    assert min(off) < 1e-4
+
+
+def _visible(errors: FloatArray, slopes: FloatArray, shift: FloatArray) -> FloatArray:
+    square = np.einsum("gi,ig->g", shift, np.linalg.solve(errors + slopes @ slopes.T, shift.T))
+    return np.asarray(np.sqrt(square))
 
 
 def test_a_cut_prior_begins_where_half_of_the_places_show_the_effect() -> None:

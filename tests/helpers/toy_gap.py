@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, Observations
+from shm.gap.repeated import Repeated
 from shm.models.effects import Conditions, Parameter, Survey
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger
 from tests.helpers.hangers import HANGER_3
@@ -35,6 +36,16 @@ class ToyProblem:
     ) -> FloatArray:
         return z @ self.slopes[hypothesis](design or self.observations.design).T
 
+    @property
+    def repeated(self) -> Repeated:
+        return Repeated.none(self.observations.design)
+
+    def section_of(self, design: Design) -> FloatArray:
+        return Repeated.none(design).section
+
+    def readings_of(self, design: Design) -> FloatArray:
+        return Repeated.none(design).readings
+
     def coordinates(self, hypothesis: Hypothesis) -> ToyCoordinates:
         d = self.slopes[hypothesis](self.observations.design).shape[1]
         return ToyCoordinates((Parameter("size", "", -1, 1, 0, ""),) * d)
@@ -46,12 +57,14 @@ class ToyProblem:
         same = (design.frequency_plane[:, None] == design.frequency_plane) & (
             design.frequency_order[:, None] == design.frequency_order
         )
-        noise = Covariance(np.diag(sd[:f] ** 2) + model_error**2 * same, sd[f:] ** 2)
+        frequency = np.diag(sd[:f] ** 2) + model_error**2 * same
+        noise = Covariance(frequency, sd[f:] ** 2, np.zeros((len(sd) - f, 0)))
         precision = np.zeros((design.size, design.size))
         precision[:f, :f] = np.linalg.inv(noise.frequency)
         precision[f:, f:] = np.diag(1 / noise.shape)
         slopes = self.slopes[hypothesis](design)
-        covariance = np.linalg.inv(np.eye(slopes.shape[1]) + slopes.T @ precision @ slopes)
+        inverse = np.eye(slopes.shape[1]) + slopes.T @ precision @ slopes
+        covariance: FloatArray = np.linalg.inv(inverse).astype(np.float64)
         z = covariance @ slopes.T @ precision @ self.observations.value
         return Fit(
             hypothesis=hypothesis,

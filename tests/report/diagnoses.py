@@ -16,6 +16,7 @@ from shm.values import (
     GapPlace,
     Hanger,
     NextMeasurement,
+    Outlier,
     Plane,
     Residual,
     Shrinkage,
@@ -178,6 +179,19 @@ UNDECIDED = replace(
     next_measurements=(),
 )
 
+BLUNDER = replace(
+    LED,
+    where=tuple(
+        replace(r, measured_hz=r.predicted_hz * 1.3, residual_percent=30.0, z=230.0, share=0.0,
+                after_percent=29.5, held_out_before_percent=NAN, held_out_after_percent=NAN)
+        if (r.plane, r.order, r.test) == ("transverse", 3, "t4") else r
+        for r in LED.where
+    ),
+    outliers=(Outlier("transverse", 3, "t4", 28.17, 21.7, 0.02, 0.9999),),
+    next_measurements=LED.next_measurements[:1],
+    tension_after_n=TensionEstimate(702.3e3, 7.4e3, 690.2e3, 714.6e3, 687.9e3, 716.8e3),
+)  # fmt: skip
+
 ONE_MODE = replace(
     NO_GAP,
     tests=("only",),
@@ -215,6 +229,7 @@ CASES = {
     "no gap": NO_GAP,
     "unexplained": UNEXPLAINED,
     "undecided": UNDECIDED,
+    "blunder": BLUNDER,
     "one mode": ONE_MODE,
     "nothing known": NOTHING_KNOWN,
 }

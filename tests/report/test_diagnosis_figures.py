@@ -32,6 +32,7 @@ def drawn() -> dict[str, dict[str, Illustration]]:
         ("alike", ALL),
         ("no gap", ["causes", "gap_map", "gap_tension"]),
         ("unexplained", ["causes", "gap_map", "gap_tension"]),
+        ("blunder", ALL),
         ("one mode", ["causes", "gap_map", "gap_tension"]),
         ("nothing known", []),
     ],
@@ -75,6 +76,21 @@ def test_the_map_shows_every_residual_once(drawn: dict[str, dict[str, Illustrati
     marks = [line for each in axes for line in each.lines if line.get_marker() in ("o", "s")]
     shown = np.sort(np.concatenate([np.asarray(line.get_ydata(), float) for line in marks]))
     assert shown == pytest.approx(np.sort([r.residual_percent for r in LED.where]))
+
+
+def test_a_frequency_set_aside_is_a_cross_with_its_size_and_does_not_squeeze_the_others(
+    drawn: dict[str, dict[str, Illustration]],
+) -> None:
+    item = drawn["blunder"]["gap_map"]
+    axes = item.figure.axes[0]
+    (cross,) = [line for line in axes.lines if line.get_marker() == "X"]
+    assert cross.get_label() == "set aside"
+    assert "+30.00 %" in [text.get_text() for text in axes.texts]
+    assert axes.get_ylim()[1] < 5
+    assert "Crosses: gross errors" in item.caption
+    assert "Set aside as a gross error: transverse 3 in t4." in item.alt
+    after = drawn["blunder"]["before_and_after"].figure.axes[0]
+    assert after.get_ylim()[1] < 5
 
 
 def test_the_map_names_place_and_units(drawn: dict[str, dict[str, Illustration]]) -> None:
@@ -147,7 +163,7 @@ def test_twenty_tests_and_long_names_leave_the_axes_their_room() -> None:
                 assert axes.get_position().width > 0.2, item.name
 
 
-@pytest.mark.parametrize("case", ["led", "alike", "one mode"])
+@pytest.mark.parametrize("case", ["led", "alike", "blunder", "one mode"])
 def test_no_word_of_a_figure_is_cut_off(
     case: str, drawn: dict[str, dict[str, Illustration]]
 ) -> None:

@@ -129,3 +129,13 @@ def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: Hang
     document = report.json(diagnosed)
     assert document["diagnosis"]["causes"][0]["effect"] == "point_mass"
     assert document["gap_watch"] == watched
+
+
+def test_a_frequency_set_aside_leads_the_table_and_is_marked() -> None:
+    text = report.diagnosis_text(sheet("blunder"))
+    rows = text[text.index("WHERE THE GAP LIES") :].splitlines()
+    marked = [line for line in rows if "set aside" in line]
+    assert len(marked) == 1
+    assert marked[0].split()[:3] == ["transverse", "3", "t4"]
+    others = [line for line in rows if re.search(r" t\d ", line) and line is not marked[0]]
+    assert rows.index(marked[0]) < rows.index(others[0])

@@ -23,6 +23,7 @@ from shm.values import (
 )
 from tests.report.diagnoses import (
     ALIKE,
+    BLUNDER,
     CASES,
     HANGER,
     LED,
@@ -87,6 +88,8 @@ def test_the_answer_in_a_word(name: str, found: Answer) -> None:
                     "(0.250)."),
         (UNDECIDED, "With point mass the frequencies' error shrinks"),
         (replace(LED, fit_p_value=0.002), "Even so the fit is poor"),
+        (BLUNDER, "Set aside as a gross error: transverse 3 of test t4 (28.17 Hz, 21.70 Hz "
+                  "expected)."),
     ],
 )  # fmt: skip
 def test_the_paragraph_says(diagnosis: Diagnosis, words: str) -> None:

@@ -71,8 +71,8 @@ def test_the_manuals_example_is_read_and_allowed(tmp_path: Path) -> None:
         ("[hanger.effects.sag]\nsag_parameter = [1, inf]", "is not a range"),
         ("[hanger.effects.sag]\nsag_parameter = [2, 1]", r"\[2, 1\] does not rise"),
         ("[hanger.scatter]\nwidth = 0.1", "scatter: unknown key width"),
-        ("[hanger.scatter]\nlength = 0.2", "length = 0.2 is not from 0 to 0.1"),
-        ("[hanger.scatter]\nlength = -0.1", "length = -0.1 is not from 0 to 0.1"),
+        ("[hanger.scatter]\nlength = 0.6", "length = 0.6 is not from 0 to 0.5"),
+        ("[hanger.scatter]\nlength = -0.1", "length = -0.1 is not from 0 to 0.5"),
         ("[hanger.scatter]\nlength = 'small'", "length = 'small' is not a number"),
     ],
 )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+import math
+from dataclasses import asdict, fields
 
 import pytest
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.documents import dump
 from shm.values import Diagnosis
-from tests.report.diagnoses import CASES, LED
+from tests.report.diagnoses import BLUNDER, CASES, LED
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -46,3 +47,21 @@ def test_the_document_has_the_names_and_nesting_of_the_contract() -> None:
 def test_no_field_of_a_diagnosis_is_left_out() -> None:
     renamed = {"tension_before_n", "tension_after_n", "next_measurements"}
     assert {field.name for field in fields(Diagnosis)} - renamed <= set(diagnosis_document(LED))
+
+
+def test_outliers_and_95_percent_intervals_are_in_the_document() -> None:
+    document = diagnosis_document(BLUNDER)
+    assert document["outliers"] == [asdict(BLUNDER.outliers[0])]
+    assert document["tension_n"]["after"]["q025"] == 687.9e3
+    assert document["tension_n"]["after"]["q975"] == 716.8e3
+
+
+def test_a_document_from_before_outliers_were_told_still_reads() -> None:
+    document = json.loads(dump(diagnosis_document(BLUNDER)))
+    del document["outliers"]
+    for tension in document["tension_n"].values():
+        del tension["q025"], tension["q975"]
+    found = diagnosis_of(document)
+    assert found.outliers == ()
+    assert math.isnan(found.tension_after_n.q025)
+    assert found.tension_after_n.q95 == BLUNDER.tension_after_n.q95

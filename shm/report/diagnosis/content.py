@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from shm.values import Cause, Diagnosis, Hanger
+from shm.values import Cause, Diagnosis, Hanger, Residual
 
 _LIKELIER_THAN_NOT = 0.5
 
@@ -78,3 +78,9 @@ def answer(diagnosis: Diagnosis) -> Answer:
     if claim is not None:
         return Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
     return Answer.NO_GAP if rest == diagnosis.no_gap_probability else Answer.UNEXPLAINED
+
+
+def is_set_aside(diagnosis: Diagnosis, residual: Residual) -> bool:
+    """Whether a frequency was taken for a gross error."""
+    named = [(each.plane, each.order, each.test) for each in diagnosis.outliers]
+    return (residual.plane, residual.order, residual.test) in named

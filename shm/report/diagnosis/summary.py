@@ -53,6 +53,7 @@ def summary(sheet: DiagnosisSheet) -> str:
 def consequences(diagnosis: Diagnosis) -> str:
     """What follows the claim: how far the gap shrinks, how it goes, the tension, what next."""
     sentences = (
+        _set_aside(diagnosis),
         _runner_up(diagnosis),
         _shrinkage(diagnosis),
         _misfit(diagnosis),
@@ -129,6 +130,19 @@ def _undecided(diagnosis: Diagnosis) -> str:
         return "Undecided: these data give no probability to any explanation."
     told = [f"{what} ({words.probability(share)})" for share, what in known[:_MOST_NAMED]]
     return f"Undecided: these data leave open {words.listed(told)}."
+
+
+def _set_aside(diagnosis: Diagnosis) -> str:
+    """The frequencies that are gross errors, and what should have been measured."""
+    told = [
+        f"{each.plane} {each.order} of test {each.test} ({words.number(each.measured_hz, '.2f')} "
+        f"Hz, {words.number(each.expected_hz, '.2f')} Hz expected)"
+        for each in diagnosis.outliers
+    ]
+    if not told:
+        return ""
+    gross = "as a gross error" if len(told) == 1 else "as gross errors"
+    return f"Set aside {gross}: {words.listed(told)}."
 
 
 def _runner_up(diagnosis: Diagnosis) -> str:

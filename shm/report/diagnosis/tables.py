@@ -6,7 +6,15 @@ import math
 from collections.abc import Callable
 
 from shm.report import words
-from shm.report.diagnosis.content import Answer, DiagnosisSheet, after, answer, claimed, claims
+from shm.report.diagnosis.content import (
+    Answer,
+    DiagnosisSheet,
+    after,
+    answer,
+    claimed,
+    claims,
+    is_set_aside,
+)
 from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
@@ -174,13 +182,20 @@ def next_measurements(sheet: DiagnosisSheet) -> Table:
 
 
 def where(sheet: DiagnosisSheet) -> Table:
-    """The residuals with the largest shares of the misfit."""
-    residuals = sorted(sheet.diagnosis.where, key=lambda r: (math.isnan(r.share), -r.share))
+    """The frequencies set aside, then the residuals with the largest shares of the misfit."""
+    diagnosis = sheet.diagnosis
+    residuals = sorted(
+        diagnosis.where,
+        key=lambda r: (not is_set_aside(diagnosis, r), math.isnan(r.share), -r.share),
+    )
     left = len(residuals) - _WORST
     return Table(
         "Where the gap lies, largest share first",
         ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %"),
-        tuple(_residual_row(residual) for residual in residuals[:_WORST]),
+        tuple(
+            _residual_row(residual, is_set_aside(diagnosis, residual))
+            for residual in residuals[:_WORST]
+        ),
         note=(
             "Off: measured over predicted frequency, less 1; z: the same in standard deviations."
             + (f" {left} more residuals are in the JSON document." if left > 0 else "")
@@ -188,7 +203,7 @@ def where(sheet: DiagnosisSheet) -> Table:
     )
 
 
-def _residual_row(residual: Residual) -> tuple[str, ...]:
+def _residual_row(residual: Residual, is_aside: bool) -> tuple[str, ...]:
     return (
         f"{residual.plane} {residual.order}",
         residual.test,
@@ -196,7 +211,7 @@ def _residual_row(residual: Residual) -> tuple[str, ...]:
         words.number(residual.predicted_hz, ".3f"),
         words.number(residual.residual_percent, "+.2f"),
         words.number(residual.z, "+.1f"),
-        _share(residual.share),
+        "set aside" if is_aside else _share(residual.share),
         words.number(residual.after_percent, "+.2f", ""),
     )
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from shm.report import words
 from shm.report.diagnosis.content import DiagnosisSheet, claimed
-from shm.report.diagnosis.figures.modes import measured, orders, panels, planes
+from shm.report.diagnosis.figures.modes import kept, orders, panels, planes
 from shm.report.diagnosis.phrases import label
 from shm.report.figures import style
 from shm.report.figures.member import Member
@@ -38,7 +38,7 @@ _SERIES = (
 
 
 def _draw(sheet: DiagnosisSheet) -> Figure | None:
-    residuals = [r for r in measured(sheet) if math.isfinite(r.after_percent)]
+    residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
     if not residuals or claimed(sheet.diagnosis) is None:
         return None
     figure = style.new_figure(3.0)
@@ -101,7 +101,7 @@ def _caption(sheet: DiagnosisSheet) -> str:
 
 
 def _alt(sheet: DiagnosisSheet) -> str:
-    found = measured(sheet)
+    found = kept(sheet)
     told = [
         f"{plane} from {_rms(found, plane, 'residual_percent')} to "
         f"{_rms(found, plane, 'after_percent')}"

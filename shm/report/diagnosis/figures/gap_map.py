@@ -19,7 +19,7 @@ from shm.report.diagnosis.figures.below_map import (
     local,
     profiles,
 )
-from shm.report.diagnosis.figures.modes import measured, panels
+from shm.report.diagnosis.figures.modes import aside, kept, measured, panels
 from shm.report.diagnosis.phrases import title
 from shm.report.figures import style
 from shm.report.figures.member import Member
@@ -27,6 +27,8 @@ from shm.values import Residual
 
 _SPREAD = 0.62
 """Width over which the tests of one mode stand side by side, in orders."""
+_EDGE = 0.12
+"""Room above and below the map for what lies beyond it, as a share of its height."""
 _MAP_INCHES = 2.7
 _BELOW_INCHES = 2.2
 
@@ -41,7 +43,11 @@ def _draw(sheet: DiagnosisSheet) -> Figure | None:
     upper, lower = _halves(figure, inches) if below else (figure, None)
     made = panels(upper, residuals, "measured / baseline - 1 (%)")
     for plane, axes in made.items():
-        _marks(axes, [r for r in residuals if r.plane == plane], sheet.diagnosis.tests)
+        ordinary = [r for r in kept(sheet) if r.plane == plane]
+        if ordinary:
+            _marks(axes, ordinary, sheet.diagnosis.tests)
+    for plane, axes in made.items():
+        _set_aside(axes, [r for r in aside(sheet) if r.plane == plane], sheet.diagnosis.tests)
     style.legend_of_figure(upper, list(made.values()), columns=3)
     if lower is not None:
         widths = (1.6, 1.0) if len(below) == 2 else (1.0,)
@@ -87,6 +93,32 @@ def _marks(axes: Axes, residuals: Sequence[Residual], tests: Sequence[str]) -> N
             )  # fmt: skip
 
 
+def _set_aside(axes: Axes, residuals: Sequence[Residual], tests: Sequence[str]) -> None:
+    """Gross errors as crosses with their size, at the edge where they lie beyond the others."""
+    if not residuals:
+        return
+    low, high = axes.get_ylim()
+    margin = _EDGE * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    x = [r.order + _offset(r.test, tests) for r in residuals]
+    y = [min(max(r.residual_percent, low), high) for r in residuals]
+    axes.plot(
+        x, y, linestyle="none", marker="X", markersize=7, color=style.RED, label="set aside",
+    )  # fmt: skip
+    for each, across, up in zip(residuals, x, y, strict=True):
+        left = across > float(np.mean(axes.get_xlim()))
+        axes.annotate(
+            f"{each.residual_percent:+.2f} %",
+            (across, up),
+            xytext=(-7 if left else 7, 0),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            va="center",
+            fontsize=style.TINY,
+            color=style.RED,
+        )
+
+
 def _offset(test: str, tests: Sequence[str]) -> float:
     if test not in tests or len(tests) < 2:
         return 0.0
@@ -110,10 +142,16 @@ def _caption(sheet: DiagnosisSheet) -> str:
     trends = (
         " Diamonds: how the mean gap changes over the range of a condition." if known(sheet) else ""
     )
+    crosses = (
+        " Crosses: gross errors, set aside; at the edge where they lie beyond it."
+        if aside(sheet)
+        else ""
+    )
     return (
         f"Measured frequency over what the baseline {sheet.diagnosis.baseline} predicts at its "
         "best, less 1, by plane and order. Bars: 90 % interval of the measurement and of what the "
-        f"baseline leaves open; filled: beyond 2 standard deviations.{order}{profiles}{trends}"
+        f"baseline leaves open; filled: beyond 2 standard deviations.{crosses}{order}{profiles}"
+        f"{trends}"
     )
 
 
@@ -127,7 +165,9 @@ def _alt(sheet: DiagnosisSheet) -> str:
     )
     there = f" Along the hanger: {places}." if places else ""
     count = words.counted(len(residuals), "residual")
-    return f"{count} of frequencies; the largest: {told}.{there}"
+    gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in aside(sheet))
+    set_aside = f" Set aside as a gross error: {gross}." if gross else ""
+    return f"{count} of frequencies; the largest: {told}.{set_aside}{there}"
 
 
 FIGURE = Member("gap_map", "Where the gap lies", _draw, _caption, _alt)

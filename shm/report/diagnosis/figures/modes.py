@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.diagnosis.content import DiagnosisSheet, is_set_aside
 from shm.report.figures import style
 from shm.values import PLANES, Plane, Residual
 
@@ -18,6 +18,16 @@ ZERO_WIDTH = 0.8
 def measured(sheet: DiagnosisSheet) -> list[Residual]:
     """The residuals that are known."""
     return [r for r in sheet.diagnosis.where if math.isfinite(r.residual_percent)]
+
+
+def kept(sheet: DiagnosisSheet) -> list[Residual]:
+    """Those of them that were not set aside as gross errors."""
+    return [r for r in measured(sheet) if not is_set_aside(sheet.diagnosis, r)]
+
+
+def aside(sheet: DiagnosisSheet) -> list[Residual]:
+    """Those of them that were."""
+    return [r for r in measured(sheet) if is_set_aside(sheet.diagnosis, r)]
 
 
 def planes(residuals: Sequence[Residual]) -> list[Plane]:

@@ -1,0 +1,23 @@
+"""What an attribution claims."""
+
+from __future__ import annotations
+
+from shm.gap.attribution import Attribution
+from shm.gap.contract import Fit
+
+
+def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
+    """The fits, with their probabilities, of what the diagnosis claims.
+
+    All members of the leading group: which of them it is, the data cannot tell.
+    """
+    leading = attribution.leading
+    if leading is None:
+        no_gap = attribution.no_gap_probability >= attribution.unexplained_probability
+        return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
+    group = [
+        each
+        for each in attribution.explanations
+        if each is leading or (each.group is not None and each.group == leading.group)
+    ]
+    return [(each.probability, each.best.fit) for each in group if each.best.fit is not None]

@@ -1,0 +1,189 @@
+"""Outliers: frequencies that belong neither to the model nor to any effect.
+
+"A gross error in this frequency" is an explanation like any other: with its prior, with the density
+that a wide distribution gives the datum, and beside every other explanation of the same data. So
+an effect that moves many data is no outlier, and one wrong frequency no effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit, logsumexp
+
+from shm.gap.attribution import Attribution
+from shm.gap.chances import log_prior
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.fit import fitted
+from shm.gap.gross_error import (
+    LeftOut,
+    at,
+    left_out,
+    log_gross,
+    log_ordinary,
+    without_shape,
+)
+from shm.gap.problem import GapProblem
+from shm.values import BoolArray, IntArray
+
+SURE = 0.9
+"""A frequency is set aside where it is a gross error with at least this probability."""
+
+LARGEST_SHARE = 0.1
+"""Never more of the frequencies than this are set aside (one at least may be)."""
+
+_FEWEST_LEFT = 4
+_LEADERS = 3
+_REACH, _REACH_SHARE = 2.5, 0.3
+_DRAGGED = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Believed:
+    """A fit with the log of its hypothesis's prior probability."""
+
+    fit: Fit
+    log_prior: float
+
+    @property
+    def log_weight(self) -> float:
+        return self.fit.log_evidence + self.log_prior
+
+
+@dataclass(frozen=True)
+class GrossError:
+    """The frequency `row` (an index) that is a gross error with `probability`."""
+
+    row: int
+    probability: float
+
+
+def believed(attribution: Attribution) -> list[Believed]:
+    """No gap, something unknown, and every explanation that was fitted, at each place."""
+    causes = attribution.explanations
+    variants = {each.effect: len(each.variants) for each in causes if " + " not in each.effect}
+    tried = [variant.fit for each in causes for variant in each.variants]
+    fits = [attribution.baseline, attribution.unexplained, *(fit for fit in tried if fit)]
+    return [Believed(fit, log_prior(fit.hypothesis, variants)) for fit in fits]
+
+
+def gross_errors(
+    problem: GapProblem, rows: IntArray, attribution: Attribution, rng: np.random.Generator
+) -> list[GrossError]:
+    """The frequencies that an attribution of `rows` would rather have set aside, in this order.
+
+    The other frequencies of `problem` have been set aside before. At most one of a test and one of
+    a mode, since what moves more together is no slip, and at most a tenth of all. The last one may
+    be less than sure.
+    """
+    found: list[GrossError] = []
+    candidates, every = believed(attribution), np.arange(problem.design.frequencies)
+    most = max(1, int(LARGEST_SHARE * len(every)))
+    while len(every) - len(rows) < most and len(rows) > _FEWEST_LEFT:
+        part = problem.part(rows)
+        row = _suspect(part, candidates, _open(problem, rows, np.setdiff1d(every, rows)))
+        if row is None:
+            break
+        probability, candidates = _judged(part, candidates, row, rng)
+        found.append(GrossError(int(rows[row]), probability))
+        if probability < SURE:
+            break
+        rows = np.delete(rows, row)
+    return found
+
+
+def _open(problem: GapProblem, rows: IntArray, gone: IntArray) -> BoolArray:
+    """Which of `rows` are of a test and of a mode that no gross error was found in yet."""
+    design = problem.design
+    mode = np.stack([design.frequency_plane, design.frequency_order])
+    same_mode = (mode[:, rows, None] == mode[:, None, gone]).all(axis=0).any(axis=1)
+    return np.asarray(
+        ~np.isin(design.frequency_test[rows], design.frequency_test[gone]) & ~same_mode
+    )
+
+
+def _suspect(
+    problem: GapProblem, candidates: Sequence[Believed], possible: BoolArray
+) -> int | None:
+    """The frequency that most likely is a gross error, if it may be one at all.
+
+    Something unknown counts as a rival only: it could take any single datum for its own.
+    """
+    rows = np.flatnonzero(possible)
+    plain = [each for each in candidates if not each.fit.hypothesis.flexible]
+    if not len(rows):
+        return None
+    seen = [_seen(problem, each.fit, rows) for each in plain]
+    gross = np.array([c.log_weight + s.gross for c, s in zip(plain, seen, strict=True)])
+    ordinary = np.array([c.log_weight + s.ordinary for c, s in zip(plain, seen, strict=True)])
+    unknown = [each.log_weight for each in candidates if each.fit.hypothesis.flexible]
+    rivals = logsumexp([*unknown, logsumexp(ordinary, axis=0).max()])
+    odds = logsumexp(gross, axis=0) - np.maximum(logsumexp(ordinary, axis=0), rivals)
+    best = int(odds.argmax())
+    leader = int(gross[:, best].argmax())
+    gain = max(0.0, float(gross[leader, best] - plain[leader].log_weight))
+    return int(rows[best]) if odds[best] > -_REACH - _REACH_SHARE * gain else None
+
+
+def _seen(problem: GapProblem, fit: Fit, rows: IntArray) -> LeftOut:
+    return left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
+
+
+def _judged(
+    problem: GapProblem, candidates: Sequence[Believed], row: int, rng: np.random.Generator
+) -> tuple[float, list[Believed]]:
+    """The probability of a gross error, by fits with and without it, and those without it.
+
+    The mode's shape is in neither: of a wrong mode it is wrong as well.
+    """
+    rest = problem.part(np.delete(np.arange(problem.design.frequencies), row))
+    whole = without_shape(problem, row)
+    base = fitted(rest, Hypothesis(), rng)
+    gross, ordinary, kept = [], [], []
+    for each in _contenders(problem, candidates, row):
+        without = Believed(_without(rest, each.fit, base, rng), each.log_prior)
+        seen = at(whole, without.fit, row)
+        kept.append(without)
+        gross.append(without.log_weight + seen.given_rest(log_gross(seen.deviation))[0])
+        tails = without.fit.log_evidence + seen.given_rest(log_ordinary(seen.deviation, seen.sd))[0]
+        full = (
+            each.fit
+            if whole is problem
+            else fitted(whole, each.fit.hypothesis, rng, each.fit.z[None])
+        )
+        ordinary.append(each.log_prior + _ordinary(whole, full, row, float(tails)))
+    odds = float(logsumexp(gross) - logsumexp(ordinary))
+    return float(expit(odds)), kept
+
+
+def _ordinary(whole: GapProblem, fit: Fit, row: int, tails: float) -> float:
+    """Log evidence with the frequency as an ordinary datum, from a fit to all data.
+
+    Where it drags the fit along, what is linear about that says little: `tails` do, the evidence by
+    the fit without it.
+    """
+    seen = _seen(whole, fit, np.array([row]))
+    away, sd = seen.expected
+    return tails if abs(away[0]) > _DRAGGED * sd[0] else fit.log_evidence + seen.ordinary[0]
+
+
+def _contenders(problem: GapProblem, candidates: Sequence[Believed], row: int) -> list[Believed]:
+    """The candidates that lead with or without the frequency, no gap and something unknown."""
+    flexible = [each for each in candidates if each.fit.hypothesis.flexible]
+    plain = [each for each in candidates if not each.fit.hypothesis.flexible]
+    gross = [c.log_weight + float(_seen(problem, c.fit, np.array([row])).gross[0]) for c in plain]
+    with_it = np.argsort([-each.log_weight for each in plain], kind="stable")[:_LEADERS]
+    without = np.argsort(-np.array(gross), kind="stable")[:_LEADERS]
+    none = [k for k, each in enumerate(plain) if not each.fit.hypothesis.effects]
+    chosen = dict.fromkeys([*none, *map(int, with_it), *map(int, without)])
+    return [*(plain[k] for k in chosen), *flexible]
+
+
+def _without(rest: GapProblem, fit: Fit, base: Fit, rng: np.random.Generator) -> Fit:
+    """The hypothesis of `fit` on the rest of the data, also from where no gap lies now."""
+    if fit.hypothesis == base.hypothesis:
+        return base
+    starts = np.stack([fit.z, np.append(base.z, fit.z[len(base.z) :])])
+    return fitted(rest, fit.hypothesis, rng, starts)

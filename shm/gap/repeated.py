@@ -1,0 +1,162 @@
+"""Errors that repeat in every mode and test: those of sensors, and of the section along the bar.
+
+A sensor's gain is a little off, it sits some millimetres from where it should and is turned a
+little; a rolled bar is here and there a little thicker than on average. None of these is a gap, yet
+no repetition averages them out. They are normal and small, so that what one standard deviation of
+each does to the data (its load) is all there is to know of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from shm.gap.contract import Design, Observations
+from shm.gap.shapes import ShapeScaling
+from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.values import FloatArray, Hanger, IntArray
+
+GAIN_SD = 0.005
+PLACE_SD_M = 0.003
+TURN_SD_RAD = float(np.radians(0.3))
+SECTION_REACH_M = 1.0
+"""The standard deviation of the distance, in which the covariance of the section is normal."""
+
+STRETCHES = 48
+_STRETCH_CHANGE = 0.01
+_STEP_SHARE = 1e-4
+_LEAST_LOAD = 1e-9
+_LEAST_SHARE = 1e-4
+_NOWHERE = np.empty(0)
+
+Predict = Callable[[Design], FloatArray]
+"""The data (data,) that the baseline, near the measured ones, predicts of another design."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Loads of what repeats.
+
+    `section` (F, k) is that of the section along the bar and `readings` (F, tests with a reading)
+    that of tensions read, both of frequencies; `sensors` (S, l) is that of shapes.
+    """
+
+    section: FloatArray
+    readings: FloatArray
+    sensors: FloatArray
+
+    @classmethod
+    def none(cls, design: Design) -> Repeated:
+        nothing = np.zeros((design.frequencies, 0))
+        return cls(nothing, nothing, np.zeros((len(design.shape_mode), 0)))
+
+    @property
+    def loads(self) -> FloatArray:
+        """Of all data (data, k): section and readings move no shape, sensors no frequency."""
+        return np.asarray(block_diag(np.hstack([self.section, self.readings]), self.sensors))
+
+    @property
+    def frequency(self) -> FloatArray:
+        """Covariance (F, F) of the frequencies' logarithms."""
+        return np.asarray(self.section @ self.section.T + self.readings @ self.readings.T)
+
+
+def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:
+    """Loads (F, k) of the section along the bar, which varies about its mean.
+
+    Each column is one of the independent ways in which it varies (Karhunen and Loeve). The mean is
+    one of the bar's deviations and no business of this. `physical` holds `STRETCHES + 1` hangers
+    alike. Mass goes with the section, bending stiffness with its square.
+    """
+    length_m = hanger.length_m
+    edges_m = np.linspace(0.0, length_m, STRETCHES + 1)
+    influence = _influence(physical, edges_m, int(design.frequency_order.max()))
+    apart = np.subtract.outer(edges_m[:-1], edges_m[:-1]) / SECTION_REACH_M
+    centring = np.eye(STRETCHES) - 1 / STRETCHES
+    variance, ways = np.linalg.eigh(centring @ np.exp(-(apart**2) / 2) @ centring)
+    kept = variance > _LEAST_SHARE * variance.sum()
+    ways = hanger.scatter.along * ways[:, kept] * np.sqrt(variance[kept])
+    return np.asarray((influence @ ways)[design.frequency_plane, design.frequency_order - 1])
+
+
+def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> FloatArray:
+    """Change (planes, orders, stretches) of log frequencies by the section of each stretch."""
+    start_m, end_m = np.append(edges_m[:-1], 0.0), np.append(edges_m[1:], 0.0)
+    factor = np.append(np.full(len(edges_m) - 1, 1 + _STRETCH_CHANGE), 1.0)
+    thick = Zone(start_m, end_m, factor**2, factor)
+    found = solve(replace(physical, zones=(*physical.zones, thick)), orders, _NOWHERE, shapes=False)
+    log = np.log(found.frequency_hz)
+    return np.asarray(np.moveaxis(log[:-1] - log[-1], 0, 2) / _STRETCH_CHANGE)
+
+
+def sensor_loads(observations: Observations, predict: Predict, length_m: float) -> FloatArray:
+    """Loads (S, k) of every channel's gain, every sensor's place, and every biaxial sensor's turn.
+
+    Measured shapes say what a gain and a turn do to them, the shapes that the baseline predicts
+    what a place does. All are taken along the shapes' scaling, which hides a part of them.
+    """
+    design = observations.design
+    place, component = design.shape_place, design.shape_component
+    if not len(place):
+        return np.zeros((0, 0))
+    value = observations.value[design.frequencies :]
+    channel = _columns(2 * place + component)
+    sensor = _columns(place)
+    raw = np.column_stack(
+        [
+            GAIN_SD * value[:, None] * channel,
+            PLACE_SD_M * _slopes(observations, predict, length_m)[:, None] * sensor,
+            TURN_SD_RAD * _turned(design, value)[:, None] * sensor,
+        ]
+    )
+    loads = _beside_scaling(observations, raw)
+    return np.asarray(loads[:, np.abs(loads).max(axis=0) > _LEAST_LOAD])
+
+
+def _columns(label: IntArray) -> FloatArray:
+    """(S, labels): 1 where a component has the label."""
+    return np.asarray((label[:, None] == np.unique(label)).astype(float))
+
+
+def _turned(design: Design, value: FloatArray) -> FloatArray:
+    """By which each component changes with a turn: the other component at its place, or 0 (S,)."""
+    key = design.shape_mode * (design.shape_place.max() + 1) + design.shape_place
+    seen = {(k, c): v for k, c, v in zip(key, design.shape_component, value, strict=True)}
+    sign = np.where(design.shape_component == 0, 1.0, -1.0)
+    other = [seen.get((k, 1 - c), 0.0) for k, c in zip(key, design.shape_component, strict=True)]
+    return np.asarray(sign * np.array(other))
+
+
+def _slopes(observations: Observations, predict: Predict, length_m: float) -> FloatArray:
+    """The slopes (S,) of the baseline's shapes along the bar, at the size of those measured."""
+    design = observations.design
+    count = len(design.places_m)
+    step_m = np.where(np.array(design.places_m) < length_m / 2, 1.0, -1.0) * _STEP_SHARE * length_m
+    beside = replace(
+        design,
+        places_m=(*design.places_m, *(np.array(design.places_m) + step_m).tolist()),
+        shape_mode=np.repeat(design.shape_mode, 2),
+        shape_place=np.stack([design.shape_place, design.shape_place + count], axis=1).ravel(),
+        shape_component=np.repeat(design.shape_component, 2),
+    )
+    here, there = predict(beside)[design.frequencies :].reshape(-1, 2).T
+    scaling = ShapeScaling.measured(observations)
+    value = observations.value[design.frequencies :]
+    along, size = (
+        np.bincount(scaling.shape, scaling.weight * here * each)[scaling.shape]
+        for each in (value, here)
+    )
+    return np.asarray((there - here) / step_m[design.shape_place] * along / size)
+
+
+def _beside_scaling(observations: Observations, raw: FloatArray) -> FloatArray:
+    """Changes (S, k) of shapes without what scaling to unit length takes back."""
+    scaling = ShapeScaling.measured(observations)
+    value = observations.value[observations.design.frequencies :]
+    shapes = int(scaling.shape.max()) + 1
+    own = (scaling.shape == np.arange(shapes)[:, None]) * (scaling.weight * value)
+    length = own @ value
+    return np.asarray(raw - value[:, None] * ((own @ raw) / length[:, None])[scaling.shape])

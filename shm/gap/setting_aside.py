@@ -1,0 +1,129 @@
+"""The attribution of a gap with gross errors set aside, and what is told of these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.gap.answer import answered
+from shm.gap.attribution import Attribution, attributed
+from shm.gap.contract import Fit
+from shm.gap.gross_error import LeftOut, at, log_gross, log_ordinary, without_shape
+from shm.gap.options import GapOptions, Progress, silent
+from shm.gap.outliers import SURE, GrossError, gross_errors
+from shm.gap.problem import GapProblem
+from shm.values import NAN, PLANES, IntArray, Outlier, Residual
+
+_ROUNDS = 2
+_LIKELIER_THAN_NOT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Cleared:
+    """The attribution of those frequencies `rows` (indices) of `whole` that `problem` keeps.
+
+    `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
+    but not surely.
+    """
+
+    whole: GapProblem
+    problem: GapProblem
+    rows: IntArray
+    attribution: Attribution
+    aside: tuple[GrossError, ...] = ()
+    doubted: tuple[GrossError, ...] = ()
+
+    def seen(self, error: GrossError, fit: Fit) -> LeftOut:
+        """A frequency seen from the other data that are kept, to which `fit` was fitted."""
+        rows = np.union1d(self.rows, [error.row])
+        index = int(np.searchsorted(rows, error.row))
+        return at(without_shape(self.whole.part(rows), index), fit, index)
+
+
+def cleared(
+    whole: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
+) -> Cleared:
+    """Attributed, and where that leaves gross errors, attributed anew without them.
+
+    Where the last attribution expects one of them as it was measured, the first one stands.
+    """
+    every = np.arange(whole.design.frequencies)
+    first = found = Cleared(whole, whole, every, attributed(whole, options, rng, progress))
+    for _ in range(_ROUNDS):
+        errors = gross_errors(whole, found.rows, found.attribution, rng)
+        sure = [each for each in errors if each.probability >= SURE]
+        rest = [each for each in errors if _LIKELIER_THAN_NOT <= each.probability < SURE]
+        found = replace(found, doubted=tuple(rest))
+        if not sure:
+            break
+        rows = np.setdiff1d(found.rows, [each.row for each in sure])
+        part = whole.part(rows)
+        again = attributed(part, options, rng, lambda label, _: progress(label, 1.0))
+        found = Cleared(whole, part, rows, again, (*found.aside, *sure))
+    return found if all(_stands(found, each) for each in found.aside) else first
+
+
+def _stands(found: Cleared, error: GrossError) -> bool:
+    """Whether the attribution without it still does not expect the frequency."""
+    seen = found.seen(error, answered(found.attribution)[0][1])
+    gross = seen.given_rest(log_gross(seen.deviation))
+    return bool(gross[0] > seen.given_rest(log_ordinary(seen.deviation, seen.sd))[0])
+
+
+def outliers(found: Cleared, errors: Sequence[GrossError], fit: Fit) -> tuple[Outlier, ...]:
+    """Gross errors with what `fit`, the answer, expects in their place."""
+    return tuple(_outlier(found, each, fit) for each in errors)
+
+
+def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
+    design, observations = found.whole.design, found.whole.observations
+    seen = found.seen(error, fit)
+    deviation, sd = (float(each[0]) for each in seen.expected)
+    measured_hz = float(np.exp(observations.value[error.row]))
+    expected_hz = measured_hz * float(np.exp(-deviation))
+    own = float(np.nan_to_num(observations.sd[error.row]))
+    return Outlier(
+        plane=PLANES[design.frequency_plane[error.row]],
+        order=int(design.frequency_order[error.row]),
+        test=design.conditions[design.frequency_test[error.row]].test,
+        measured_hz=measured_hz,
+        expected_hz=expected_hz,
+        expected_sd_hz=expected_hz * float(np.sqrt(max(sd**2 - own**2, 0.0))),
+        probability=error.probability,
+    )
+
+
+def with_outliers(
+    found: Cleared, kept: Sequence[Residual], before: Fit, after: Fit | None
+) -> tuple[Residual, ...]:
+    """The residuals of the frequencies `kept` and of those set aside, in the order of the data.
+
+    These have no share in the misfit, since it is that of the others.
+    """
+    rows = dict(zip(found.rows.tolist(), kept, strict=True))
+    rows |= {each.row: _residual(found, each, before, after) for each in found.aside}
+    return tuple(rows[row] for row in sorted(rows))
+
+
+def _residual(found: Cleared, error: GrossError, before: Fit, after: Fit | None) -> Residual:
+    (told,) = outliers(found, [error], before)
+    seen = found.seen(error, before)
+    deviation, sd = (float(each[0]) for each in seen.expected)
+    return Residual(
+        told.plane,
+        told.order,
+        told.test,
+        told.measured_hz,
+        told.expected_hz,
+        100 * float(np.expm1(deviation)),
+        deviation / sd,
+        0.0,
+        after_percent=NAN if after is None else _percent(found, error, after),
+    )
+
+
+def _percent(found: Cleared, error: GrossError, fit: Fit) -> float:
+    deviation, _ = found.seen(error, fit).expected
+    return 100 * float(np.expm1(deviation[0]))

@@ -1,0 +1,121 @@
+"""One wrong frequency is an outlier; what moves many together is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from shm.gap import GapOptions, diagnose
+from shm.gap.fit import baseline_fit
+from shm.gap.gross_error import FREEDOM, GROSS_ERROR, left_out, log_gross, log_ordinary
+from shm.gap.observations import observed
+from shm.gap.outliers import SURE
+from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.values import Diagnosis, ModalTest
+from tests.helpers.hangers import HANGER_3
+
+PLAIN = replace(HANGER_3, plate=None)
+CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
+ONE_TEST = CampaignPlan(
+    modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False
+)
+
+
+TRIED = {"point_mass", "sag", "support_motion", "bending_stiffness"}
+QUICK = GapOptions(without=tuple(name for name in EFFECTS if name not in TRIED))
+
+
+def measured(*effects: PlantedEffect, seed: int = 101) -> tuple[ModalTest, ...]:
+    return campaign(PLAIN, HangerState(711e3), effects, ONE_TEST, np.random.default_rng(seed))
+
+
+def spoiled(tests: Sequence[ModalTest], plane: str, order: int, factor: float) -> list[ModalTest]:
+    """One frequency of the first test made larger by `factor`."""
+    modes = tuple(
+        replace(mode, frequency_hz=factor * mode.frequency_hz)
+        if (mode.plane, mode.order) == (plane, order)
+        else mode
+        for mode in tests[0].modes
+    )
+    return [replace(tests[0], modes=modes), *tests[1:]]
+
+
+@pytest.fixture(scope="module")
+def one_wrong() -> Diagnosis:
+    return diagnose(spoiled(measured(), "longitudinal", 3, 1.03), PLAIN, QUICK)
+
+
+def test_one_wrong_frequency_is_set_aside_and_nothing_else_is_the_matter(
+    one_wrong: Diagnosis,
+) -> None:
+    (found,) = one_wrong.outliers
+    assert (found.plane, found.order, found.test) == ("longitudinal", 3, "t1")
+    assert found.measured_hz == pytest.approx(1.03 * found.expected_hz, rel=1e-3)
+    assert found.expected_sd_hz < 1e-3 * found.expected_hz
+    assert found.probability > SURE
+    assert one_wrong.no_gap_probability > 0.5
+
+
+def test_what_is_set_aside_is_told_in_a_remark_and_kept_in_the_list_of_residuals(
+    one_wrong: Diagnosis,
+) -> None:
+    assert "Longitudinal 3 of test t1" in one_wrong.remarks[0]
+    assert "look at the recording again" in one_wrong.remarks[0]
+    assert len(one_wrong.where) == 12
+    (row,) = [r for r in one_wrong.where if (r.plane, r.order) == ("longitudinal", 3)]
+    assert row.residual_percent == pytest.approx(3.0, abs=0.2)
+    assert abs(row.z) > 50
+    assert row.share == 0
+    assert sum(r.share for r in one_wrong.where) == pytest.approx(1.0)
+    assert one_wrong.shrinkage.rms_before_percent < 0.1
+
+
+def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_one() -> None:
+    found = diagnose(spoiled(measured(CLAMP), "transverse", 5, 0.97), PLAIN, QUICK)
+    assert [(o.plane, o.order) for o in found.outliers] == [("transverse", 5)]
+    assert found.leading is not None
+    assert found.leading.effect == "point_mass"
+    assert diagnose(measured(CLAMP), PLAIN, QUICK).outliers == ()
+
+
+def test_a_residual_of_four_and_a_half_standard_deviations_is_no_proof() -> None:
+    sd = np.array([1e-4])
+    assert log_gross(4.5 * sd) < log_ordinary(4.5 * sd, sd)
+    assert log_gross(8 * sd) > log_ordinary(8 * sd, sd) + np.log(SURE / (1 - SURE))
+    assert FREEDOM == 20
+
+
+def test_both_densities_are_the_prior_of_theirs_in_all() -> None:
+    size = np.geomspace(1e-9, 60, 200_001)
+    both = [np.exp(log_gross(size)), np.exp(log_ordinary(size, np.array(1e-3)))]
+    inside = (size >= 1e-4) & (size <= 3)
+    assert 2 * np.trapezoid(both[0][inside], size[inside]) == pytest.approx(GROSS_ERROR, rel=1e-3)
+    assert 2 * np.trapezoid(both[1], size) == pytest.approx(1 - GROSS_ERROR, rel=1e-3)
+
+
+def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
+    """Data y = m + S z + e, z standard normal: y is normal about m with covariance S S' + C."""
+    problem = GapProblem(PLAIN, "beam1", observed(measured(), PLAIN))
+    fit = baseline_fit(problem, np.random.default_rng(1))
+    rows = np.array([2, 7])
+    seen = left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
+    away = problem.observations.value - fit.predicted + fit.slopes @ fit.z
+    node = 3
+    errors = problem.likelihood(fit.hypothesis).nodes[node].covariance.frequency
+    whole = errors + fit.slopes @ fit.slopes.T
+    for column, row in enumerate(rows):
+        others = np.delete(np.arange(12), row)
+        pull = np.linalg.solve(whole[np.ix_(others, others)], whole[others, row])
+        deviation = away[row] - pull @ away[others]
+        variance = whole[row, row] - pull @ whole[others, row]
+        assert seen.deviation[node, column] == pytest.approx(deviation, rel=1e-5)
+        assert seen.sd[node, column] == pytest.approx(np.sqrt(variance), rel=1e-5)
+        evidence = stats.multivariate_normal(cov=whole).logpdf(away)
+        weight = problem.likelihood(fit.hypothesis).log_weight[node]
+        assert seen.log_all[node] == pytest.approx(evidence + weight, abs=1e-4)

@@ -1,0 +1,110 @@
+"""Tensions that were read: what they shift, what their errors leave, and what they save."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.documents import dump, modes_document, parse_modes
+from shm.errors import BadInput
+from shm.gap import GapOptions, diagnose
+from shm.gap.contract import Hypothesis
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.models.hanger import PhysicalHanger, solve
+from shm.values import NAN, FloatArray, ModalTest, Mode, Supports
+from tests.helpers.hangers import HANGER_3
+
+ORDERS = (1, 2, 3, 4)
+READ_N = (600e3, 650e3, 700e3, 760e3)
+SD_N = 10e3
+STRING = replace(HANGER_3, bending_stiffness_factor=1e-4, supports=Supports("pinned", "pinned"))
+
+
+def frequencies_hz(tension_n: FloatArray) -> FloatArray:
+    """Of hanger 3 (tests, orders)."""
+    bar = PhysicalHanger.clamped(HANGER_3, tension_n)
+    return solve(bar, len(ORDERS), np.empty(0), shapes=False).frequency_hz[:, 0]
+
+
+def loadings(frequency_hz: FloatArray, read_n: tuple[float, ...], sd_n: float) -> list[ModalTest]:
+    return [
+        ModalTest(
+            f"t{number}",
+            tuple(
+                Mode("transverse", order, float(f), 1e-4 * float(f))
+                for order, f in zip(ORDERS, row, strict=True)
+            ),
+            tension_read_n=read,
+            tension_read_sd_n=sd_n if np.isfinite(read) else NAN,
+        )
+        for number, (row, read) in enumerate(zip(frequency_hz, read_n, strict=True))
+    ]
+
+
+def test_shifts_count_from_the_mean_of_all_readings_and_are_zero_without_one() -> None:
+    tests = loadings(frequencies_hz(np.full(3, 7e5)), (600e3, NAN, 800e3), SD_N)
+    conditions = observed(tests, HANGER_3).design.conditions
+    assert [each.tension_shift_n for each in conditions] == [-100e3, 0.0, 100e3]
+    assert [each.tension_shift_sd_n for each in conditions] == [SD_N, 0.0, SD_N]
+
+
+def test_one_reading_alone_says_nothing() -> None:
+    tests = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, NAN), SD_N)
+    conditions = observed(tests, HANGER_3).design.conditions
+    assert [each.tension_shift_n for each in conditions] == [0.0, 0.0]
+
+
+def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
+    """Of a string d ln f/dT = 1/(2 T): half the reading's fraction, in every mode."""
+    tests = loadings(np.outer([1.0, 1.0], ORDERS), (690e3, 732e3), SD_N)
+    problem = GapProblem(STRING, "beam1", observed(tests, STRING))
+    theta = problem.theta(Hypothesis(), problem._near)
+    level_n = float(theta[0, 0]) * STRING.nominal_tension_n
+    loads = problem.readings_of(problem.design)
+    assert loads.shape == (8, 2)
+    for test, shift_n in enumerate((-21e3, 21e3)):
+        own = problem.design.frequency_test == test
+        np.testing.assert_allclose(loads[own, test], SD_N / 2 / (level_n + shift_n), rtol=2e-3)
+        assert not loads[~own, test].any()
+
+
+def test_tensions_that_differ_between_tests_are_no_gap_where_they_were_read() -> None:
+    """Four loadings, each read to 10 kN, of frequencies that are exact to 0.01 %."""
+    rng = np.random.default_rng(3)
+    true_n = np.array(READ_N) + SD_N * rng.standard_normal(4)
+    measured = frequencies_hz(true_n) * (1 + 1e-4 * rng.standard_normal((4, len(ORDERS))))
+    found = diagnose(loadings(measured, READ_N, SD_N), HANGER_3, GapOptions(seed=1))
+    assert found.leading is None
+    assert found.no_gap_probability > 0.5
+    tension = found.tension_after_n
+    assert tension.q025 < true_n.mean() < tension.q975
+
+
+def test_a_reading_survives_the_modes_document_and_is_absent_where_there_was_none() -> None:
+    tests = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, NAN), SD_N)
+    document = json.loads(dump(modes_document(tests)))
+    assert "tension_read_n" not in document["tests"][1]
+    one, other = parse_modes(document)
+    assert (one.tension_read_n, one.tension_read_sd_n) == (600e3, SD_N)
+    assert np.isnan(other.tension_read_n)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"tension_read_n": 6e5},
+        {"tension_read_sd_n": 1e4},
+        {"tension_read_n": 6e5, "tension_read_sd_n": 0.0},
+        {"tension_read_n": -1.0, "tension_read_sd_n": 1.0},
+    ],
+)
+def test_a_reading_without_a_standard_deviation_is_refused(values: dict[str, float]) -> None:
+    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
+    document = json.loads(dump(modes_document(tests)))
+    document["tests"][0] |= values
+    with pytest.raises(BadInput, match="tension_read"):
+        parse_modes(document)
