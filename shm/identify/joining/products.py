@@ -48,6 +48,25 @@ def of_hits(ring: Ringing) -> Product:
     return Product(known.mean(axis=0).T, jackknife_sd(others).T)
 
 
+def of_seen_shapes(modes: Sequence[FoundMode], seen: Sequence[bool]) -> Product:
+    """The shapes of the modes that the set-up has `seen`, certain ones larger; 0 of the others.
+
+    They are free of what modes beyond the band leave in residues, but tell no scales.
+    """
+    values, sds = np.zeros((2, len(modes), max(len(mode.shape) for mode in modes)))
+    for index, (mode, own) in enumerate(zip(modes, seen, strict=True)):
+        if own:
+            values[index] = _certainty(mode) * mode.shape
+            sds[index] = _certainty(mode) * mode.shape_sd
+    return Product(values, sds)
+
+
+def _certainty(mode: FoundMode) -> float:
+    """1 over the mean standard deviation of a shape; 1 where it is not known."""
+    sd = float(np.mean(mode.shape_sd))
+    return 1 / sd if sd > 0 else 1.0
+
+
 def of_shapes(modes: Sequence[FoundMode]) -> Product:
     """The shapes as they are."""
     return Product(np.array([m.shape for m in modes]), np.array([m.shape_sd for m in modes]))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.identify.contract import FoundMode, Hit, Measurement
-from shm.values import ComplexArray, FloatArray
+from shm.values import BoolArray, ComplexArray, FloatArray
 
 _RIDGE = 1e-12
 """Keeps modes that the ring-down is too short to tell apart from growing against each other."""
@@ -36,8 +36,38 @@ class Ringing:
     residue: FloatArray
 
 
-def ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
-    """Amplitudes and residues of `modes` after the used hits of time records."""
+def ringing(
+    measurement: Measurement, modes: Sequence[FoundMode], seen: Sequence[bool] = ()
+) -> Ringing:
+    """Amplitudes and residues of `modes` after the used hits of time records.
+
+    Those that were not `seen` here (default: all were) and lie too near to one that was to be told
+    apart from it have none: the ring-down would be divided between the two by chance.
+    """
+    rings = np.ones(len(modes), bool) if all(seen) else ~_hidden(measurement, modes, seen)
+    found = _ringing(measurement, [mode for mode, own in zip(modes, rings, strict=True) if own])
+    return Ringing(_spread(found.amplitude_m_s2, rings), _spread(found.residue, rings))
+
+
+def _hidden(
+    measurement: Measurement, modes: Sequence[FoundMode], seen: Sequence[bool]
+) -> BoolArray:
+    """Which modes stand behind one that was seen."""
+    frequency_hz, known = np.array([mode.frequency_hz for mode in modes]), np.array(seen)
+    samples = max(decay.shape[1] for decay in measurement.decays)
+    away = np.abs(np.subtract.outer(frequency_hz, frequency_hz[known]))
+    near = away < measurement.sampling_rate_hz / samples
+    return np.asarray(~known & near.any(axis=1))
+
+
+def _spread(values: FloatArray, kept: BoolArray) -> FloatArray:
+    """Values (hits, points, kept) among zeros, (hits, points, modes)."""
+    spread = np.zeros((*values.shape[:2], len(kept)))
+    spread[:, :, kept] = values
+    return spread
+
+
+def _ringing(measurement: Measurement, modes: Sequence[FoundMode]) -> Ringing:
     poles = poles_of_modes(modes)
     longest = max(signals.shape[1] for signals in measurement.driven)
     waves = np.exp(np.outer(poles, np.arange(longest) / measurement.sampling_rate_hz))

@@ -20,6 +20,9 @@ RINGING = 0.4
 """An anti-aliasing filter rings around a pulse by about this share over the distance in samples."""
 RINGING_SAMPLES = 16
 """So long before a hit its ringing may stand out of the noise: the ring-down before ends there."""
+_REACH, _STEPS = 12, 33
+"""Samples to either side from which a peak between samples is interpolated, and at how many places.
+"""
 _BASELINE_SECONDS = 0.25
 _BASELINE_SAMPLES = 64
 
@@ -124,9 +127,19 @@ def _pulse(
     first = max(near, key=lambda peak: float(push[peak]))
     falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
     end = first + int(falls[0]) if len(falls) else stop
-    hardest = float(max(push[peak] for peak in peaks))
+    hardest = max(_between_samples(push, peak) for peak in peaks)
     second = _second_peak(push[first:stop], end - first, noise, rate)
     return Pulse(start, first, end, stop, hardest, second)
+
+
+def _between_samples(push: FloatArray, peak: int) -> float:
+    """The peak of a band-limited pulse, which as a rule lies between samples."""
+    first = max(0, peak - _REACH)
+    part = push[first : peak + _REACH + 1]
+    nodes = np.arange(len(part))
+    offsets = peak - first + np.linspace(-1, 1, _STEPS)[:, np.newaxis] - nodes
+    taper = np.cos(np.pi * np.clip(offsets / (_REACH + 1), -1, 1) / 2) ** 2
+    return float(max(push[peak], np.max((np.sinc(offsets) * taper) @ part)))
 
 
 def _same_pulse(sampling_rate_hz: float) -> int:

@@ -48,10 +48,11 @@ def placed(
     found, steady = without_tones(found, tones)
     turned_rad = principal_angle(found, points)
     groups = _candidates(found, points, turned_rad)
-    length_m = hanger.length_m if hanger else NAN
+    known = hanger if hanger and hanger.as_hanger else None
+    length_m = known.length_m if known else NAN
     numbering = assign_orders(
         [_plane_modes(group, length_m) for group in groups],
-        Expected.of(hanger) if hanger else None,
+        Expected.of(known) if known else None,
     )
     ordered = [
         (candidate, order)
@@ -69,7 +70,8 @@ def placed(
             *_plane_notes(points, turned_rad),
             *(pair_note(mode) for mode in pairs),
             *_near_notes(groups, points),
-            *_basis_notes(numbering, hanger, points),
+            *_support_notes(hanger),
+            *_basis_notes(numbering, known, points),
             *_order_notes(ordered),
         ),
     )
@@ -158,6 +160,15 @@ def _near_notes(
                 "aside, which may be the wrong one: measure with a biaxial accelerometer"
             )
     return notes
+
+
+def _support_notes(hanger: Hanger | None) -> list[str]:
+    if hanger is None or hanger.as_hanger:
+        return []
+    return [
+        "the hanger is not clamped at both ends and in tension: its description does not help to "
+        "number the modes"
+    ]
 
 
 def _basis_notes(
