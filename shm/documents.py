@@ -84,6 +84,9 @@ def test_document(test: ModalTest) -> dict[str, Any]:
     document.pop("hanger")
     if test.added_mass is None:
         document.pop("added_mass")
+    if math.isnan(test.tension_read_n):
+        document.pop("tension_read_n")
+        document.pop("tension_read_sd_n")
     return document
 
 
@@ -144,7 +147,22 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
         temperature_c=_number(test, "temperature_c", label, file),
         amplitude=_number(test, "amplitude", label, file),
         added_mass=_added_mass(test.get("added_mass"), label, file),
+        **_tension_read(test, label, file),
     )
+
+
+def _tension_read(test: Mapping[str, Any], label: str, file: str | Path) -> dict[str, float]:
+    keys = ("tension_read_n", "tension_read_sd_n")
+    values = {key: _number(test, key, label, file) for key in keys}
+    read, sd = values.values()
+    if math.isfinite(read) != math.isfinite(sd) or read < 0 or sd <= 0:
+        raise BadInput(
+            f"{label}: tension_read_n and tension_read_sd_n are a tension and its standard "
+            f"deviation, above 0.",
+            file=file,
+            remedy="Give both, in N, or neither.",
+        )
+    return values
 
 
 def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:

@@ -8,7 +8,7 @@ from dataclasses import fields
 from shm.bridge.table import Table
 from shm.values import EffectPrior, Scatter
 
-_LARGEST_SCATTER = 0.1
+_LARGEST_SCATTER = 0.5
 
 
 def scatter_of(table: Table | None) -> Scatter:

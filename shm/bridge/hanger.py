@@ -1,4 +1,4 @@
-"""A `[[hanger]]` table: section, plates, turnbuckles, admitted model classes, thresholds, gap."""
+"""A `[[hanger]]` table: section, ends, turnbuckles, admitted model classes, thresholds, gap."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from shm.bridge.effects import effect_priors_of, scatter_of
+from shm.bridge.supports import supports_of
 from shm.bridge.table import Table
 from shm.values import NAN, EndPlate, Hanger, Thresholds, Turnbuckle
 
@@ -15,7 +16,7 @@ _REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
 _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
-    "plate", "turnbuckle", "thresholds", "scatter", "effects",
+    "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -26,7 +27,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
     """The hanger of a `[[hanger]]` table; raises BadInput naming table and key at fault."""
     table = Table(values, f"[[hanger]] id {values.get('id', '?')}", path)
     table.refuse_unknown(_KNOWN)
-    length_m, elastic_modulus, tension = (table.positive(key) for key in _REQUIRED[1:])
+    length_m, elastic_modulus = table.positive("length_m"), table.positive("elastic_modulus_pa")
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
     return Hanger(
@@ -36,7 +37,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         area_m2=area,
         second_moment_m4=second_moment,
         mass_per_length_kg_m=mass,
-        nominal_tension_n=tension,
+        nominal_tension_n=table.not_negative("nominal_tension_n"),
         name=str(values.get("name", "")),
         thresholds=_thresholds(table.table("thresholds")),
         diameter_m=diameter,
@@ -47,6 +48,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         models=_models(table),
         scatter=scatter_of(table.table("scatter")),
         effect_priors=effect_priors_of(table.table("effects")),
+        supports=supports_of(table.table("supports")),
     )
 
 

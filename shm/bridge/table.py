@@ -40,6 +40,13 @@ class Table:
             f"{key} = {self.values[key]!r} is not a positive number", f"Give {key} in SI units."
         )
 
+    def not_negative(self, key: str) -> float:
+        """A number from 0 up; raises BadInput where it is missing or none."""
+        value = self._number(key, f"Give {key} in SI units.")
+        if value >= 0:
+            return value
+        raise self.refusal(f"{key} = {self.values[key]!r} is negative", f"Give {key} in SI units.")
+
     def fraction(self, key: str, default: float, low: float, high: float) -> float:
         """A number from `low` to `high`, both included; `default` where the key is missing."""
         if key not in self:

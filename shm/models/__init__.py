@@ -12,7 +12,8 @@ from shm.errors import UsageError
 from shm.models.adopted import Adopted
 from shm.models.adopted import unfit as adopted_unfit
 from shm.models.adopted_name import AdoptedName, is_adopted
-from shm.models.base import Model
+from shm.models.base import Model, held_otherwise
+from shm.models.composed import AS_DESCRIBED
 from shm.models.registry import MODELS
 from shm.values import Hanger
 
@@ -31,6 +32,22 @@ def build(name: str, hanger: Hanger) -> Model:
             remedy=f"Classes that apply: {', '.join(fitting) or 'none'}.",
         )
     return described(name, hanger)
+
+
+def check_baseline(name: str, hanger: Hanger) -> None:
+    """Raises UsageError where the model class `name` is no baseline of a diagnosis of `hanger`.
+
+    That is where `build` does, but that a diagnosis takes beam1 on any supports, and with no
+    tension.
+    """
+    reason = _not_this_bar(name, hanger)
+    if not reason and name != AS_DESCRIBED:
+        reason = held_otherwise(hanger)
+    if reason:
+        raise UsageError(
+            f"model class {name} is no baseline for hanger {hanger.id}: {reason}",
+            remedy=f"Take another baseline, {AS_DESCRIBED} for instance.",
+        )
 
 
 def described(name: str, hanger: Hanger) -> Model:
@@ -63,6 +80,11 @@ def competing_names(hanger: Hanger, names: Sequence[str]) -> tuple[str, ...]:
 
 def _why_not(name: str, hanger: Hanger) -> str:
     """A sentence from its predicate on; empty where the class applies."""
+    return _not_this_bar(name, hanger) or held_otherwise(hanger)
+
+
+def _not_this_bar(name: str, hanger: Hanger) -> str:
+    """The same, whatever holds the bar."""
     _refuse_unknown(name, hanger)
     if hanger.models and not {name, name.partition("+")[0]} & set(hanger.models):
         return f"the hanger's `models` admits {', '.join(hanger.models)} only."
@@ -85,6 +107,7 @@ __all__ = [
     "Model",
     "applicable",
     "build",
+    "check_baseline",
     "competing_names",
     "described",
     "is_adopted",

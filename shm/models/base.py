@@ -20,6 +20,19 @@ def silent(fraction: float) -> None:
     """No progress is shown."""
 
 
+def held_otherwise(hanger: Hanger) -> str:
+    """Why no model class can be updated for `hanger`; empty where it is clamped and in tension."""
+    if hanger.nominal_tension_n == 0:
+        return "the hanger carries no tension (nominal_tension_n = 0) that could be updated."
+    if not hanger.supports.clamped:
+        supports = hanger.supports
+        return (
+            f"it holds the ends by clamps or springs of its own, and [hanger.supports] has them "
+            f"{supports.deck} (deck) and {supports.arch} (arch). `shm gap diagnose` takes them so."
+        )
+    return ""
+
+
 class Model:
     """A model class of one hanger. A member declares its parameters and overrides two verbs.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shm.errors import UsageError
-from shm.models.base import Model
+from shm.models.base import Model, held_otherwise
 from shm.models.beam import Beam1, Beam2
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
@@ -20,7 +20,7 @@ def registered(name: str, hanger: Hanger) -> Model:
     """
     if name not in MODELS:
         raise UsageError(f"unknown model class {name!r}.", remedy=f"Known: {', '.join(MODELS)}.")
-    reason = MODELS[name].unfit(hanger)
+    reason = MODELS[name].unfit(hanger) or held_otherwise(hanger)
     if reason:
         raise UsageError(
             f"model class {name} does not apply to hanger {hanger.id}: {reason}",

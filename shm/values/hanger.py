@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 from shm.values.kinds import NAN
 
@@ -45,12 +47,44 @@ class Turnbuckle:
 
 @dataclass(frozen=True)
 class Scatter:
-    """Standard deviations, as fractions, by which a bar as made differs from its description."""
+    """Standard deviations, as fractions, by which a bar as made differs from its description.
+
+    `along` is by which its section varies along the bar about its own mean. `tension` is how far
+    the tension may be from the nominal one where that was weighed or measured; infinite where the
+    nominal one says next to nothing.
+    """
 
     section: float = 0.005
     density: float = 0.005
     length: float = 0.005
     modulus: float = 0.005
+    along: float = 0.001
+    tension: float = math.inf
+
+
+Support: TypeAlias = Literal["clamped", "pinned", "free"]
+"""How an end is held: fast, turning freely, or not at all."""
+
+
+@dataclass(frozen=True)
+class Supports:
+    """What holds the two ends, and the mass that hangs from the free one of them, if any.
+
+    The mass swings along with the end, sideways; its weight is part of the nominal tension.
+    """
+
+    deck: Support = "clamped"
+    arch: Support = "clamped"
+    hanging_mass_kg: float = 0.0
+
+    @property
+    def clamped(self) -> bool:
+        """Whether both ends are."""
+        return self.ends("clamped") == (0, 1)
+
+    def ends(self, *kinds: Support) -> tuple[int, ...]:
+        """Which ends (deck 0, arch 1) are held in one of these ways."""
+        return tuple(end for end, own in enumerate((self.deck, self.arch)) if own in kinds)
 
 
 @dataclass(frozen=True)
@@ -70,7 +104,7 @@ class Hanger:
     `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of
     the solid section's bending stiffness that a strand has. `models` names the model classes that
     the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
-    catalogue of effects.
+    catalogue of effects. A bar with a nominal tension of 0 carries none.
     """
 
     id: int
@@ -90,7 +124,13 @@ class Hanger:
     models: tuple[str, ...] = ()
     scatter: Scatter = field(default_factory=Scatter)
     effect_priors: tuple[EffectPrior, ...] = ()
+    supports: Supports = field(default_factory=Supports)
 
     @property
     def bending_stiffness_n_m2(self) -> float:
         return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
+
+    @property
+    def as_hanger(self) -> bool:
+        """Whether it is what the model classes take it for: clamped at both ends, in tension."""
+        return self.supports.clamped and self.nominal_tension_n > 0

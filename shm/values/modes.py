@@ -72,7 +72,11 @@ class QualityCheck:
 
 @dataclass(frozen=True)
 class ModalTest:
-    """What one hammer test says about a hanger: its identified modes and the conditions."""
+    """What one hammer test says about a hanger: its identified modes and the conditions.
+
+    `tension_read_n` is what a load cell or a lift-off showed during the test, with the reading's
+    standard deviation.
+    """
 
     id: str
     modes: tuple[Mode, ...]
@@ -81,3 +85,5 @@ class ModalTest:
     temperature_c: float = NAN
     amplitude: float = NAN
     added_mass: AddedMass | None = None
+    tension_read_n: float = NAN
+    tension_read_sd_n: float = NAN

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -84,20 +85,68 @@ class Score:
     cases: int = 0
 
 
+MarkName = Literal[
+    "detected",
+    "false alarms",
+    "named first",
+    "among the first two",
+    "in its group",
+    "two effects told",
+    "right where sure",
+    "unknown called unexplained",
+    "unknown misattributed",
+    "left out called unexplained",
+    "left out misattributed",
+    "calibration error",
+    "calibration error as counted",
+    "calibration error by chance",
+    "log score",
+    "Brier score",
+    "tension error before, %",
+    "tension error after, %",
+    "tension error after over before",
+    "tension covered",
+    "size covered",
+    "held-out misfit after over before",
+    "held-out misfit worse",
+    "failed",
+]
+
+
 @dataclass(frozen=True)
 class Mark:
     """A score beside the bounds that it must keep; an infinite bound is none.
 
-    `richness` and `way` are empty where all count. `met` is None where too few cases speak.
+    It is asked of planted sizes greater than `above`. `richness`, `way` and `effect` are empty
+    where all count. With the way `recordings less modes` the score is the difference of two.
+    `met` is None where nothing is asked or too few cases speak.
     """
 
-    name: str
+    name: MarkName
     score: Score
     lower: float
     upper: float
     richness: Richness | Literal[""] = ""
-    way: Way | Literal[""] = ""
+    way: Way | Literal["recordings less modes", ""] = ""
     met: bool | None = None
+    above: float = 0.0
+    effect: str = ""
+
+    @property
+    def asked(self) -> bool:
+        """Whether it has a bound to keep."""
+        return math.isfinite(self.lower) or math.isfinite(self.upper)
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Cases alike in size or in probability: from where to where, the mean, a share of them."""
+
+    low: float
+    high: float
+    mean: float
+    score: Score
+    richness: Richness | Literal[""] = ""
 
 
 @dataclass(frozen=True)
@@ -112,6 +161,11 @@ class CaseScore:
     in its 90 % interval, None where it was not estimated at its place; `tension_covered` that of
     the tension in its 95 % interval. Errors of the tension are fractions. `held_out_ratio` is the
     error of held-out predictions of the true frequencies after over before.
+
+    `alike` are the other members of the leader's group. `misattributed` says that an effect was
+    named with more than 0.9 outside the truth's group, `pair_told` how the answer did on two
+    effects, None for all other kinds. `brier` is the Brier score over no gap, every cause and
+    unexplained. An answer that failed has no leader; its Brier score is the worst there is.
     """
 
     case: str
@@ -137,11 +191,19 @@ class CaseScore:
     held_out_ratio: float = NAN
     seconds: float = NAN
     failure: str = ""
+    brier: float = NAN
+    misattributed: bool = False
+    pair_told: bool | None = None
+    alike: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class TrialScore:
-    """All scores of a trial: its marks, and each case in both rounds."""
+    """All scores of a trial: its marks, and each case in both rounds.
+
+    `detection` holds the share detected by size and richness, `reliability` the share right by
+    leading probability.
+    """
 
     cases: int
     seed: int
@@ -150,3 +212,5 @@ class TrialScore:
     marks: tuple[Mark, ...]
     first_round: tuple[CaseScore, ...]
     left_out: tuple[CaseScore, ...] = ()
+    detection: tuple[Bin, ...] = ()
+    reliability: tuple[Bin, ...] = ()

@@ -24,6 +24,7 @@ from shm.simulate import (
     planted_modes,
 )
 from shm.simulate.effects import ranges_of, where_of
+from shm.simulate.manufacture import GLOBAL
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, Turnbuckle
 
 PLACES = (1.56, 3.48, 5.4, 7.92)
@@ -133,9 +134,7 @@ def both(
         PLACES,
     )  # fmt: skip
     tension = 1.05 * hanger.nominal_tension_n
-    deviations = (
-        DEVIATIONS.section, DEVIATIONS.density, DEVIATIONS.length, DEVIATIONS.modulus,
-    )  # fmt: skip
+    deviations = np.log1p([getattr(DEVIATIONS, name) for name in GLOBAL])
     own = [value for each in effects for value in each.values.values()]
     theta = np.array([[1.05, *springs, *deviations, *own]])
     test, shift, level, mass = WARM_AND_HARD

@@ -57,7 +57,7 @@ def test_a_class_that_does_not_describe_the_hanger_is_no_baseline() -> None:
 )
 def test_scatter_changes_stiffness_and_mass(column: int, stiffness: float, mass: float) -> None:
     deviations = np.zeros((1, 4))
-    deviations[0, column] = 0.02
+    deviations[0, column] = np.log(1.02)
     made, plain = scattered(clamped(), deviations, HANGER_3), clamped()
     np.testing.assert_allclose(
         made.bending_stiffness_n_m2, plain.bending_stiffness_n_m2 * stiffness
@@ -66,7 +66,7 @@ def test_scatter_changes_stiffness_and_mass(column: int, stiffness: float, mass:
 
 
 def test_a_longer_bar_ends_farther_from_the_deck() -> None:
-    made = scattered(clamped(), np.array([[0, 0, 0.01, 0]]), HANGER_3)
+    made = scattered(clamped(), np.array([[0, 0, np.log(1.01), 0]]), HANGER_3)
     np.testing.assert_allclose((made.deck_end_m[0], made.arch_end_m[0]), (0, 1.01 * LENGTH))
 
 

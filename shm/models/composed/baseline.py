@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,21 +10,27 @@ import numpy as np
 from shm.errors import UsageError
 from shm.models.base import Model
 from shm.models.beam import Beam
+from shm.models.composed.scatter import Deviation
 from shm.models.effects.base import Parameter
 from shm.models.hanger import PhysicalHanger, solve
 from shm.models.registry import MODELS
 from shm.models.solid import S2
 from shm.values import NAN, FloatArray, Hanger
 
-_LENGTH = "theta_L"
+AS_DESCRIBED = "beam1"
+"""The class that takes the ends as they are described; of most hangers that is clamped."""
+
+_LENGTH, _TENSION = "theta_L", "theta_F"
 _NOWHERE = np.empty(0)
 
 
 class Baseline:
     """The model class `name` of `hanger`, its length that of the description.
 
-    The beams are cases of the general model. Of the others it takes the frequencies and, for what
-    effects change and for shapes, a bar on equivalent end springs.
+    The beams are cases of the general model; beam1 is the bar on the supports of its description.
+    Of the others it takes the frequencies and, for what effects change and for shapes, a bar on
+    equivalent end springs. A bar that carries no tension has no parameter of it; a tension that the
+    description knows (`Scatter.tension`) has a normal prior instead of the class's.
     """
 
     def __init__(self, name: str, hanger: Hanger):
@@ -31,14 +38,14 @@ class Baseline:
         if reason := MODELS[name].unfit(hanger):
             raise UsageError(
                 f"model class {name} is no baseline for hanger {hanger.id}: {reason}",
-                remedy="Take another baseline, beam1 for instance.",
+                remedy=f"Take another baseline, {AS_DESCRIBED} for instance.",
             )
         self._model = MODELS[name](hanger)
-        bounds = self._model.bounds
+        left_out = {_LENGTH} if hanger.nominal_tension_n else {_LENGTH, _TENSION}
         self.parameters = tuple(
-            Parameter(key, _unit(key), lower, upper, NAN, f"the prior of model class {name}")
-            for key, (lower, upper) in bounds.items()
-            if key != _LENGTH
+            self._parameter(key, *both)
+            for key, both in self._model.bounds.items()
+            if key not in left_out
         )
         self._last: tuple[bytes, int, FloatArray] | None = None
 
@@ -49,7 +56,10 @@ class Baseline:
     def physical(self, theta: FloatArray, sensors: int) -> PhysicalHanger:
         """The hangers of `theta` (n, parameters) before any effect, with that many sensors."""
         whole = self._whole(theta)
-        tension_n = theta[:, self.names.index("theta_F")] * self.hanger.nominal_tension_n
+        tension_n = whole[:, self._model.parameter_names.index(_TENSION)]
+        tension_n = tension_n * self.hanger.nominal_tension_n
+        if self.name == AS_DESCRIBED:
+            return PhysicalHanger.held(self.hanger, tension_n, sensors)
         clamped = PhysicalHanger.clamped(self.hanger, tension_n, sensors)
         deck_m, arch_m = _ends_m(self._model)
         bar = replace(
@@ -69,6 +79,14 @@ class Baseline:
             found = self._model.frequencies_hz(self._whole(theta), modes)
             self._last = key, modes, found / general.frequency_hz
         return self._last[2]
+
+    def _parameter(self, key: str, lower: float, upper: float) -> Parameter:
+        known = self.hanger.scatter.tension
+        if key == _TENSION and math.isfinite(known):
+            reason = "the nominal tension, as exactly as the hanger's description states it"
+            return Deviation(key, "", 1 - known, 1 + known, NAN, reason)
+        reason = f"the prior of model class {self.name}"
+        return Parameter(key, _unit(key), lower, upper, NAN, reason)
 
     def _whole(self, theta: FloatArray) -> FloatArray:
         """As the class takes them, with its length at the description's."""

@@ -82,6 +82,8 @@ class ComposedHanger:
         self, physical: PhysicalHanger, theta: FloatArray, conditions: Conditions
     ) -> PhysicalHanger:
         at = len(self.baseline.parameters) + len(DEVIATIONS)
+        tension_n = physical.tension_n + conditions.tension_shift_n
+        physical = replace(physical, tension_n=tension_n)
         for (name, variant), count in zip(self.effects, self._counts, strict=True):
             values = theta[:, at : at + count]
             physical = EFFECTS[name].applied(physical, values, variant, conditions, self.hanger)

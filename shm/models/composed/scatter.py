@@ -16,13 +16,22 @@ DEVIATIONS = ("section", "density", "length", "modulus")
 
 @dataclass(frozen=True)
 class Deviation(Parameter):
-    """A parameter with a normal prior about 0: `lower` and `upper` are one standard deviation."""
+    """A parameter with a normal prior: `lower` and `upper` are one standard deviation off."""
 
     def value(self, share: FloatArray) -> FloatArray:
-        return np.asarray(self.upper * ndtri(share))
+        return np.asarray(self._mean + self._sd * ndtri(share))
 
     def share(self, value: FloatArray) -> FloatArray:
-        return np.asarray(ndtr(value / self.upper) if self.upper else np.full_like(value, 0.5))
+        away = value - self._mean
+        return np.asarray(ndtr(away / self._sd) if self._sd else np.full_like(value, 0.5))
+
+    @property
+    def _mean(self) -> float:
+        return (self.lower + self.upper) / 2
+
+    @property
+    def _sd(self) -> float:
+        return (self.upper - self.lower) / 2
 
 
 def deviations_of(hanger: Hanger) -> tuple[Deviation, ...]:
@@ -35,10 +44,12 @@ def deviations_of(hanger: Hanger) -> tuple[Deviation, ...]:
 def scattered(physical: PhysicalHanger, deviations: FloatArray, hanger: Hanger) -> PhysicalHanger:
     """Hangers (n) whose section (area), density, length and modulus deviate by fractions (n, 4).
 
+    Each is multiplied by the exponential of its fraction, so that none can vanish where an owner
+    hardly knows it.
     Bending stiffness goes with the square of the area. The bar is longer at its arch end. What is
     told by factors of the bar's own, as turnbuckles are, keeps its own stiffness and mass.
     """
-    section, density, length, modulus = (1 + deviations).T
+    section, density, length, modulus = np.exp(deviations).T
     stiffness, mass = section**2 * modulus, section * density
     return replace(
         physical,

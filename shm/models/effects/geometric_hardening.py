@@ -28,6 +28,8 @@ class GeometricHardening(Effect):
     follows = ("amplitude",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
+            return "It takes a tension between two ends that are held."
         return missing_levels(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:

@@ -29,15 +29,15 @@ class IntermediateSupport(Effect):
         return places.planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own = hanger.nominal_tension_n / hanger.length_m
+        own = _lateral_stiffness_n_m(hanger)
         size = Parameter(
             "stiffness_n_m",
             "N/m",
             1e-3 * own,
             100 * own,
             0.0,
-            "0.001 to 100 times T/L, what the tension itself resists with: from a cable that leans "
-            "on the hanger to a stiff tie.",
+            "0.001 to 100 times T/L, what the tension itself resists with (without any, 100 "
+            "EI/L^3, the bar): from a cable that leans on the hanger to a stiff tie.",
             spread="logarithmic",
         )
         return size, places.place_along(hanger)
@@ -54,3 +54,9 @@ class IntermediateSupport(Effect):
         stiffness[:, list(variant.planes)] = values[:, :1]
         spring = LateralSpring(values[:, 1], stiffness, np.zeros(len(values)))
         return replace(physical, springs=(*physical.springs, spring))
+
+
+def _lateral_stiffness_n_m(hanger: Hanger) -> float:
+    if hanger.nominal_tension_n:
+        return hanger.nominal_tension_n / hanger.length_m
+    return 100 * hanger.bending_stiffness_n_m2 / hanger.length_m**3

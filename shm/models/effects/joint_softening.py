@@ -9,7 +9,6 @@ import numpy as np
 from shm.models.conditions import Conditions
 from shm.models.effects import places, scales
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
-from shm.models.effects.levels import missing_levels
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
@@ -32,10 +31,11 @@ class JointSoftening(Effect):
     follows = ("amplitude",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
-        return missing_levels(survey)
+        held = hanger.supports.ends("clamped")
+        return "" if held else "No end is clamped, by a joint that could soften."
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends()
+        return places.at_ends(places.ends(), hanger.supports.ends("clamped"))
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         return (scales.rotational_stiffness("log10_k_at_reference_level", hanger),)

@@ -48,6 +48,11 @@ def springs(survey: Survey) -> tuple[Variant, ...]:
     return ends_and_planes(survey) + alike
 
 
+def at_ends(variants: tuple[Variant, ...], ends: tuple[int, ...]) -> tuple[Variant, ...]:
+    """Those of `variants` that act at no other ends."""
+    return tuple(each for each in variants if set(each.ends) <= set(ends))
+
+
 def free_planes(variant: Variant) -> tuple[int, ...]:
     """The planes that have a spring of their own; the first stands for all where they are alike."""
     return variant.planes[:1] if variant.alike else variant.planes

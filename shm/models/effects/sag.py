@@ -24,6 +24,11 @@ class Sag(Effect):
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
 
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
+            return "It takes a tension between two ends that are held."
+        return ""
+
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.single_planes(survey)
 

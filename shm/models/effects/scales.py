@@ -19,15 +19,18 @@ def mass_kg(hanger: Hanger) -> float:
     return hanger.mass_per_length_kg_m * hanger.length_m
 
 
-def rotational_stiffness(name: str, hanger: Hanger) -> Parameter:
-    """The log10 of an end spring's stiffness, scaled by EI p of a mode of order 4."""
+def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Parameter:
+    """The log10 of an end spring's stiffness, scaled by EI p of a mode of order 4.
+
+    No effect is an infinite stiffness, or none at all where the description has a `hinge`.
+    """
     own = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
     return Parameter(
         name,
         "N m/rad",
         math.log10(_SOFT * own),
         math.log10(_STIFF * own),
-        np.inf,
+        -np.inf if hinge else np.inf,
         "0.03 to 1000 times EI p, what the bar itself resists with in mode 4: softer is a hinge, "
         "stiffer a clamp; nobody knows the order of magnitude.",
     )

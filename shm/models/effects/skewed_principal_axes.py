@@ -30,15 +30,10 @@ class SkewedPrincipalAxes(Effect):
     imitated_by = ("rotational_end_flexibility", "sensor_misalignment")
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
-        if survey.biaxial and survey.sensor_places_m:
-            return ""
-        return (
-            "It takes mode shapes of biaxial sensors: without what each sees in the other plane it "
-            "cannot be told from plain end flexibility."
-        )
+        return "" if hanger.supports.ends("clamped") else "No end is clamped across any axis."
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends()
+        return places.at_ends(places.ends(), hanger.supports.ends("clamped"))
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         angle = Parameter(

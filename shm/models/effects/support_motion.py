@@ -30,8 +30,12 @@ class SupportMotion(Effect):
     seen_by = ("frequencies near the support's own", "the other plane", "shapes near the ends")
     imitated_by = ("intermediate_support", "sag", "translational_end_flexibility")
 
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
+
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        everywhere = places.ends_and_planes(survey)
+        held = hanger.supports.ends("clamped", "pinned")
+        everywhere = places.at_ends(places.ends_and_planes(survey), held)
         return tuple(each for each in everywhere if len(each.ends) == len(each.planes) == 1)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:

@@ -30,6 +30,8 @@ class TemperatureTension(Effect):
     follows = ("temperature",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.supports.ends("free"):
+            return "An end is free, so that warmth stretches nothing."
         if survey.temperatures_c and _range(survey.temperatures_c) >= _LEAST_RANGE_K:
             return ""
         return "It takes tests at two known temperatures at least 1 K apart."

@@ -29,8 +29,12 @@ class TranslationalEndFlexibility(Effect):
     seen_by = ("frequencies", "the other plane", "shapes near the ends")
     imitated_by = ("support_motion", "shear_and_rotary_inertia", "stiff_end_zones", "point_mass")
 
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
+
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.springs(survey)
+        held = hanger.supports.ends("clamped", "pinned")
+        return places.at_ends(places.springs(survey), held)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]

@@ -12,11 +12,9 @@ from shm.models.hanger.families import families
 from shm.models.hanger.physical import PhysicalHanger
 from shm.models.hanger.springs import are_coupled, rotational_n_m_rad
 from shm.models.hanger.system import DEFLECTIONS, SLOPES, System
-from shm.values import BoolArray, FloatArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 _FREE_SHIFT = 1.0
-_AS_A_WHOLE = 1e-4
-"""Below this omega^2 a free bar moves as a whole."""
 _SEARCHED = 4
 
 
@@ -40,7 +38,8 @@ def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bo
     found = spectrum(stiffness, mass, _shift(physical).ravel(), with_vectors or supported)
     axes = None if found.vectors is None else found.vectors[:, None]
     support = parts.support_share.transpose(0, 2, 1).reshape(rows * planes, 2, 1)
-    found = _without_supports(found, axes, parts, support, _is_free(physical)).first(modes)
+    whole = _motions_as_a_whole(physical).ravel()
+    found = _without_supports(found, axes, parts, support, whole).first(modes)
     omega = np.sqrt(found.omega_squared).reshape(rows, planes, modes) * _unit(physical)[..., None]
     if not with_vectors or found.vectors is None:
         return Motion(omega, None)
@@ -72,8 +71,8 @@ def _coupled(physical: PhysicalHanger, parts: System, modes: int) -> Motion:
     found = spectrum(stiffness.reshape(square), mass.reshape(square), shift, True)
     assert found.vectors is not None
     axes = found.vectors.reshape(rows, 2, unknowns, -1)
-    free = _is_free(physical)
-    found = _without_supports(found, axes, parts, parts.support_share, free)
+    whole = _motions_as_a_whole(physical).sum(axis=1)
+    found = _without_supports(found, axes, parts, parts.support_share, whole)
     found = found.first(_SEARCHED * modes)
     axes = _axes(found, unknowns)
     share = np.einsum("num,nuv,nvm->nm", axes[:, 0], parts_mass[:, 0], axes[:, 0], optimize=True)
@@ -99,6 +98,18 @@ def _is_free(physical: PhysicalHanger) -> bool:
     return bool(np.any(np.isinf(physical.translational_compliance_m_n)))
 
 
+def _motions_as_a_whole(physical: PhysicalHanger) -> IntArray:
+    """In how many ways the ends let the bar move without bending it, (n, planes).
+
+    Sideways where both are free. It turns where one of them is, or both, nothing resists the ends'
+    turning and no tension pulls it straight.
+    """
+    free = np.isinf(physical.translational_compliance_m_n).sum(axis=1)
+    loose = np.isinf(np.einsum("nepp->nep", physical.rotational_compliance_rad_n_m)).all(axis=1)
+    turns = (free > 0) & loose & (physical.tension_n == 0)[:, None]
+    return np.asarray((free == 2) * 1 + turns)
+
+
 def _shift(physical: PhysicalHanger) -> FloatArray:
     """What makes the stiffness definite (n, planes): k^4 - P k^2 + shift > 0 for compression P."""
     squeezed = np.maximum(-stiffness_ratio(physical), 0.0)
@@ -106,15 +117,13 @@ def _shift(physical: PhysicalHanger) -> FloatArray:
 
 
 def _without_supports(
-    found: Spectrum, axes: FloatArray | None, parts: System, support: FloatArray, free: bool
+    found: Spectrum, axes: FloatArray | None, parts: System, support: FloatArray, whole: IntArray
 ) -> Spectrum:
-    """Without motions of a free bar as a whole and the supports' own modes.
+    """Without the `whole` (rows,) motions of a free bar as a whole and the supports' own modes.
 
     `axes` (rows, axes, unknowns, modes) are the vectors, `support` (rows, ends, axes).
     """
-    out = np.zeros(found.omega_squared.shape, dtype=bool)
-    if free:
-        out |= found.omega_squared < _AS_A_WHOLE
+    out = np.arange(found.omega_squared.shape[1]) < whole[:, None]
     if axes is not None:
         for end, deflection in enumerate(DEFLECTIONS):
             at = parts.unknown(deflection)

@@ -25,7 +25,7 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A mass clamped on; both fields (n,)."""
+    """A mass clamped on; both fields (n,). Beyond an end it moves with the end."""
 
     x_m: FloatArray
     mass_kg: FloatArray
@@ -107,6 +107,21 @@ class PhysicalHanger:
                 for each in hanger.turnbuckles
             ),
         )
+
+    @classmethod
+    def held(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:
+        """The same on the supports of its description; what hangs from a free end is a mass."""
+        supports = hanger.supports
+        bar = cls.clamped(hanger, tension_n, sensors)
+        for end in supports.ends("pinned", "free"):
+            bar.rotational_compliance_rad_n_m[:, end, [0, 1], [0, 1]] = np.inf
+        for end in supports.ends("free"):
+            bar.translational_compliance_m_n[:, end] = np.inf
+        if not supports.hanging_mass_kg:
+            return bar
+        one = np.ones(len(tension_n))
+        at_end_m = np.array([-np.inf, np.inf])[list(supports.ends("free"))]
+        return replace(bar, masses=(PointMass(at_end_m * one, supports.hanging_mass_kg * one),))
 
     def on_springs(self, springs_n_m_rad: tuple[FloatArray, FloatArray]) -> PhysicalHanger:
         """The same on rotational springs at the deck and the arch end, each (n, planes)."""
