@@ -2,6 +2,8 @@
 
 python docs/build.py            # all, the tables included (two minutes)
 python docs/build.py --quick    # without the tables
+
+The blind trial takes hours; its page is filled from one that was solved by docs/blind_page.py.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from pathlib import Path
 import rich_click as click
 
 from docs.effects_page import effects_page
+from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from shm.settings import TABLE, Setting
 from shm_cli.main import VERBS, cli
@@ -79,13 +82,6 @@ def _range(row: Setting) -> str:
     return " ".join(text for text in bounds if text)
 
 
-def _fill_in(path: Path, name: str, table: str) -> None:
-    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
-    before, rest = path.read_text(encoding="utf-8").split(begin)
-    after = rest.split(end)[1]
-    path.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
-
-
 def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
@@ -96,12 +92,12 @@ def main() -> None:
     tables, chosen = compared(seed=1)
     computed = markdown(frequencies.HEADS, [frequencies.cells(row) for row in tables])
     preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
-    _fill_in(DOCS / "validation.md", "frequencies", computed)
-    _fill_in(DOCS / "validation.md", "selection", preferred)
-    _fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
+    fill_in(DOCS / "validation.md", "frequencies", computed)
+    fill_in(DOCS / "validation.md", "selection", preferred)
+    fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])
-    _fill_in(DOCS.parent / "README.md", "selection", short)
+    fill_in(DOCS.parent / "README.md", "selection", short)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from shm.report import (
 )
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli.adopt import adopt, adopted, drop
+from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
     hanger_file_option,
@@ -134,6 +135,7 @@ def diagnose(
 command.add_command(adopt)
 command.add_command(adopted)
 command.add_command(drop)
+command.add_command(blind)
 
 
 def _of_workspace(

@@ -1,8 +1,8 @@
-"""Reports of a hanger, sheets of one hammer test by which a person checks it, gap diagnoses.
+"""Reports of a hanger, sheets of one hammer test, gap diagnoses, scores of a blind trial.
 
-Nothing here reads a store or writes a file: `HangerReport`, `TestSheet` or `DiagnosisSheet` in,
-terminal text, one HTML file, a JSON document or figures out. Only this room opens matplotlib and
-jinja2.
+Nothing here reads a store or writes a file: `HangerReport`, `TestSheet` (by which a person checks a
+test), `DiagnosisSheet` or `TrialScore` in, terminal text, one HTML file, a JSON document or figures
+out. Only this room opens matplotlib and jinja2.
 """
 
 from __future__ import annotations
@@ -25,6 +25,10 @@ from shm.report.sheet.text import test_text
 from shm.report.summary import Status, advice, status, summary
 from shm.report.table import Table
 from shm.report.text import text
+from shm.report.trial.document import trial_json
+from shm.report.trial.figures import trial_figures
+from shm.report.trial.page import trial_page
+from shm.report.trial.text import trial_text
 
 __all__ = [
     "DiagnosisSheet",
@@ -52,4 +56,8 @@ __all__ = [
     "test_text",
     "text",
     "trend_row",
+    "trial_figures",
+    "trial_json",
+    "trial_page",
+    "trial_text",
 ]

@@ -1,0 +1,175 @@
+"""The scores of a trial in words, and their figures with intervals and bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.report import words
+from shm.values import Mark, MarkName, Score
+
+
+@dataclass(frozen=True)
+class Phrase:
+    """What a score is in a few words, and in a sentence what it counts."""
+
+    title: str
+    explained: str
+
+
+PHRASES: dict[MarkName, Phrase] = {
+    "detected": Phrase("gaps seen", "share of planted causes at which anything but no gap leads"),
+    "false alarms": Phrase(
+        "false alarms", "share of hangers without any effect at which no gap does not lead"
+    ),
+    "named first": Phrase(
+        "effect named first", "share of single effects that are the likeliest of all causes"
+    ),
+    "among the first two": Phrase(
+        "effect among the first two", "share of single effects among the two likeliest causes"
+    ),
+    "in its group": Phrase(
+        "effect first or in the first's group",
+        "share of single effects that the likeliest cause is, or that it cannot be told from",
+    ),
+    "two effects told": Phrase(
+        "two effects told",
+        "the pair or its group leads; or one of the two does, with the pair or something "
+        "unexplained among the first three answers",
+    ),
+    "right where sure": Phrase(
+        "right where more than 0.9 sure", "share of the answers above 0.9 that are right"
+    ),
+    "unknown called unexplained": Phrase(
+        "not in the catalogue: called unexplained", "share of causes that the catalogue lacks"
+    ),
+    "unknown misattributed": Phrase(
+        "not in the catalogue: another effect blamed", "named with more than 0.9"
+    ),
+    "left out called unexplained": Phrase(
+        "left out: called unexplained",
+        "second round, the true effect taken out of the catalogue: unexplained leads",
+    ),
+    "left out misattributed": Phrase(
+        "left out: another effect blamed",
+        "second round: an effect named with more than 0.9, outside the true one's group",
+    ),
+    "calibration error": Phrase(
+        "calibration error",
+        "how far leading probabilities lie from the share that is right, less what few cases add",
+    ),
+    "calibration error as counted": Phrase(
+        "calibration error as counted", "with the scatter that few cases add"
+    ),
+    "calibration error by chance": Phrase(
+        "calibration error by chance alone", "what would be counted were every probability right"
+    ),
+    "log score": Phrase(
+        "log score", "mean of -ln of the probability given to the truth; 0 is best"
+    ),
+    "Brier score": Phrase(
+        "Brier score", "mean square error of all probabilities; 0 is best, 2 worst"
+    ),
+    "tension error before, %": Phrase(
+        "median error of the tension before, %", "by the baseline alone"
+    ),
+    "tension error after, %": Phrase("median error of the tension after, %", "by the answer"),
+    "tension error after over before": Phrase(
+        "error of the tension, after over before", "ratio of the two medians"
+    ),
+    "tension covered": Phrase(
+        "tension in its 95 % interval", "share of all cases, whatever was planted"
+    ),
+    "size covered": Phrase(
+        "effect's size in its 90 % interval", "of single effects whose place was found"
+    ),
+    "held-out misfit after over before": Phrase(
+        "held-out error, after over before",
+        "median ratio of errors of frequencies that were held out of the fit, against the truth",
+    ),
+    "held-out misfit worse": Phrase(
+        "held-out error worse than before", "share of cases in which the answer predicts worse"
+    ),
+    "failed": Phrase("answers that failed", "they count as wrong everywhere"),
+}
+
+
+_DIGITS = (2, 3, 4, 5)
+
+
+def title(name: MarkName) -> str:
+    return PHRASES[name].title
+
+
+def scope(mark: Mark) -> str:
+    """`two planes, size above 4`; what a score is of."""
+    cost = "recordings less modes"
+    way = {cost: cost, "": ""}.get(mark.way, f"from {mark.way}")
+    size = f"size above {mark.above:g}" if mark.above else ""
+    told = [mark.richness, words.quantity(mark.effect), way, size]
+    return ", ".join(filter(None, told)) or "all"
+
+
+def value(score: Score, signed: bool = False) -> str:
+    """Two decimals, three significant digits of what is larger than 10."""
+    if not math.isfinite(score.value):
+        return "not known"
+    return _number(score.value, signed)
+
+
+def found(mark: Mark) -> str:
+    """The value with so many decimals that it is seen on which side of its bounds it lies."""
+    number = mark.score.value
+    for digits in _DIGITS:
+        shown = round(number, digits)
+        if all(
+            np.sign(shown - each) == np.sign(number - each) for each in (mark.lower, mark.upper)
+        ):
+            return f"{number:{'+' if is_cost(mark) else ''}.{digits}f}"
+    return value(mark.score, is_cost(mark))
+
+
+def interval(score: Score, signed: bool = False) -> str:
+    if not math.isfinite(score.low + score.high):
+        return "not known"
+    return f"{_number(score.low, signed)} to {_number(score.high, signed)}"
+
+
+def _number(number: float, signed: bool) -> str:
+    if abs(number) >= 10:
+        return words.plain(number)
+    return f"{number:{'+' if signed else ''}.2f}"
+
+
+def is_cost(mark: Mark) -> bool:
+    return mark.way == "recordings less modes"
+
+
+def bounds(mark: Mark) -> str:
+    """`at least 0.95`."""
+    lower, upper = math.isfinite(mark.lower), math.isfinite(mark.upper)
+    form = "+g" if is_cost(mark) else "g"
+    if lower and upper:
+        return f"{mark.lower:{form}} to {mark.upper:{form}}"
+    if lower:
+        return f"at least {mark.lower:{form}}"
+    return f"at most {mark.upper:{form}}" if upper else ""
+
+
+def outcome(mark: Mark) -> str:
+    """`met`, `missed`, `too few`; nothing where nothing is asked."""
+    if not mark.asked:
+        return ""
+    return {True: "met", False: "missed", None: "too few"}[mark.met]
+
+
+def of_cases(score: Score) -> str:
+    """`180 of 184`, of a share."""
+    return f"{score.value * score.cases:.0f} of {score.cases}"
+
+
+def count(score: Score) -> str:
+    """`1 case`, `96 cases`."""
+    return words.counted(score.cases, "case")

@@ -1,0 +1,241 @@
+"""Cases without a trace of their cause."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from shm.blind.layout import read_trial
+from shm.blind.making import make_trial
+from shm.blind.making.case import make_case
+from shm.blind.making.mix import WAYS, Draft
+from shm.blind.making.plans import PLANS
+from shm.blind.making.planting import Site, planted_effects
+from shm.blind.making.traces import of_one_instant, padded
+from shm.blind.sealing import key_of
+from shm.bridge import load_hanger
+from shm.documents import load_modes
+from shm.errors import UsageError
+from shm.models.effects import EFFECTS
+from shm.read import read
+from shm.simulate import PLANTED, UNLISTED, PlantedEffect, drawn_hanger
+from shm.values import PlantedKind, Recording, TrueCase, Way
+from tests.helpers.blind_workers import in_this_process
+
+KINDS: tuple[PlantedKind, ...] = get_args(PlantedKind)
+
+
+def draft_of(kind: PlantedKind, way: Way = "modes", effects: tuple[str, ...] = ()) -> Draft:
+    usual = ("loose_guide",) if kind == "unknown" else ("point_mass", "bending_stiffness")
+    return Draft(f"{way}-{KINDS.index(kind)}", kind, "two planes", way, 0.6, effects or usual)
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, TrueCase]]:
+    """One case of each kind and way, with two planes, as a trial holds them."""
+    folder = tmp_path_factory.mktemp("cases")
+    seeds = np.random.SeedSequence(11).spawn(8)
+    drafts = [draft_of(kind, way) for way in WAYS for kind in KINDS]
+    truths = {
+        draft.case: make_case(folder / draft.case, draft, seed)
+        for draft, seed in zip(drafts, seeds, strict=True)
+    }
+    for way in WAYS:
+        padded(folder / case for case, truth in truths.items() if truth.way == way)
+    of_one_instant(folder)
+    return folder, truths
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole trial of two cases, seed 5, made in this process."""
+    folder = tmp_path_factory.mktemp("made") / "trial"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("shm.blind.making.workers", in_this_process)
+        make_trial(folder, folder.with_name("trial.key.json"), 2, seed=5)
+    return folder
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_whatever_is_planted_files_have_the_same_names_sizes_and_times(
+    cases: tuple[Path, dict[str, TrueCase]], way: Way
+) -> None:
+    folder, truths = cases
+    seen = {
+        tuple((path.name, path.stat().st_size, path.stat().st_mtime) for path in sorted(
+            (folder / case).iterdir()
+        ))
+        for case, truth in truths.items() if truth.way == way
+    }  # fmt: skip
+    assert len(seen) == 1
+
+
+def test_whatever_is_planted_modal_tests_have_the_same_fields(
+    cases: tuple[Path, dict[str, TrueCase]],
+) -> None:
+    """Also null stands where it stands in all others: an unknown figure would be a trace."""
+    folder, truths = cases
+    forms = {
+        json.dumps(form_of(json.loads((folder / case / "tests.modes.json").read_text())))
+        for case, truth in truths.items()
+        if truth.way == "modes"
+    }
+    assert len(forms) == 1
+
+
+def form_of(node: object) -> object:
+    """A document with its numbers taken out."""
+    if isinstance(node, dict):
+        return {key: form_of(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [form_of(each) for each in node]
+    return "number" if isinstance(node, float) else node
+
+
+def test_whatever_is_planted_recordings_say_the_same_beside_their_samples(
+    cases: tuple[Path, dict[str, TrueCase]],
+) -> None:
+    folder, truths = cases
+    said = set()
+    for case in (case for case, truth in truths.items() if truth.way == "recordings"):
+        recording = read(folder / case / "t1_2.npz")
+        assert isinstance(recording, Recording)
+        channels = [(c.name, c.plane, math.isnan(c.x_m)) for c in recording.channels[1:]]
+        said.add((str(channels), recording.samples, recording.time, recording.hanger))
+    assert len(said) == 1
+
+
+def test_no_file_holds_a_cause_or_a_true_figure(
+    cases: tuple[Path, dict[str, TrueCase]],
+) -> None:
+    folder, truths = cases
+    names = [*EFFECTS, *UNLISTED, "planted", "seed_sequence"]
+    for path in (each for each in folder.rglob("*") if each.is_file()):
+        content, truth = path.read_bytes(), truths[path.parent.name]
+        assert not [name for name in names if name.encode() in content]
+        assert repr(truth.tension_n).encode() not in content
+
+
+def test_the_key_says_what_was_planted_and_what_is_left_out(
+    cases: tuple[Path, dict[str, TrueCase]],
+) -> None:
+    for truth in cases[1].values():
+        names = tuple(each.name for each in truth.effects)
+        assert len(names) == {"none": 0, "two": 2}.get(truth.kind, 1)
+        wanted = {"none": 1, "unknown": 0}.get(truth.kind, len(names))
+        assert len(truth.left_out) == wanted
+        assert truth.kind in ("none", "unknown") or truth.left_out == names
+        assert len(truth.frequencies) == 16
+        assert (truth.size == 0) == (truth.kind == "none")
+        if truth.kind == "two":
+            assert truth.size >= 8
+        for each in truth.effects:
+            assert each.size == pytest.approx(truth.size, rel=1e-6) or truth.kind == "two"
+
+
+def test_sizes_lie_where_the_draft_says(cases: tuple[Path, dict[str, TrueCase]]) -> None:
+    """Log-uniform from 1 to 64: at 0.6 of the range 64 to the power of 0.6."""
+    one = next(t for t in cases[1].values() if t.kind == "one" and t.way == "modes")
+    assert one.size == pytest.approx(64**0.6, rel=0.1)
+
+
+def test_the_diagnosis_is_given_what_the_owner_knows(
+    cases: tuple[Path, dict[str, TrueCase]],
+) -> None:
+    folder, truths = cases
+    for case, truth in truths.items():
+        hanger = load_hanger(folder / case / "hanger.toml")
+        assert 6 <= hanger.length_m <= 15
+        assert 0.6 < hanger.nominal_tension_n / truth.tension_n < 1.6
+        told = json.loads((folder / case / "case.json").read_text())
+        assert set(told) == {"schema", "baseline", "seed"}
+    assert len(load_modes(folder / "modes-0" / "tests.modes.json")[0].modes) == 16
+
+
+def test_neither_errors_of_sensors_without_shapes_nor_hardening_without_levels_are_planted() -> (
+    None
+):
+    rng = np.random.default_rng(3)
+    hanger, state = drawn_hanger(rng)
+    site = Site(hanger, state, PLANS["two planes"])
+    of_other_data = ("sensor_mass", "sensor_misalignment", "geometric_hardening")
+    draft = draft_of("one", effects=(*of_other_data, "distributed_mass"))
+    assert planted_effects(draft, site, rng)[0].name == "distributed_mass"
+
+
+def test_a_case_whose_data_can_show_nothing_is_refused() -> None:
+    rng = np.random.default_rng(3)
+    hanger, state = drawn_hanger(rng)
+    site = Site(hanger, state, PLANS["one plane"])
+    with pytest.raises(UsageError, match="another seed"):
+        planted_effects(draft_of("one", effects=("temperature_tension",)), site, rng)
+
+
+def test_what_cannot_be_planted_has_an_infinite_size() -> None:
+    hanger, state = drawn_hanger(np.random.default_rng(3))
+    site = Site(hanger, state, PLANS["one plane"])
+    assert site.size(()) == 0
+    broken = PlantedEffect("point_mass", "everywhere", {"mass_kg": 5.0})
+    assert site.size((broken,)) == math.inf
+
+
+def test_every_effect_of_the_catalogue_can_be_planted_and_no_other_stands_in_it() -> None:
+    assert set(PLANTED) == set(EFFECTS)
+    assert not set(UNLISTED) & set(EFFECTS)
+
+
+def test_the_same_seed_gives_the_same_cases_whatever_the_number_of_processes(
+    trial: Path, tmp_path: Path
+) -> None:
+    make_trial(tmp_path / "again", tmp_path / "again.key.json", 2, seed=5, jobs=2)
+    assert contents(trial / "cases") == contents(tmp_path / "again" / "cases")
+    first = key_of(read_trial(trial), trial.with_name("trial.key.json"))
+    assert first == key_of(read_trial(tmp_path / "again"), tmp_path / "again.key.json")
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_the_trial_says_nothing_of_its_seed_and_has_no_time_of_making(trial: Path) -> None:
+    assert set(json.loads((trial / "trial.json").read_text())) == {
+        "schema",
+        "cases",
+        "key_sha256",
+    }
+    salt = json.loads(trial.with_name("trial.key.json").read_text())["salt"]
+    everything = [*trial.rglob("*"), trial]
+    assert len({path.stat().st_mtime for path in everything}) == 1
+    assert not [p for p in everything if p.is_file() and salt.encode() in p.read_bytes()]
+
+
+def test_a_trial_is_never_made_over_something(trial: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="not empty"):
+        make_trial(trial, tmp_path / "k.json", 1)
+    (tmp_path / "k.json").write_text("")
+    with pytest.raises(UsageError, match="there is a key"):
+        make_trial(tmp_path / "new", tmp_path / "k.json", 1)
+    with pytest.raises(UsageError, match="Keep it apart"):
+        make_trial(tmp_path / "new", tmp_path / "new" / "deep" / "k.json", 1)
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_stop_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shm.blind.making.workers", in_this_process)
+
+    def stopped(done: int, of: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_trial(tmp_path / "new", tmp_path / "k.json", 1, seed=5, ways=["modes"], told=stopped)
+    assert list(tmp_path.iterdir()) == []

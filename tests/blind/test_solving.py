@@ -1,0 +1,203 @@
+"""Solving without the key: the guard, the order of rounds, faults as answers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shm.blind.answers import read_answers, write_answer
+from shm.blind.layout import Trial
+from shm.blind.making.case import make_case
+from shm.blind.making.mix import Draft
+from shm.blind.solving import solve_left_out, solve_trial, solved
+from shm.blind.solving.guard import Refused, guard
+from shm.blind.workers import workers
+from shm.documents import load_modes
+from shm.errors import BadInput, NothingThere, ShmError
+from shm.values import Answer
+from tests.helpers.blind_workers import in_this_process
+
+FAILED = "no test has a mode."
+
+
+def make_one(folder: Path, case: str, way: str = "modes") -> None:
+    kind, effects = ("none", ()) if way == "recordings" else ("one", ("bending_stiffness",))
+    draft = Draft(case, kind, "one plane", way, 0.9, effects)  # type: ignore[arg-type]
+    make_case(folder / case, draft, np.random.SeedSequence(4))
+
+
+@pytest.fixture
+def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trial:
+    """Two cases that cannot be read, so that they are answered at once, in this process."""
+    monkeypatch.setattr("shm.blind.solving.workers", in_this_process)
+    made = Trial(tmp_path / "trial", ("c0001", "c0002"), "")
+    for case in made.cases:
+        made.case_directory(case).mkdir(parents=True)
+        (made.case_directory(case) / "hanger.toml").write_text("[[hanger]]\n")
+    return made
+
+
+@pytest.fixture(scope="module")
+def secrets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with cases, a key elsewhere, and links from the cases to the key."""
+    folder = tmp_path_factory.mktemp("guarded")
+    (folder / "cases").mkdir()
+    (folder / "cases" / "told").write_text("told")
+    (folder / "trial.key.json").write_text("secret")
+    (folder / "cases" / "soft").symlink_to(folder / "trial.key.json")
+    os.link(folder / "trial.key.json", folder / "cases" / "hard")
+    (folder / "cases" / "copy.key.json").write_text("secret")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def guarded(secrets: Path) -> Iterator[Callable[..., object]]:
+    """Calls a function in a guarded process."""
+    with workers(1, guard, ([secrets / "cases"], [secrets / "trial.key.json"])) as pool:
+        yield lambda verb, *given: pool.submit(verb, *given).result()
+
+
+def test_a_guarded_process_reads_its_cases(guarded: Callable[..., object], secrets: Path) -> None:
+    assert guarded(Path.read_text, secrets / "cases" / "told") == "told"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "trial.key.json",
+        "cases/../trial.key.json",
+        "cases/soft",
+        "cases/hard",
+        "cases/copy.key.json",
+        "elsewhere",
+    ],
+)
+def test_a_guarded_process_told_to_read_the_key_raises(
+    guarded: Callable[..., object], secrets: Path, name: str
+) -> None:
+    with pytest.raises(Refused, match="may not open"):
+        guarded(Path.read_text, secrets / name)
+    with pytest.raises(Refused):
+        guarded(os.open, str(secrets / name).encode(), os.O_RDONLY)
+
+
+def test_a_guarded_process_makes_no_new_name_for_the_key(
+    guarded: Callable[..., object], secrets: Path
+) -> None:
+    for verb in (os.link, os.rename):
+        with pytest.raises(Refused):
+            guarded(verb, str(secrets / "trial.key.json"), str(secrets / "cases" / "new"))
+    assert (secrets / "trial.key.json").exists()
+
+
+def test_a_guarded_process_lets_nobody_else_read_for_it(guarded: Callable[..., object]) -> None:
+    with pytest.raises(Refused, match="does without"):
+        guarded(os.system, "true")
+
+
+def test_a_process_that_is_ended_from_outside_is_said_with_a_remedy() -> None:
+    with workers(1) as pool, pytest.raises(BrokenProcessPool):
+        pool.submit(os._exit, 3).result()
+    with pytest.raises(ShmError, match="fewer --jobs"), workers(1) as pool:
+        raise BrokenProcessPool
+
+
+def test_a_case_is_diagnosed_in_a_guarded_process(tmp_path: Path) -> None:
+    made = Trial(tmp_path, ("c0001",), "")
+    make_one(tmp_path / "cases", "c0001")
+    counted = []
+    found = solve_trial(made, told=lambda done, of: counted.append((done, of)))
+    assert found.failed == ()
+    assert found.answers[0].diagnosis is not None
+    assert found.answers[0].diagnosis.baseline == "beam1"
+    assert counted == [(1, 1)]
+
+
+def test_recordings_are_identified_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_one(tmp_path, "c0001", "recordings")
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr("shm.blind.solving.case.diagnose", lambda *given: asked.append(given))
+    found = solved(tmp_path / "c0001")
+    assert found.identified is not None
+    tests = asked[0][0]
+    assert tests == found.identified.tests
+    assert 6 <= len(tests[0].modes) <= 9
+    assert found.identified.refused == ()
+
+
+def test_the_second_round_takes_the_tests_that_the_first_identified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_one(tmp_path, "c0001")
+    known = tmp_path / "c0001" / "tests.modes.json"
+    known = known.rename(tmp_path / "c0001.modes.json")
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr("shm.blind.solving.case.diagnose", lambda *given: asked.append(given))
+    solved(tmp_path / "c0001", ("sag",), known)
+    tests, _, options = asked[0]
+    assert tests == load_modes(known)
+    assert options.without == ("sag",)
+
+
+def test_recordings_that_hold_no_mode_are_an_answer_with_a_failure(tmp_path: Path) -> None:
+    make_one(tmp_path, "c0001", "recordings")
+    for path in (tmp_path / "c0001").glob("*.npz"):
+        path.write_bytes(b"noise")
+    found = solved(tmp_path / "c0001")
+    assert found.answer.diagnosis is None
+    assert "t1" in found.answer.failure
+
+
+def test_a_fault_of_shm_is_an_answer_that_says_where(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_one(tmp_path, "c0001")
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr("shm.blind.solving.case.diagnose", broken)
+    failure = solved(tmp_path / "c0001").answer.failure
+    assert failure.startswith("unexpected ZeroDivisionError: by zero (test_solving.py, line ")
+
+
+def test_answers_that_are_there_are_kept_and_only_the_rest_is_solved(trial: Trial) -> None:
+    trial.answers("answers").mkdir()
+    earlier = Answer("c0002", (), None, FAILED)
+    write_answer(earlier, trial.answers("answers"))
+    counted = []
+    found = solve_trial(trial, told=lambda done, of: counted.append((done, of)))
+    assert counted == [(2, 2)]
+    assert found.earlier == 1
+    assert found.answers[1] == earlier
+    assert "length_m is missing" in found.answers[0].failure
+    assert found.unexpected == ()
+
+
+def test_a_sealed_trial_is_not_solved_again_nor_after_a_change(trial: Trial) -> None:
+    trial.answers("answers").mkdir()
+    for case in trial.cases:
+        write_answer(Answer(case, (), None, FAILED), trial.answers("answers"))
+    sealed = solve_trial(trial)
+    assert solve_trial(trial).sha256 == sealed.sha256
+    write_answer(Answer("c0001", (), None, "other"), trial.answers("answers"))
+    with pytest.raises(BadInput, match="changed after they were sealed"):
+        solve_trial(trial)
+
+
+def test_the_second_round_waits_for_the_first_to_be_sealed(trial: Trial) -> None:
+    with pytest.raises(NothingThere, match="not complete"):
+        solve_left_out(trial, {"c0001": ("sag",)})
+    trial.answers("answers").mkdir()
+    for case in trial.cases:
+        write_answer(Answer(case, (), None, FAILED), trial.answers("answers"))
+    solve_trial(trial)
+    found = solve_left_out(trial, {"c0001": ("sag",)})
+    assert [(each.case, each.left_out) for each in found.answers] == [("c0001", ("sag",))]
+    assert len(read_answers(trial.answers("answers"))) == 2
