@@ -4,6 +4,8 @@ python docs/build.py            # all, the tables included (two minutes)
 python docs/build.py --quick    # without the tables
 
 The blind trial takes hours; its page is filled from one that was solved by docs/blind_page.py.
+The real measurements are not in this repository; docs/real_cases_page.py fills their page in two
+minutes where they are.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from shm_cli.common import counting_bar, json_option, show, show_table, table
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
     from shm.blind.solving import SolvedRound
-    from shm.values import Mark
+    from shm.values import TrialScore
 
 _trial_argument = click.argument(
     "directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path)
@@ -177,7 +177,8 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     """Open the key and say how good the answers are, with intervals.
 
     Key and answers are verified first: whoever changed either after it was sealed is found out.
-    The second round counts where `solve --left-out` sealed one.
+    The second round counts where `solve --left-out` sealed one; the gate asks for it. A mark that
+    too few cases speak of is not judged: from some 500 cases on all are.
 
     \b
     Example: shm gap blind score trial --html trial.html --gate
@@ -193,12 +194,17 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     else:
         click.echo(trial_text(found).rstrip())
     if gate:
-        _refuse_missed(found.marks)
+        _refuse_missed(found)
 
 
-def _refuse_missed(marks: Sequence[Mark]) -> None:
-    judged = [mark for mark in marks if mark.met is not None]
+def _refuse_missed(found: TrialScore) -> None:
+    judged = [mark for mark in found.marks if mark.met is not None]
     missed = [mark for mark in judged if not mark.met]
+    if not found.left_out:
+        raise GateNotMet(
+            "the second round, without the true effects, was not run.",
+            remedy="Run it first: shm gap blind solve DIR --left-out KEY.",
+        )
     if missed:
         raise GateNotMet(
             f"{len(missed)} of {len(judged)} marks are missed.",

@@ -169,6 +169,7 @@ def command(
     """
     _refuse_what_does_not_go_together(campaign, lacking, chosen)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
+    _refuse_other_supports(hanger)
     start = first.replace(tzinfo=UTC) if first else _FIRST
     out.mkdir(parents=True, exist_ok=True)
     if campaign:
@@ -203,6 +204,20 @@ def _refuse_what_does_not_go_together(
                 f"{option} is of recordings, and a campaign makes none.",
                 remedy=f"Leave out {option} or --campaign.",
             )
+
+
+def _refuse_other_supports(hanger: Hanger) -> None:
+    """The simulated bars stand on springs that clamp them in the end, and are in tension."""
+    if hanger.as_hanger:
+        return
+    held = "" if hanger.supports.clamped else "is not clamped at both ends"
+    slack = "" if hanger.nominal_tension_n > 0 else "carries no tension"
+    raise UsageError(
+        f"hanger {hanger.id} {' and '.join(filter(None, (held, slack)))}: only bars that are "
+        "clamped or on springs at both ends, and in tension, can be simulated.",
+        remedy="Leave out [hanger.supports] and give a nominal tension above 0; soft ends are "
+        "--k1 to --k4.",
+    )
 
 
 def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Recording:

@@ -13,7 +13,7 @@ def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
     """
     leading = attribution.leading
     if leading is None:
-        no_gap = attribution.no_gap_probability >= attribution.unexplained_probability
+        no_gap = attribution.leads == "no gap"
         return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
     group = [
         each

@@ -14,6 +14,7 @@ from shm.gap.imitation import imitated_share, visible_shifts
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
+from shm.values import Leads, leads
 
 WITHIN_REACH = 7.0
 
@@ -64,13 +65,15 @@ class Attribution:
     p_value: float
 
     @property
+    def leads(self) -> Leads:
+        """What it says: a cause, no gap, or something unknown."""
+        claim = self.claimed(self.explanations[0]) if self.explanations else 0.0
+        return leads(self.no_gap_probability, self.unexplained_probability, claim)
+
+    @property
     def leading(self) -> Explanation | None:
-        """The likeliest explanation, were its group counted as one; None for no gap or unknown."""
-        if not self.explanations:
-            return None
-        best = self.explanations[0]
-        rest = max(self.no_gap_probability, self.unexplained_probability)
-        return best if self.claimed(best) > rest else None
+        """The likeliest explanation; None where no cause leads."""
+        return self.explanations[0] if self.leads == "cause" else None
 
     def claimed(self, explanation: Explanation) -> float:
         """The probability of its group, or its own where it has none."""

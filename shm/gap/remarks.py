@@ -44,7 +44,7 @@ def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
             "no test holds a mode that can be used. " + " ".join(remarks),
             remedy="Give tests with modes whose orders rise with their frequencies.",
         )
-    return Usable(tuple(kept), (*remarks, *_said_of_all(kept)))
+    return Usable(tuple(kept), (*remarks, *_said_of_all(kept, hanger)))
 
 
 def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
@@ -99,9 +99,9 @@ def _doubtful(test: ModalTest) -> dict[str, str]:
     return found
 
 
-def _said_of_all(tests: Sequence[ModalTest]) -> list[str]:
+def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
     remarks = [
-        _few(tests),
+        _few(tests, hanger),
         _without_sd(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
@@ -109,15 +109,34 @@ def _said_of_all(tests: Sequence[ModalTest]) -> list[str]:
     return [remark for remark in remarks if remark] + _contradictions(tests)
 
 
-def _few(tests: Sequence[ModalTest]) -> str:
+def _few(tests: Sequence[ModalTest], hanger: Hanger) -> str:
     names = {_name(mode) for test in tests for mode in test.modes}
     if len(names) >= _FEW_FREQUENCIES:
         return ""
     only = "Only one mode is" if len(names) == 1 else f"Only {len(names)} modes are"
     return (
-        f"{only} given ({', '.join(sorted(names))}): tension alone can follow so few frequencies, "
-        f"so that a gap can hardly show and its cause cannot; give at least {_FEW_FREQUENCIES}, "
-        f"better eight a plane."
+        f"{only} given ({', '.join(sorted(names))}): {_what_few_do(tests, hanger)}; give at least "
+        f"{_FEW_FREQUENCIES}, better eight a plane."
+    )
+
+
+def _what_few_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
+    """A tension that cannot follow the frequencies lets a gap show, though not its cause."""
+    alike = "but most causes look alike in so few frequencies"
+    if hanger.nominal_tension_n == 0:
+        return f"the bar carries no tension that could follow them, so that a gap can show, {alike}"
+    if math.isfinite(hanger.scatter.tension):
+        known = f"the tension is known to {100 * hanger.scatter.tension:.2g} %"
+        return f"{known}, so that a gap can show, {alike}"
+    read_n = {test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)}
+    if len(read_n) > 1:
+        return (
+            "a gap shows only where the frequencies do not change as the tensions that were read "
+            "do, and most causes look alike in that"
+        )
+    return (
+        "tension alone can follow so few frequencies, so that a gap can hardly show and its cause "
+        "cannot"
     )
 
 
@@ -178,8 +197,7 @@ def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
 
 def _alike(one: ModalTest, other: ModalTest) -> bool:
     """Whether nothing is known to differ between the tests' conditions."""
-    read_n = abs(one.tension_read_n - other.tension_read_n)
-    if one.added_mass != other.added_mass or read_n > 0:
+    if one.added_mass != other.added_mass:
         return False
     if abs(one.temperature_c - other.temperature_c) > _SAME_TEMPERATURE_K:
         return False

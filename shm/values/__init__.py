@@ -12,12 +12,14 @@ from shm.values.diagnosis import (
     Diagnosis,
     EffectEstimate,
     GapPlace,
+    Leads,
     NextMeasurement,
     Outlier,
     Residual,
     Shrinkage,
     TensionEstimate,
     Trend,
+    leads,
 )
 from shm.values.hanger import (
     EffectPrior,
@@ -101,6 +103,7 @@ __all__ = [
     "GapPlace",
     "Hanger",
     "IntArray",
+    "Leads",
     "Mark",
     "MarkName",
     "ModalTest",
@@ -135,4 +138,5 @@ __all__ = [
     "Turnbuckle",
     "Verdict",
     "Way",
+    "leads",
 ]

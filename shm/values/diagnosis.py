@@ -7,6 +7,19 @@ from typing import Literal
 
 from shm.values.kinds import NAN, Plane
 
+Leads = Literal["cause", "no gap", "unexplained"]
+
+NO_GAP_STANDS_FROM = 0.2
+"""A gap is not shown while no gap keeps this probability: many faint causes together outweigh it
+sooner than any of them is worth naming."""
+
+
+def leads(no_gap: float, unexplained: float, claim: float) -> Leads:
+    """What a diagnosis says by the probabilities of no gap, the unknown and the likeliest claim."""
+    if no_gap >= NO_GAP_STANDS_FROM:
+        return "no gap"
+    return "cause" if claim > unexplained else "unexplained"
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -197,12 +210,14 @@ class Diagnosis:
         return sum(each.probability for each in self.causes if each.group == cause.group)
 
     @property
-    def leading(self) -> Cause | None:
-        """The likeliest cause of the likeliest group.
+    def leads(self) -> Leads:
+        """What it says: a cause, no gap, or something unknown."""
+        claim = max((self.claim(cause) for cause in self.causes), default=0.0)
+        return leads(self.no_gap_probability, self.unexplained_probability, claim)
 
-        None where no gap or something unknown is likelier than each group.
-        """
-        order = [(self.claim(cause), cause.probability) for cause in self.causes]
-        best = max(range(len(order)), key=order.__getitem__, default=None)
-        rest = max(self.no_gap_probability, self.unexplained_probability)
-        return self.causes[best] if best is not None and order[best][0] > rest else None
+    @property
+    def leading(self) -> Cause | None:
+        """The likeliest cause of the likeliest group; None where no cause leads."""
+        if self.leads != "cause":
+            return None
+        return max(self.causes, key=lambda cause: (self.claim(cause), cause.probability))

@@ -38,6 +38,7 @@ from shm.simulate import (
     CampaignPlan,
     HangerState,
     PlantedEffect,
+    Reality,
     at_share,
     campaign_with_truth,
     choices,
@@ -62,7 +63,7 @@ ROD = Hanger(
     nominal_tension_n=711e3,
     diameter_m=0.130,
 )
-PLAN = CampaignPlan()
+PLAN = CampaignPlan(reality=Reality(own_laws=False))
 DOCS = Path(__file__).parents[2] / "docs" / "gap_trial.md"
 
 

@@ -71,7 +71,12 @@ def test_named_first_does_not_mind_what_no_gap_has() -> None:
 
 @pytest.mark.parametrize(
     ("no_gap", "unexplained", "sag", "right", "detected"),
-    [(0.7, 0.2, 0.1, True, False), (0.2, 0.7, 0.1, False, True), (0.2, 0.1, 0.7, False, True)],
+    [
+        (0.7, 0.2, 0.1, True, False),
+        (0.3, 0.1, 0.6, True, False),
+        (0.1, 0.8, 0.1, False, True),
+        (0.1, 0.1, 0.8, False, True),
+    ],
 )
 def test_a_sound_hanger_is_right_where_no_gap_leads(
     no_gap: float, unexplained: float, sag: float, right: bool, detected: bool

@@ -103,6 +103,31 @@ def test_a_simulated_bar_with_a_turnbuckle_is_identified_at_its_exact_frequencie
         assert mode["frequency_hz"] == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize("campaign", [(), ("--campaign",)])
+@pytest.mark.parametrize(
+    ("tension", "supports", "said"),
+    [
+        ("500e3", "deck = 'free'", "hanger 14 is not clamped at both ends: only bars"),
+        ("0.0", "both = 'clamped'", "hanger 14 carries no tension: only bars"),
+        ("0.0", "both = 'free'", "is not clamped at both ends and carries no tension: only bars"),
+    ],
+)
+def test_simulate_refuses_a_bar_that_is_held_otherwise_or_slack(
+    shm: Shm, tmp_path: Path, tension: str, supports: str, said: str, campaign: tuple[str, ...]
+) -> None:
+    path = tmp_path / "H.toml"
+    path.write_text(
+        "[[hanger]]\nid = 14\nlength_m = 6.0\ndiameter_m = 0.1\nelastic_modulus_pa = 200e9\n"
+        f"density_kg_m3 = 7850\nnominal_tension_n = {tension}\n[hanger.supports]\n{supports}\n"
+    )
+    out = tmp_path / "tests"
+    ended = shm("simulate", "--hanger-file", path, *campaign, "--out", out)
+    assert ended.code == 2
+    assert said in " ".join(ended.err.split())
+    assert "[hanger.supports]" in ended.err
+    assert not out.exists()
+
+
 @pytest.mark.usefixtures("_plated")
 def test_predict_refuses_a_class_that_does_not_apply_with_the_reason(
     shm: Shm, hanger_file: Path

@@ -50,9 +50,3 @@ def test_effects_that_tests_alike_cannot_show_are_left_out_with_the_reason() -> 
     hidden = invisible(problem)
     assert {"temperature_tension", "geometric_hardening", "sensor_misalignment"} <= set(hidden)
     assert not set(hidden) & {each.name for each in hypotheses(problem)}
-
-
-def test_joints_that_turn_show_in_frequencies_though_they_pass_for_springs_there() -> None:
-    problem = _problem(temperatures_c=(10.0,), amplitudes=(1.0,), shapes=False, mass_share=0.0)
-    named = {each.name for each in hypotheses(problem)}
-    assert {"joint_softening", "skewed_principal_axes", "rotational_end_flexibility"} <= named

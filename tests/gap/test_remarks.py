@@ -8,7 +8,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.gap.remarks import usable
-from shm.values import NAN, AddedMass, Hanger, ModalTest, Mode, Plane, ShapePoint
+from shm.values import NAN, AddedMass, Hanger, ModalTest, Mode, Plane, Scatter, ShapePoint
 
 HANGER = Hanger(3, 12.0, 200e9, 0.01327, 1.402e-5, 103.5, 711e3)
 FREQUENCIES = (5.6, 13.5, 24.6, 39.1, 57.1, 78.6)
@@ -36,8 +36,36 @@ def test_good_tests_call_for_no_remark_and_lose_no_mode() -> None:
 def test_one_mode_only_is_said_with_what_it_does() -> None:
     only = replace(_test(), modes=_test().modes[:1])
     (remark,) = usable([only], HANGER).remarks
-    assert "Only one mode is given (transverse 1)" in remark
+    assert "Only one mode is given (transverse 1): tension alone can follow" in remark
     assert "cause cannot" in remark
+
+
+@pytest.mark.parametrize(
+    ("hanger", "said"),
+    [
+        (replace(HANGER, nominal_tension_n=0.0), "the bar carries no tension that could follow"),
+        (replace(HANGER, scatter=Scatter(tension=0.01)), "the tension is known to 1 %, so that a"),
+    ],
+)
+def test_few_modes_of_a_bar_whose_tension_is_known_are_not_said_to_be_followed_by_it(
+    hanger: Hanger, said: str
+) -> None:
+    only = replace(_test(), modes=_test().modes[:3])
+    (remark,) = usable([only], hanger).remarks
+    assert remark.startswith("Only 3 modes are given (transverse 1, transverse 2, transverse 3): ")
+    assert said in remark
+    assert "a gap can show, but most causes look alike" in remark
+    assert "tension alone" not in remark
+
+
+def test_one_mode_at_several_tensions_read_shows_a_gap_by_how_it_rises() -> None:
+    one = replace(_test("t1"), modes=_test().modes[:1], tension_read_n=7e5, tension_read_sd_n=7e3)
+    other = replace(one, id="t2", tension_read_n=8e5)
+    (remark,) = usable([one, other], HANGER).remarks
+    assert "a gap shows only where the frequencies do not change as the tensions" in remark
+    assert "tension alone" not in remark
+    (remark,) = usable([one, replace(other, tension_read_n=7e5)], HANGER).remarks
+    assert "tension alone can follow" in remark
 
 
 def test_frequencies_without_standard_deviation_are_said() -> None:

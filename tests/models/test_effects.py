@@ -216,8 +216,10 @@ def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
     assert hidden == {
         "temperature_tension",
         "geometric_hardening",
+        "joint_softening",
         "sensor_mass",
         "sensor_misalignment",
+        "skewed_principal_axes",
     }
 
 
@@ -227,8 +229,10 @@ def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
         ("temperature_tension", replace(RICH, temperatures_c=(12.0,)), "1 K apart"),
         ("temperature_tension", replace(RICH, temperatures_c=(12.0, 12.9)), "1 K apart"),
         ("geometric_hardening", replace(RICH, amplitudes=(1.0, 1.19)), "1.2 times"),
+        ("joint_softening", replace(RICH, amplitudes=()), "1.2 times"),
         ("sensor_mass", replace(RICH, sensor_places_m=()), "known places"),
         ("sensor_misalignment", replace(RICH, biaxial=False), "biaxial"),
+        ("skewed_principal_axes", replace(RICH, biaxial=False), "plain end flexibility"),
     ],
 )
 def test_what_data_cannot_show_is_said_in_a_sentence(name: str, survey: Survey, why: str) -> None:

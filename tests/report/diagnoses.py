@@ -147,6 +147,14 @@ ALIKE = replace(
     remarks=(),
 )  # fmt: skip
 
+STRING_HANGER = replace(HANGER, nominal_tension_n=37.5)
+STRING = replace(
+    LED,
+    tension_before_n=TensionEstimate(38.34, 0.91, 37.12, 39.95),
+    tension_after_n=TensionEstimate(41.04, 2.9, 35.9, 45.7),
+)
+"""Tensions of a string: a thousandth of a hanger's and less."""
+
 NO_GAP = replace(
     LED,
     where=tuple(
@@ -173,9 +181,9 @@ UNEXPLAINED = replace(
 
 UNDECIDED = replace(
     LED,
-    causes=(make_cause("point_mass", 0.3, parameters=MASS), make_cause("sag", 0.25)),
-    no_gap_probability=0.25,
-    unexplained_probability=0.2,
+    causes=(make_cause("point_mass", 0.45, parameters=MASS), make_cause("sag", 0.3)),
+    no_gap_probability=0.15,
+    unexplained_probability=0.1,
     next_measurements=(),
 )
 

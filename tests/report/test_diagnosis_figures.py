@@ -13,7 +13,7 @@ from shm import report
 from shm.report import DiagnosisSheet, Illustration
 from shm.report.figures.style import PALETTE
 from shm.values import TensionEstimate
-from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, sheet
+from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, STRING, STRING_HANGER, sheet
 
 ALL = ["causes", "gap_map", "before_and_after", "gap_tension"]
 
@@ -125,6 +125,21 @@ def test_tensions_are_drawn_in_kilonewtons(drawn: dict[str, dict[str, Illustrati
     (axes,) = drawn["led"]["gap_tension"].figure.axes
     points = [line for line in axes.lines if line.get_marker() == "o"]
     assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([731.4, 702.3])
+
+
+def test_tensions_below_one_kilonewton_are_drawn_in_newtons() -> None:
+    item = report.diagnosis_figures(DiagnosisSheet(STRING, STRING_HANGER))[-1]
+    (axes,) = item.figure.axes
+    points = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([38.34, 41.04])
+    assert axes.get_xlabel() == "tension (N)"
+    assert [text.get_text() for text in axes.texts] == [
+        "38.3 N (37.1 to 40.0)",
+        "41.0 N (35.9 to 45.7)",
+    ]
+    (nominal,) = [line for line in axes.lines if line.get_label() == "nominal"]
+    assert list(np.asarray(nominal.get_xdata())) == [37.5, 37.5]
+    assert "41.0 N (35.9 to 45.7)" in item.alt
 
 
 def test_a_nominal_tension_far_away_does_not_squeeze_the_intervals() -> None:

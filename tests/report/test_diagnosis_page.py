@@ -11,7 +11,8 @@ import pytest
 
 from shm import documents, report
 from shm.report import DiagnosisSheet, HangerReport
-from tests.report.diagnoses import CASES, HANGER, LED, sheet
+from shm.values import TensionEstimate
+from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet
 from tests.report.outline import Outline
 
 PAGES = ("led", "alike", "nothing known")
@@ -93,6 +94,27 @@ def test_a_shortened_table_of_causes_keeps_no_gap_and_something_else() -> None:
     assert "no gap" in table
     assert "something not in" in table
     assert "4 more rows" in " ".join(table.split())
+
+
+def test_tensions_below_one_kilonewton_are_told_in_newtons_everywhere() -> None:
+    small = DiagnosisSheet(STRING, STRING_HANGER)
+    text = report.diagnosis_text(small)
+    words = " ".join(text.split())
+    assert "the tension is 41.0 N (35.9 to 45.7); the baseline beam1 alone gives 38.3 N" in words
+    assert "mean, N" in text
+    assert "kN" not in text[text.index("\nTENSION") : text.index("\nWHAT WOULD TELL")]
+    assert "41 N" in told(parsed(report.diagnosis_page(small)))
+
+
+def test_both_tensions_are_told_in_kilonewtons_where_one_reaches_it() -> None:
+    mixed = replace(
+        STRING,
+        tension_before_n=TensionEstimate(960.0, 30.0, 910.0, 1010.0),
+        tension_after_n=TensionEstimate(1100.0, 40.0, 1030.0, 1170.0),
+    )
+    text = " ".join(report.diagnosis_text(DiagnosisSheet(mixed, STRING_HANGER)).split())
+    assert "the tension is 1.100 kN (1.030 to 1.170)" in text
+    assert "alone gives 0.960 kN (0.910 to 1.010)" in text
 
 
 def test_causes_that_cannot_be_told_apart_share_a_letter() -> None:

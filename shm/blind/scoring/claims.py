@@ -59,7 +59,9 @@ def claimed(diagnosis: Diagnosis) -> Claim:
     if leading is not None:
         return Claim(leading.effect, diagnosis.claim(leading), alike(diagnosis, leading))
     no_gap, unexplained = diagnosis.no_gap_probability, diagnosis.unexplained_probability
-    return Claim(NO_GAP, no_gap) if no_gap >= unexplained else Claim(UNEXPLAINED, unexplained)
+    if diagnosis.leads == "no gap":
+        return Claim(NO_GAP, no_gap)
+    return Claim(UNEXPLAINED, unexplained)
 
 
 def alike(diagnosis: Diagnosis, cause: Cause) -> tuple[Cause, ...]:

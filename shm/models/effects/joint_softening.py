@@ -9,6 +9,7 @@ import numpy as np
 from shm.models.conditions import Conditions
 from shm.models.effects import places, scales
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.levels import missing_levels
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
@@ -31,8 +32,9 @@ class JointSoftening(Effect):
     follows = ("amplitude",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
-        held = hanger.supports.ends("clamped")
-        return "" if held else "No end is clamped, by a joint that could soften."
+        if not hanger.supports.ends("clamped"):
+            return "No end is clamped, by a joint that could soften."
+        return missing_levels(survey)
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.at_ends(places.ends(), hanger.supports.ends("clamped"))

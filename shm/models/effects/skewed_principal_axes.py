@@ -30,7 +30,14 @@ class SkewedPrincipalAxes(Effect):
     imitated_by = ("rotational_end_flexibility", "sensor_misalignment")
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
-        return "" if hanger.supports.ends("clamped") else "No end is clamped across any axis."
+        if not hanger.supports.ends("clamped"):
+            return "No end is clamped across any axis."
+        if survey.biaxial and survey.sensor_places_m:
+            return ""
+        return (
+            "It takes mode shapes of biaxial sensors: without what each sees in the other plane it "
+            "cannot be told from plain end flexibility."
+        )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.at_ends(places.ends(), hanger.supports.ends("clamped"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from shm.values import Cause, Diagnosis, Hanger, Residual
+from shm.values import Cause, Diagnosis, Hanger, Leads, Residual
 
 _LIKELIER_THAN_NOT = 0.5
 
@@ -62,22 +62,22 @@ def claimed(diagnosis: Diagnosis) -> Claim | None:
 
 def after(diagnosis: Diagnosis) -> str:
     """What the tension after the diagnosis allows for; empty where that is the baseline alone."""
-    if claimed(diagnosis) is not None:
-        return "with the cause"
-    no_gap = diagnosis.no_gap_probability >= diagnosis.unexplained_probability
-    return "" if no_gap else "allowing for the unknown"
+    told: dict[Leads, str] = {
+        "cause": "with the cause", "no gap": "", "unexplained": "allowing for the unknown",
+    }  # fmt: skip
+    return told[diagnosis.leads]
 
 
 def answer(diagnosis: Diagnosis) -> Answer:
     """What the diagnosis says; undecided where nothing is likelier than not."""
     claim = claimed(diagnosis)
-    rest = max(diagnosis.no_gap_probability, diagnosis.unexplained_probability)
-    highest = rest if claim is None else claim.probability
-    if not highest >= _LIKELIER_THAN_NOT:
-        return Answer.UNDECIDED
     if claim is not None:
-        return Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
-    return Answer.NO_GAP if rest == diagnosis.no_gap_probability else Answer.UNEXPLAINED
+        sure, said = claim.probability, Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
+    elif diagnosis.leads == "no gap":
+        sure, said = diagnosis.no_gap_probability, Answer.NO_GAP
+    else:
+        sure, said = diagnosis.unexplained_probability, Answer.UNEXPLAINED
+    return said if sure >= _LIKELIER_THAN_NOT else Answer.UNDECIDED
 
 
 def is_set_aside(diagnosis: Diagnosis, residual: Residual) -> bool:

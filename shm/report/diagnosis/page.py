@@ -11,9 +11,11 @@ from shm.report import words
 from shm.report.diagnosis.content import Answer, DiagnosisSheet, after, answer, claimed
 from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis.phrases import label
-from shm.report.diagnosis.summary import consequences, kilonewtons, name, verdict
+from shm.report.diagnosis.summary import consequences, name, verdict
 from shm.report.diagnosis.tables import answers, evidence
+from shm.report.diagnosis.tensions import TensionUnit, tension_unit
 from shm.report.template import ENVIRONMENT
+from shm.values import TensionEstimate
 
 _STYLES = {
     Answer.EXPLAINED: "first",
@@ -64,7 +66,7 @@ def _claim(sheet: DiagnosisSheet) -> tuple[str, str, str]:
         told = words.probability(claim.probability)
         return ("Probability of the cause", told, f"{label(claim.leading)}{alike}")
     no_gap, unknown = diagnosis.no_gap_probability, diagnosis.unexplained_probability
-    if no_gap >= unknown:
+    if diagnosis.leads == "no gap":
         return ("Probability of no gap", words.probability(no_gap), f"by {diagnosis.baseline}")
     return ("Something else", words.probability(unknown), "probability, not in the catalogue")
 
@@ -86,9 +88,14 @@ def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     plain, better = sheet.diagnosis.tension_before_n, sheet.diagnosis.tension_after_n
     if math.isnan(plain.mean):
         return None
+    unit = tension_unit(sheet.diagnosis)
     if not after(sheet.diagnosis) or math.isnan(better.mean):
-        return ("Tension", f"{plain.mean / 1e3:.0f} kN", f"baseline: {kilonewtons(plain)}")
-    return ("Tension", f"{better.mean / 1e3:.0f} kN", f"baseline alone: {kilonewtons(plain)}")
+        return ("Tension", _rounded(plain, unit), f"baseline: {unit.told(plain)}")
+    return ("Tension", _rounded(better, unit), f"baseline alone: {unit.told(plain)}")
+
+
+def _rounded(estimate: TensionEstimate, unit: TensionUnit) -> str:
+    return f"{unit.of(estimate.mean):.0f} {unit.name}"
 
 
 def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:

@@ -16,7 +16,8 @@ from shm.report.diagnosis.content import (
     claims,
 )
 from shm.report.diagnosis.phrases import label, phrase
-from shm.values import Diagnosis, NextMeasurement, TensionEstimate, Trend
+from shm.report.diagnosis.tensions import tension_unit
+from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
 _POOR_FIT = 0.01
@@ -228,31 +229,19 @@ def _tension(diagnosis: Diagnosis) -> str:
     plain, better = diagnosis.tension_before_n, diagnosis.tension_after_n
     if math.isnan(plain.mean):
         return ""
-    alone = f"the baseline {diagnosis.baseline} alone gives {kilonewtons(plain)}"
+    unit = tension_unit(diagnosis)
+    alone = f"the baseline {diagnosis.baseline} alone gives {unit.told(plain)}"
     what = after(diagnosis)
     if not what or math.isnan(better.mean):
         return f"For the tension {alone}{_with_care(diagnosis)}."
     off = 100 * (plain.mean / better.mean - 1)
-    told = f"{what.capitalize()} the tension is {kilonewtons(better)}"
+    told = f"{what.capitalize()} the tension is {unit.told(better)}"
     return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
 
 
 def _with_care(diagnosis: Diagnosis) -> str:
     unsure = answer(diagnosis) in (Answer.UNEXPLAINED, Answer.UNDECIDED)
     return ", not to be relied on while the gap is open" if unsure else ""
-
-
-def tension_kn(estimate: TensionEstimate) -> Interval:
-    return words.kilonewtons(Interval(estimate.mean, estimate.q05, estimate.q95))
-
-
-def kilonewtons(estimate: TensionEstimate) -> str:
-    """`702 kN (690 to 714)`."""
-    interval = tension_kn(estimate)
-    if math.isnan(interval.width):
-        return f"{interval.mean:.0f} kN"
-    low, high = words.span(interval).split(" to ")
-    return f"{words.mean(interval)} kN ({low} to {high})"
 
 
 def ranked_measurements(diagnosis: Diagnosis) -> list[NextMeasurement]:

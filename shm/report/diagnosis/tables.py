@@ -18,6 +18,7 @@ from shm.report.diagnosis.content import (
 from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
+from shm.report.diagnosis.tensions import TensionUnit, tension_unit
 from shm.report.table import Table
 from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
 
@@ -138,27 +139,35 @@ def shrinkage(sheet: DiagnosisSheet) -> Table:
 
 def tension(sheet: DiagnosisSheet) -> Table:
     diagnosis, nominal = sheet.diagnosis, sheet.hanger.nominal_tension_n
+    unit = tension_unit(diagnosis)
     rows = (
         (f"before: the baseline {diagnosis.baseline}", diagnosis.tension_before_n),
         (f"after: {after(diagnosis)}", diagnosis.tension_after_n),
     )
     return Table(
         "Tension",
-        ("tension", "mean, kN", "sd, kN", "90 % interval, kN", "% of nominal"),
+        (
+            "tension",
+            *(f"{what}, {unit.name}" for what in ("mean", "sd", "90 % interval")),
+            "% of nominal",
+        ),
         tuple(
-            _tension_row(what, each, nominal)
+            _tension_row(what, each, nominal, unit)
             for what, each in rows
             if math.isfinite(each.mean) and not what.endswith(": ")
         ),
     )
 
 
-def _tension_row(what: str, estimate: TensionEstimate, nominal_n: float) -> tuple[str, ...]:
+def _tension_row(
+    what: str, estimate: TensionEstimate, nominal_n: float, unit: TensionUnit
+) -> tuple[str, ...]:
+    interval = unit.interval(estimate)
     return (
         what,
-        f"{estimate.mean / 1e3:.1f}",
-        words.number(estimate.sd / 1e3, ".1f"),
-        f"{estimate.q05 / 1e3:.1f} to {estimate.q95 / 1e3:.1f}"
+        f"{interval.mean:.1f}",
+        words.number(unit.of(estimate.sd), ".1f"),
+        f"{interval.low:.1f} to {interval.high:.1f}"
         if math.isfinite(estimate.q05)
         else "not known",
         f"{100 * estimate.mean / nominal_n:.1f}",

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report.diagnosis.content import DiagnosisSheet, after
-from shm.report.diagnosis.summary import kilonewtons, tension_kn
+from shm.report.diagnosis.tensions import TensionUnit, tension_unit
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.values import TensionEstimate
@@ -23,16 +23,17 @@ def _draw(sheet: DiagnosisSheet) -> Figure | None:
         return None
     figure = style.new_figure(0.42 * len(rows) + 0.95)
     axes = figure.subplots()
-    style.dress(axes, "tension (kN)", "")
+    unit = tension_unit(sheet.diagnosis)
+    style.dress(axes, f"tension ({unit.name})", "")
     for row, (_, estimate, colour) in enumerate(rows):
-        _interval(axes, row, estimate, colour)
+        _interval(axes, row, estimate, unit, colour)
     axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
     axes.set_ylim(len(rows) - 0.5, -0.75)
     axes.margins(x=0.12)
     axes.ticklabel_format(axis="x", useOffset=False)
-    _nominal(axes, sheet)
+    _nominal(axes, unit.of(sheet.hanger.nominal_tension_n))
     return figure
 
 
@@ -45,8 +46,10 @@ def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
     return [row for row in rows if row[0] and math.isfinite(row[1].mean)]
 
 
-def _interval(axes: Axes, row: int, estimate: TensionEstimate, colour: str) -> None:
-    interval = tension_kn(estimate)
+def _interval(
+    axes: Axes, row: int, estimate: TensionEstimate, unit: TensionUnit, colour: str
+) -> None:
+    interval = unit.interval(estimate)
     if math.isfinite(interval.width):
         axes.plot(
             [interval.low, interval.high], [row, row], color=colour, linewidth=7, alpha=0.35,
@@ -54,7 +57,7 @@ def _interval(axes: Axes, row: int, estimate: TensionEstimate, colour: str) -> N
         )  # fmt: skip
     axes.plot([interval.mean], [row], marker="o", markersize=6, color=colour)
     axes.annotate(
-        kilonewtons(estimate),
+        unit.told(estimate),
         (interval.mean, row),
         xytext=(0, 9),
         textcoords="offset points",
@@ -64,9 +67,8 @@ def _interval(axes: Axes, row: int, estimate: TensionEstimate, colour: str) -> N
     )
 
 
-def _nominal(axes: Axes, sheet: DiagnosisSheet) -> None:
+def _nominal(axes: Axes, nominal: float) -> None:
     """The nominal tension as a line, where it lies near."""
-    nominal = sheet.hanger.nominal_tension_n / 1e3
     low, high = axes.get_xlim()
     reach = _NEAR * (high - low)
     if not low - reach <= nominal <= high + reach:
@@ -89,7 +91,8 @@ def _caption(sheet: DiagnosisSheet) -> str:
 
 
 def _alt(sheet: DiagnosisSheet) -> str:
-    told = [f"{what} {kilonewtons(estimate)}" for what, estimate, _ in _rows(sheet)]
+    unit = tension_unit(sheet.diagnosis)
+    told = [f"{what} {unit.told(estimate)}" for what, estimate, _ in _rows(sheet)]
     return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
 
 
