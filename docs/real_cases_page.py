@@ -167,7 +167,7 @@ Diagnosed: TypeAlias = tuple[Arrangement, Diagnosis]
 
 
 def pipe_hanger_tables(data: Path) -> str:
-    """One row for each clamp and direction, then one for each length of CA, in markdown."""
+    """One row for each clamp and direction, then one for each of CA, in markdown."""
     found = [
         (each, diagnose(each.tests, each.hanger, GapOptions(seed=SEED)))
         for each in arrangements(data)
@@ -181,7 +181,7 @@ def pipe_hanger_tables(data: Path) -> str:
     return "\n\n".join(
         (
             _table(_FAMILY_HEAD, [_family_row(key, pairs) for key, pairs in families.items()]),
-            "The six lengths of CA:",
+            "The arrangements of CA, the shortest rods first:",
             _table(_LENGTH_HEAD, [_length_row(*pair) for pair in shortest_first]),
             _one_hinge(hinges),
         )
