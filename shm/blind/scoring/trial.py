@@ -15,7 +15,7 @@ from shm.blind.scoring.marks import marks
 from shm.blind.scoring.questions import figures, leading
 from shm.values import Answer, Bin, CaseScore, Richness, TrialScore, TrueCase
 
-_SIZES = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0, np.inf)
+_SIZES = (0.0, 2.0, 4.0, 8.0, 32.0, 128.0, np.inf)
 
 
 def trial_score(

@@ -54,12 +54,12 @@ def summary(sheet: DiagnosisSheet) -> str:
 def consequences(diagnosis: Diagnosis) -> str:
     """What follows the claim: how far the gap shrinks, how it goes, the tension, what next."""
     sentences = (
-        _set_aside(diagnosis),
         _runner_up(diagnosis),
         _shrinkage(diagnosis),
         _misfit(diagnosis),
         _pattern(diagnosis),
         _tension(diagnosis),
+        _set_aside(diagnosis),
         next_step(diagnosis),
     )
     return " ".join(sentence for sentence in sentences if sentence)

@@ -13,7 +13,7 @@ from shm.report.trial.figures.points import points
 from shm.report.trial.phrases import value
 from shm.values import Bin, Richness, TrialScore
 
-_TICKS = (1, 2, 4, 8, 16, 32, 64)
+_TICKS = (1, 4, 16, 64, 256, 1024)
 
 
 def _draw(score: TrialScore) -> Figure | None:
@@ -49,9 +49,10 @@ def _panel(axes: Axes, score: TrialScore, richness: Richness) -> None:
             [mark.above, _TICKS[-1]], [mark.lower] * 2, color=style.ORANGE, linestyle="--",
             linewidth=1.2,
         )  # fmt: skip
-    axes.set_xscale("log", base=2)
+    axes.set_xscale("log")
+    axes.minorticks_off()
     axes.set_xticks(_TICKS, [str(tick) for tick in _TICKS])
-    axes.set_xlim(0.9, 72)
+    axes.set_xlim(0.9, 1200)
     axes.set_ylim(-0.05, 1.08)
 
 
