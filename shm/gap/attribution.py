@@ -17,6 +17,8 @@ from shm.gap.search import SUPPORTED, Search
 from shm.values import Leads, leads
 
 WITHIN_REACH = 7.0
+AS_GOOD_A_FIT = 1.0
+"""What a cause may fit worse than the best one, in log likelihood, and still fit as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,12 +154,13 @@ def _with_groups(
     problem: GapProblem, causes: tuple[Explanation, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[tuple[str, ...], ...]]:
     """The causes with the indices of their groups, and the groups' names."""
-    top = max((each.log_bayes_factor for each in causes), default=0.0)
+    best = max(causes, key=lambda each: each.log_bayes_factor, default=None)
     alone = {each.effect: each.log_bayes_factor for each in causes}
     able = [
-        (index, each.best.fit, top - each.log_bayes_factor < SAME_BELOW)
+        (index, each.best.fit, hardly_behind(each, best))
         for index, each in enumerate(causes)
-        if each.best.fit is not None and _reached(each, top) and not _idle(each, alone)
+        if best is not None and each.best.fit is not None
+        if _reached(each, best) and not _idle(each, alone)
     ]
     found = grouped([faces(problem, fit) for _, fit, _ in able], [near for *_, near in able])
     members = [tuple(able[i][0] for i in group) for group in found]
@@ -166,10 +169,21 @@ def _with_groups(
     return tuple(replace(each, group=index.get(i)) for i, each in enumerate(causes)), names
 
 
-def _reached(cause: Explanation, top: float) -> bool:
-    """Whether these data leave a cause a chance beside the best one, of log Bayes factor `top`."""
+def hardly_behind(cause: Explanation, best: Explanation) -> bool:
+    """Whether the data hardly prefer the best cause: by evidence, or else by the prior alone.
+
+    A cause of many parameters pays for them, but where it fits as well the data do not speak
+    against it.
+    """
+    behind = best.log_bayes_factor - cause.log_bayes_factor
+    as_well = cause.log_fit > best.log_fit - AS_GOOD_A_FIT
+    return behind < SAME_BELOW or (as_well and behind < WITHIN_REACH)
+
+
+def _reached(cause: Explanation, best: Explanation) -> bool:
+    """Whether these data leave a cause a chance beside the best one."""
     level = cause.log_bayes_factor
-    return level > top - SAME_BELOW or level > max(0.0, top - WITHIN_REACH)
+    return hardly_behind(cause, best) or level > max(0.0, best.log_bayes_factor - WITHIN_REACH)
 
 
 def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:

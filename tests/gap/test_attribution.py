@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, attributed
+from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind
+from shm.gap.chances import Tried
+from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
@@ -114,3 +116,18 @@ def test_an_effect_that_would_drown_in_the_errors_is_told_to_be_invisible() -> N
     assert "drown" in dict(found.invisible)["distributed_mass"]
     assert found.leading is None
     assert found.explanations == ()
+
+
+@pytest.mark.parametrize(
+    ("log_bayes_factor", "log_fit", "alike"),
+    [(7.5, 9.0, True), (6.5, 9.0, False), (6.5, 11.5, True), (2.5, 12.0, False)],
+)
+def test_a_cause_that_fits_as_well_is_not_told_apart_by_what_its_freedom_costs(
+    log_bayes_factor: float, log_fit: float, alike: bool
+) -> None:
+    best, other = _cause(10.0, 12.0), _cause(log_bayes_factor, log_fit)
+    assert hardly_behind(other, best) == alike
+
+
+def _cause(log_bayes_factor: float, log_fit: float) -> Explanation:
+    return Explanation(Tried(Hypothesis(), 0.0, 0.0), (), 0.1, log_bayes_factor, log_fit)
