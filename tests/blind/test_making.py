@@ -140,9 +140,9 @@ def test_the_key_says_what_was_planted_and_what_is_left_out(
 
 
 def test_sizes_lie_where_the_draft_says(cases: tuple[Path, dict[str, TrueCase]]) -> None:
-    """Log-uniform from 1 to 64: at 0.6 of the range 64 to the power of 0.6."""
+    """Log-uniform from 1 to 1000: at 0.6 of the range 1000 to the power of 0.6."""
     one = next(t for t in cases[1].values() if t.kind == "one" and t.way == "modes")
-    assert one.size == pytest.approx(64**0.6, rel=0.1)
+    assert one.size == pytest.approx(1000**0.6, rel=0.1)
 
 
 def test_the_diagnosis_is_given_what_the_owner_knows(
