@@ -2,48 +2,94 @@
 
 Corrosion has no edges, sockets taper, joints slip by another power. The larger an effect, the more
 its law's own error stands out of the noise, and without an allowance a second effect or something
-unknown would take the blame. So the data may err about a prediction by a fraction of what the
-effect does to each of them beyond what the baseline can follow, the same in all tests of a mode;
-the fraction is unknown.
+unknown would take the blame. So the data may err about a prediction in two ways: by an unknown
+multiple, about 1 in size, of what each other law of the effect would change; and by a fraction of
+what the effect does to each of them beyond what the baseline can follow, the same in all tests of a
+mode. The fraction is unknown.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.gap.contract import Covariance, Fit, NoiseNode, Observations
+from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import same_mode
+from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
 from shm.values import FloatArray
 
-FRACTIONS = ((0.0, 0.4), (0.03, 0.2), (0.1, 0.2), (0.2, 0.2))
+FRACTIONS = ((0.003, 0.2), (0.03, 0.2), (0.1, 0.15), (0.2, 0.1), (0.4, 0.05))
 """By how much an effect's law is off, each with its prior probability."""
+EXACT = 0.3
+"""The prior probability that it is not off at all."""
 
 
-def law_gain(observations: Observations, baseline: Fit, fit: Fit) -> float:
-    """What the log evidence of a fit with effects gains if their laws may be off.
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A posterior about a fit, all parameters linear: its log evidence, step and curvature.
 
-    Never less than the log of the prior probability that they are exact. The prediction is taken
-    as linear about the fit.
+    The parameters are the fit's own and, behind them, standard normal multiples of other laws.
     """
+
+    errors: Covariance
+    log_evidence: float
+    step: FloatArray
+    curvature: FloatArray
+
+
+def by_its_laws(
+    problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator
+) -> tuple[float, Fit]:
+    """What the log evidence of a fit with effects gains if their laws may be off, and the fit then.
+
+    The gain is never less than the log of the prior probability that the laws are exact. Where they
+    more likely are not, the fit is that with the likeliest allowance. The prediction is taken as
+    linear about the fit.
+    """
+    others = _changes(problem, fit)
     shift = fit.predicted - baseline.predicted
-    logs = [
-        _log_evidence(observations, fit, _allowed(observations, fit, shift, e))
-        for e, _ in FRACTIONS
+    exact = _linear(problem, fit, fit.noise, fit.slopes)
+    wide = np.column_stack([fit.slopes, others])
+    off = [
+        _linear(problem, fit, _allowed(problem.design, fit, fraction * shift), wide)
+        for fraction, _ in FRACTIONS
     ]
-    return float(logsumexp(logs, b=[share for _, share in FRACTIONS]) - logs[0])
+    share = np.array([share for _, share in FRACTIONS])
+    weight = np.log(share) + np.array([each.log_evidence for each in off])
+    of_exact = np.log(EXACT) + exact.log_evidence
+    gain = float(np.logaddexp(of_exact, logsumexp(weight)) - exact.log_evidence)
+    if of_exact > logsumexp(weight):
+        return gain, fit
+    return gain, _moved(problem, fit, off[int(weight.argmax())], others, rng)
 
 
-def _allowed(
-    observations: Observations, fit: Fit, shift: FloatArray, fraction: float
-) -> Covariance:
-    """The errors of a fit with those of a law that is off by a fraction of its shift (data,)."""
-    count = observations.design.frequencies
-    off = fraction * shift
-    together = np.outer(off[:count], off[:count]) * same_mode(observations.design)
+def _changes(problem: GapProblem, fit: Fit) -> FloatArray:
+    """What the other laws of a fit's effects, one at a time, change of its prediction (data, k)."""
+    theta = problem.theta(fit.hypothesis, fit.z[None])
+    found = [
+        problem.predict_at(other, theta)[0] - fit.predicted for other in _otherwise(fit.hypothesis)
+    ]
+    return np.column_stack([np.empty((len(fit.predicted), 0)), *found])
+
+
+def _otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+    """The same effects, one of them by another law."""
+    for index, (name, variant) in enumerate(hypothesis.effects):
+        for law in range(1, len(EFFECTS[name].other_laws) + 1):
+            effects = list(hypothesis.effects)
+            effects[index] = name, replace(variant, law=law)
+            yield replace(hypothesis, effects=tuple(effects))
+
+
+def _allowed(design: Design, fit: Fit, off: FloatArray) -> Covariance:
+    """The errors of a fit with those of a law that is `off` (data,)."""
+    count = design.frequencies
+    together = np.outer(off[:count], off[:count]) * same_mode(design)
     return replace(
         fit.noise,
         frequency=fit.noise.frequency + together,
@@ -51,11 +97,42 @@ def _allowed(
     )
 
 
-def _log_evidence(observations: Observations, fit: Fit, errors: Covariance) -> float:
-    """The log evidence of a fit about its most probable point, all its parameters linear."""
+def _linear(problem: GapProblem, fit: Fit, errors: Covariance, slopes: FloatArray) -> _Linear:
+    """About a fit's most probable point; `slopes` (data, d + k), the first d its own."""
     likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
-    residual = observations.value - fit.predicted
-    gram = likelihood.gram(np.column_stack([fit.slopes, residual])[None])[0, 0]
-    inner, pull = gram[:-1, :-1] + np.eye(len(fit.z)), gram[:-1, -1] - fit.z
-    left = gram[-1, -1] + fit.z @ fit.z - pull @ np.linalg.solve(inner, pull)
-    return float(likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - left / 2)
+    z = np.concatenate([fit.z, np.zeros(slopes.shape[1] - len(fit.z))])
+    residual = problem.observations.value - fit.predicted
+    gram = likelihood.gram(np.column_stack([slopes, residual])[None])[0, 0]
+    inner, pull = gram[:-1, :-1] + np.eye(len(z)), gram[:-1, -1] - z
+    step = np.linalg.solve(inner, pull)
+    misfit = gram[-1, -1] + z @ z - pull @ step
+    log = likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - misfit / 2
+    return _Linear(errors, float(log), step, inner)
+
+
+def _moved(
+    problem: GapProblem, fit: Fit, linear: _Linear, others: FloatArray, rng: np.random.Generator
+) -> Fit:
+    """The fit where the allowance moves it to; the other laws' changes are among its errors."""
+    own, count = len(fit.z), problem.design.frequencies
+    errors = replace(
+        linear.errors,
+        frequency=linear.errors.frequency + others[:count] @ others[:count].T,
+        shape_loads=np.column_stack([linear.errors.shape_loads, others[count:]]),
+    )
+    likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
+    places = np.array([fit.z, fit.z + linear.step[:own]])
+    predicted = np.array([fit.predicted, problem.predict(fit.hypothesis, places[1:])[0]])
+    log = likelihood.log(problem.observations.value - predicted)
+    # The prediction is only nearly linear: a step that leads down is not taken.
+    best = int((log - (places**2).sum(axis=1) / 2).argmax())
+    covariance = np.asarray(np.linalg.inv(linear.curvature)[:own, :own], dtype=np.float64)
+    return replace(
+        fit,
+        z=places[best],
+        covariance=covariance,
+        predicted=predicted[best],
+        noise=errors,
+        draws=rng.multivariate_normal(places[best], covariance, len(fit.draws), method="cholesky"),
+        log_fit=float(log[best]),
+    )

@@ -11,7 +11,7 @@ from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.hypotheses import hypotheses, invisible
-from shm.gap.laws import law_gain
+from shm.gap.laws import by_its_laws
 from shm.gap.options import GapOptions, Progress
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
@@ -25,7 +25,7 @@ MOST_SAMPLED = 5
 LEADERS = 3
 MOST_PAIRS = 8
 SUPPORTED = 2.0
-LAWS_WITHIN = 60.0
+LAWS_WITHIN = 500.0
 DROWNED = "Even at its largest it would drown in the errors of these data."
 
 
@@ -104,9 +104,7 @@ class Search:
         """Allows for the error of the effects' own laws, where it may decide something."""
         first = max(each.log_evidence for each in tried)
         return [
-            replace(each, log_evidence=each.log_evidence + self._law_gain(each))
-            if each.log_evidence > first - LAWS_WITHIN
-            else each
+            self._by_its_laws(each) if each.log_evidence > first - LAWS_WITHIN else each
             for each in tried
         ]
 
@@ -164,10 +162,11 @@ class Search:
         hypothesis = replace(base.hypothesis, flexible=True)
         return self._tried(fitted(self.problem, hypothesis, self.rng, base.z[None]))
 
-    def _law_gain(self, tried: Tried) -> float:
+    def _by_its_laws(self, tried: Tried) -> Tried:
         if tried.fit is None or tried.hypothesis.flexible or not tried.hypothesis.effects:
-            return 0.0
-        return law_gain(self.problem.observations, self.baseline, tried.fit)
+            return tried
+        gain, fit = by_its_laws(self.problem, self.baseline, tried.fit, self.rng)
+        return replace(self._tried(fit), log_evidence=tried.log_evidence + gain)
 
     def _tried(self, fit: Fit) -> Tried:
         return Tried.fitted(fit, len(self.baseline.z))

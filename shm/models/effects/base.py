@@ -11,6 +11,9 @@ from shm.models.conditions import Conditions
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import AddedMass, FloatArray, Hanger, Plane
 
+GRADUAL = (0.6, 1.0, 1.4)
+"""Reaches of three steps that stand for one gradual edge."""
+
 
 @dataclass(frozen=True)
 class Survey:
@@ -31,7 +34,7 @@ class Variant:
 
     `at` says it in words; `key` in a word that may stand in the name of a model class. `places_m`
     are those of the sensors where the effect acts at each of them. With `alike` one value serves
-    all its planes.
+    all its planes. `law` counts the effect's `other_laws` from 1; 0 is its own.
     """
 
     at: str = "everywhere"
@@ -41,6 +44,7 @@ class Variant:
     test: str = ""
     places_m: tuple[float, ...] = ()
     alike: bool = False
+    law: int = 0
 
     @property
     def key(self) -> str:
@@ -100,7 +104,8 @@ class Effect:
     `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
     for. The first parameter is the effect's size. `follows` are the conditions of a test that it
     depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
-    would not have.
+    would not have. `other_laws` says in words by which other laws, about as likely as its own, the
+    same parameters may act.
     """
 
     name: ClassVar[str]
@@ -110,6 +115,7 @@ class Effect:
     imitated_by: ClassVar[tuple[str, ...]]
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
     of_the_hanger: ClassVar[bool] = True
+    other_laws: ClassVar[tuple[str, ...]] = ()
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         """Why these data cannot show the effect, a sentence for people; empty where they can."""

@@ -10,6 +10,8 @@ from shm.models.effects.levels import missing_levels
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
+_DYING = 1.5
+
 
 class GeometricHardening(Effect):
     """Swinging widely stretches the hanger and raises its mean tension with the amplitude squared.
@@ -25,6 +27,7 @@ class GeometricHardening(Effect):
     )
     seen_by = ("tests at different levels",)
     imitated_by = ("temperature_tension", "timebase")
+    other_laws = ("the swing dies away the faster the wider it is: the power of the level is 1.5",)
     follows = ("amplitude",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
@@ -53,5 +56,6 @@ class GeometricHardening(Effect):
         conditions: Conditions,
         hanger: Hanger,
     ) -> PhysicalHanger:
-        factor = 1 + values[:, 0] * conditions.amplitude**2
+        power = _DYING if variant.law else 2.0
+        factor = 1 + values[:, 0] * conditions.amplitude**power
         return replace(physical, tension_n=physical.tension_n * factor)

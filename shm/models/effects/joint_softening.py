@@ -14,6 +14,7 @@ from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
 _LOSS_AT_REFERENCE_LEVEL = 0.1
+_SLIP = 0.5
 
 
 class JointSoftening(Effect):
@@ -29,6 +30,7 @@ class JointSoftening(Effect):
     source = "Gaul and Nitsche (2001), The role of friction in mechanical joints."
     seen_by = ("tests at different levels",)
     imitated_by = ("rotational_end_flexibility", "skewed_principal_axes")
+    other_laws = ("the compliance grows with the square root of the level",)
     follows = ("amplitude",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
@@ -51,7 +53,8 @@ class JointSoftening(Effect):
         hanger: Hanger,
     ) -> PhysicalHanger:
         ends = list(variant.ends)
-        own = conditions.amplitude * 10.0 ** -values[:, 0]
+        power = _SLIP if variant.law else 1.0
+        own = conditions.amplitude**power * 10.0 ** -values[:, 0]
         compliance = physical.rotational_compliance_rad_n_m.copy()
         compliance[:, ends] += own[:, None, None, None] * np.eye(2)
         loss = physical.joint_loss_factor.copy()

@@ -10,6 +10,8 @@ from shm.models.effects.base import Effect, Parameter, Variant
 from shm.models.hanger.physical import PhysicalHanger, PointMass
 from shm.values import FloatArray, Hanger
 
+GYRATION_M = 0.1
+
 
 class UnknownPointMass(Effect):
     """Something heavy sits at one place: a clamp, a coupler, a lamp, a bracket left behind.
@@ -28,6 +30,7 @@ class UnknownPointMass(Effect):
         "section_loss",
         "sensor_mass",
     )
+    other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         own_kg = scales.mass_kg(hanger)
@@ -50,5 +53,8 @@ class UnknownPointMass(Effect):
         conditions: Conditions,
         hanger: Hanger,
     ) -> PhysicalHanger:
-        mass = PointMass(x_m=values[:, 1], mass_kg=values[:, 0])
-        return replace(physical, masses=(*physical.masses, mass))
+        mass_kg, x_m = values.T
+        if not variant.law:
+            return replace(physical, masses=(*physical.masses, PointMass(x_m, mass_kg)))
+        halves = [PointMass(x_m + side * GYRATION_M, mass_kg / 2) for side in (-1, 1)]
+        return replace(physical, masses=(*physical.masses, *halves))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from shm.models.conditions import Conditions
 from shm.models.effects import places
-from shm.models.effects.base import Effect, Parameter, Variant
+from shm.models.effects.base import GRADUAL, Effect, Parameter, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, FloatArray, Hanger
 
@@ -25,6 +25,7 @@ class SectionLoss(Effect):
     )
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
+    other_laws = ("the loss begins and ends gradually, over two fifths of its extent at each end",)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -57,10 +58,15 @@ class SectionLoss(Effect):
         hanger: Hanger,
     ) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        zone = Zone(
-            start_m=middle_m - extent_m / 2,
-            end_m=middle_m + extent_m / 2,
-            stiffness_factor=(1 - loss) ** 2,
-            mass_factor=1 - loss,
+        reaches = GRADUAL if variant.law else (1.0,)
+        left = (1 - loss) ** (1 / len(reaches))
+        zones = tuple(
+            Zone(
+                start_m=middle_m - reach * extent_m / 2,
+                end_m=middle_m + reach * extent_m / 2,
+                stiffness_factor=left**2,
+                mass_factor=left,
+            )
+            for reach in reaches
         )
-        return replace(physical, zones=(*physical.zones, zone))
+        return replace(physical, zones=physical.zones + zones)

@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.models.conditions import Conditions
 from shm.models.effects import places
-from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, PLANES, FloatArray, Hanger
 
@@ -25,6 +25,7 @@ class StiffEndZones(Effect):
     source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
     seen_by = ("frequencies", "shapes near the ends")
     imitated_by = ("effective_length", "bending_stiffness", "shear_and_rotary_inertia")
+    other_laws = ("the stiffness falls gradually, as in a socket that tapers",)
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.ends_and_planes(survey)
@@ -63,9 +64,15 @@ class StiffEndZones(Effect):
         deck_m, arch_m = physical.deck_end_m, physical.arch_end_m
         reach_m, ratio = values.T
         same = np.ones_like(ratio)
+        steps = GRADUAL if variant.law else (1.0,)
         factor = np.ones((len(ratio), len(PLANES)))
-        factor[:, list(variant.planes)] = ratio[:, None]
-        deck = Zone(deck_m, deck_m + reach_m, factor, same)
-        arch = Zone(arch_m - reach_m, arch_m, factor, same)
-        added = tuple((deck, arch)[end] for end in variant.ends)
-        return replace(physical, zones=physical.zones + added)
+        factor[:, list(variant.planes)] = ratio[:, None] ** (1 / len(steps))
+        zones = [
+            (
+                Zone(deck_m, deck_m + step * reach_m, factor, same),
+                Zone(arch_m - step * reach_m, arch_m, factor, same),
+            )[end]
+            for step in steps
+            for end in variant.ends
+        ]
+        return replace(physical, zones=(*physical.zones, *zones))
