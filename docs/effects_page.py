@@ -90,6 +90,10 @@ def _section(effect: Effect) -> str:
         f"- Easily taken for: {', '.join(f'`{name}`' for name in effect.imitated_by)}.",
         f"- Source: {effect.source}",
     ]
+    if effect.other_laws:
+        lines.append(
+            f"- Or by another law, which the diagnosis allows for: {'; '.join(effect.other_laws)}."
+        )
     return "\n\n".join(lines[:3]) + "\n\n" + "\n".join(lines[3:])
 
 

@@ -269,3 +269,27 @@ def test_an_axis_at_45_degrees_makes_a_round_bar_swing_at_45_degrees() -> None:
 def test_springs_alike_in_both_planes_are_two_of_one_size(name: str) -> None:
     one = frequencies(name, "deck end, both planes alike", (7.6,))
     np.testing.assert_array_equal(one, frequencies(name, "deck end", (7.6, 7.6)))
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("section_loss", (0.1, 5.0, 1.0)),
+        ("stiff_end_zones", (0.2, 3.0)),
+        ("point_mass", (5.0, 4.0)),
+    ],
+)
+def test_another_law_of_an_effect_does_nearly_the_same(
+    name: str, values: tuple[float, ...]
+) -> None:
+    """It changes frequencies by some percent of what the effect itself changes."""
+    own = physical(name, place_of(name), values)
+    variant = replace(place(name, place_of(name)), law=1)
+    other = EFFECTS[name].applied(physical(), np.array([values]), variant, Conditions("t1"), ROD)
+    bare, by_own, by_other = (solved(each).frequency_hz[0] for each in (physical(), own, other))
+    apart = np.abs(by_other - by_own).max() / np.abs(by_own - bare).max()
+    assert 1e-3 < apart < 0.3
+
+
+def place_of(name: str) -> str:
+    return "both ends" if name == "stiff_end_zones" else "everywhere"
