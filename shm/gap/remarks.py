@@ -229,9 +229,8 @@ def _listed(names: Sequence[str]) -> str:
 def set_aside(outliers: Sequence[Outlier]) -> tuple[str, ...]:
     """Of frequencies that the diagnosis did without."""
     return tuple(
-        f"{each.plane.capitalize()} {each.order} of test {each.test}, {each.measured_hz:g} Hz, is "
-        f"set aside as a gross error (probability {_probability(each)}): {_expected(each)}. A "
-        f"wrong mode, a tone or a slip; look at the recording again."
+        f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
         for each in outliers
     )
 
@@ -239,11 +238,16 @@ def set_aside(outliers: Sequence[Outlier]) -> tuple[str, ...]:
 def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
     """Of frequencies that may be gross errors, but were kept."""
     return tuple(
-        f"{each.plane.capitalize()} {each.order} of test {each.test}, {each.measured_hz:g} Hz, may "
-        f"be a gross error (probability {_probability(each)}): {_expected(each)}. It is kept, and "
-        f"the answer may lean on it; look at the recording again."
+        f"{_measured(each)}, may be a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. It is kept, and the answer may lean on it; look at the recording "
+        f"again."
         for each in outliers
     )
+
+
+def _measured(outlier: Outlier) -> str:
+    mode = f"{outlier.plane.capitalize()} {outlier.order} of test {outlier.test}"
+    return f"{mode}, {outlier.measured_hz:g} Hz"
 
 
 def _expected(outlier: Outlier) -> str:

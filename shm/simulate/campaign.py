@@ -64,16 +64,14 @@ def campaign_with_truth(
     Tension, deviations, errors of sensors and noise do not depend on the effects. Raises UsageError
     for an effect or plan that cannot be.
     """
-    tests = plan.tests(hanger)
     made, noise = rng.spawn(2)
-    truth = _drawn_truth(hanger, state, effects, plan, made)
-    exact = [_of_test(hanger, state, truth, plan, test) for test in tests]
+    truth, exact = _realised(hanger, state, effects, plan, made)
     factors = sd_factors(hanger, state, plan)
     measured = tuple(
         replace(test, modes=identified(found, factors, hanger, plan, noise))
-        for test, found in zip(tests, exact, strict=True)
+        for test, found in zip(plan.tests(hanger), exact, strict=True)
     )
-    return Campaign(measured, replace(truth, frequencies=_frequencies(tests, exact, plan)))
+    return Campaign(measured, truth)
 
 
 def realised(
@@ -84,11 +82,8 @@ def realised(
     rng: np.random.Generator,
 ) -> CampaignTruth:
     """The truth of `campaign_with_truth` for the same generator state, without measuring."""
-    tests = plan.tests(hanger)
     made, _ = rng.spawn(2)
-    truth = _drawn_truth(hanger, state, effects, plan, made)
-    exact = [_of_test(hanger, state, truth, plan, test) for test in tests]
-    return replace(truth, frequencies=_frequencies(tests, exact, plan))
+    return _realised(hanger, state, effects, plan, made)[0]
 
 
 def bar_in_test(
@@ -148,6 +143,20 @@ def _of_test(
 ) -> PlantedModes:
     true_state = replace(state, tension_n=truth.tension_n)
     return noiseless(hanger, true_state, truth.effects, plan, test, truth.deviations, truth.sensors)
+
+
+def _realised(
+    hanger: Hanger,
+    state: HangerState,
+    effects: Sequence[PlantedEffect],
+    plan: CampaignPlan,
+    rng: np.random.Generator,
+) -> tuple[CampaignTruth, list[PlantedModes]]:
+    """The truth, and the modes without error of each test."""
+    tests = plan.tests(hanger)
+    truth = _drawn_truth(hanger, state, effects, plan, rng)
+    exact = [_of_test(hanger, state, truth, plan, test) for test in tests]
+    return replace(truth, frequencies=_frequencies(tests, exact, plan)), exact
 
 
 def _frequencies(
