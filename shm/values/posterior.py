@@ -1,9 +1,8 @@
-"""What inference and watching find."""
+"""What inference finds."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
 
 from shm.values.kinds import FloatArray, Plane
 
@@ -76,35 +75,3 @@ class Selection:
     @property
     def selected(self) -> Posterior:
         return self.posteriors[0]
-
-
-@dataclass(frozen=True)
-class Drift:
-    """How far one quantity has moved from its baseline, with the probability that it matters.
-
-    `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
-    `log10_k1` (shift in decades); `probability` is that of a shift beyond `threshold`, up or down.
-    """
-
-    hanger: int
-    test: str
-    time: datetime
-    quantity: str
-    baseline: float
-    value: float
-    shift_mean: float
-    shift_sd: float
-    threshold: float
-    probability: float
-
-
-@dataclass(frozen=True)
-class Alert:
-    """A shift that its owner should know of. `key` makes its delivery idempotent."""
-
-    key: str
-    hanger: int
-    test: str
-    time: datetime
-    message: str
-    drifts: tuple[Drift, ...]

@@ -1,0 +1,159 @@
+"""What watching a hanger over time finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+from shm.values.kinds import NAN, FloatArray, Plane
+
+End = Literal["deck", "arch"]
+
+TENSION = "tension"
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedQuantity:
+    """One thing that may move: the tension, or a spring of the model class.
+
+    `name` is `tension` or that of the parameter, such as `log10_k1`; `end` and `plane` say where a
+    spring acts, None where they do not tell it apart. The watch works in a `coordinate` in which
+    frequencies change nearly linearly, 0 at the baseline: of the tension the logarithm of its ratio
+    to the baseline's; of a spring the change of the mean log frequency. `coordinates` (m,),
+    ascending, and `values` (m,) map it to the tension in N or to log10 of the stiffness; `baseline`
+    is the value at 0. `step_sd` is the standard deviation of a change, if there is one, before any
+    data, in the coordinate.
+    """
+
+    name: str
+    baseline: float
+    coordinates: FloatArray
+    values: FloatArray
+    step_sd: float
+    end: End | None = None
+    plane: Plane | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What one test by itself says of the watched quantities of a hanger, without any prior.
+
+    Its log likelihood at coordinates x (q,) is -(x - mean)' information (x - mean) / 2, of the
+    errors that differ from test to test: what all tests share, the model's error above all, cancels
+    in every comparison and is left out. `information` (q, q) is singular where a test cannot tell
+    quantities apart; `mean` (q,) is then 0 along what it does not see.
+    """
+
+    test: str
+    time: datetime
+    temperature_c: float
+    mean: FloatArray
+    information: FloatArray
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far one quantity has moved from its baseline, with the probability that it matters.
+
+    `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
+    `log10_k1` (shift in decades); `probability` is that of a shift beyond `threshold`, up or down.
+    `value` is what the state over time says at the test, its swing with the temperature taken out.
+    """
+
+    hanger: int
+    test: str
+    time: datetime
+    quantity: str
+    baseline: float
+    value: float
+    shift_mean: float
+    shift_sd: float
+    threshold: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Moved:
+    """One quantity as that which has changed, and no other.
+
+    `probability` is that it is this one, given that something has changed; the shift (a fraction of
+    the tension, decades of a stiffness) is that if it is. `alike` are the quantities that the data
+    cannot tell from it: a log Bayes factor below 3.
+    """
+
+    quantity: str
+    probability: float
+    shift_mean: float
+    shift_sd: float
+    end: End | None = None
+    plane: Plane | None = None
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Change:
+    """What the sequential test says after one test of a hanger.
+
+    `evidence_years` is the Shiryaev-Roberts statistic in years of this hanger; a change is called
+    once it exceeds `limit_years`, which is the mean time to a false call, or less than it.
+    `probability` is that of any change since the baseline, `sudden` that it was a step and no
+    ramp, given a change. `began_after` and `began_by` hold the beginning with 90 % probability.
+    `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
+    of this test's reading being a blunder.
+    """
+
+    evidence_years: float
+    limit_years: float
+    probability: float
+    sudden: float
+    began_after: datetime
+    began_by: datetime
+    moved: tuple[Moved, ...]
+    outlier_probability: float = NAN
+
+    @property
+    def called(self) -> bool:
+        """Whether the evidence is beyond its limit."""
+        return self.evidence_years > self.limit_years
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedTest:
+    """The watch after one test: shifts of all quantities and what the sequential test says."""
+
+    test: str
+    time: datetime
+    temperature_c: float
+    drifts: tuple[Drift, ...]
+    change: Change
+
+
+@dataclass(frozen=True)
+class TemperatureCoefficient:
+    """How a quantity goes with the temperature: per kelvin, a fraction or decades, with its sd."""
+
+    quantity: str
+    mean: float
+    sd: float
+
+
+AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "test"]
+
+
+@dataclass(frozen=True)
+class Alert:
+    """A shift that its owner should know of. `key` makes its delivery idempotent.
+
+    `kinds` are the rules that raised it; `change` is None where the sequential test had no part.
+    A `test` alert is no finding: it shows that a hook works.
+    """
+
+    key: str
+    hanger: int
+    test: str
+    time: datetime
+    message: str
+    drifts: tuple[Drift, ...]
+    kinds: tuple[AlertKind, ...] = ()
+    change: Change | None = None
