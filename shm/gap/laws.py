@@ -27,6 +27,8 @@ FRACTIONS = ((0.003, 0.2), (0.03, 0.2), (0.1, 0.15), (0.2, 0.1), (0.4, 0.05))
 """By how much an effect's law is off, each with its prior probability."""
 EXACT = 0.3
 """The prior probability that it is not off at all."""
+SHOWN = 3.0
+"""Log odds against an exact law from which on the data show that it is off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +49,9 @@ def by_its_laws(
 ) -> tuple[float, Fit]:
     """What the log evidence of a fit with effects gains if their laws may be off, and the fit then.
 
-    The gain is never less than the log of the prior probability that the laws are exact. Where they
-    more likely are not, the fit is that with the likeliest allowance. The prediction is taken as
-    linear about the fit.
+    The gain is never less than the log of the prior probability that the laws are exact. Where the
+    data show that they are not, the fit is that with the likeliest allowance. The prediction is
+    taken as linear about the fit.
     """
     others = _changes(problem, fit)
     shift = fit.predicted - baseline.predicted
@@ -63,7 +65,7 @@ def by_its_laws(
     weight = np.log(share) + np.array([each.log_evidence for each in off])
     of_exact = np.log(EXACT) + exact.log_evidence
     gain = float(np.logaddexp(of_exact, logsumexp(weight)) - exact.log_evidence)
-    if of_exact > logsumexp(weight):
+    if logsumexp(weight) < of_exact + SHOWN:
         return gain, fit
     return gain, _moved(problem, fit, off[int(weight.argmax())], others, rng)
 
