@@ -135,6 +135,12 @@ def _moved(
         covariance=covariance,
         predicted=predicted[best],
         noise=errors,
-        draws=rng.multivariate_normal(places[best], covariance, len(fit.draws), method="cholesky"),
+        draws=places[best] + _scattered(linear.curvature, len(fit.draws), rng)[:, :own],
         log_fit=float(log[best]),
     )
+
+
+def _scattered(curvature: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
+    """Normal draws (count, d) by the curvature's own factor: its inverse may be too uneven."""
+    normal = rng.standard_normal((len(curvature), count))
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(curvature).T, normal).T)
