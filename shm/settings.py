@@ -109,8 +109,11 @@ class Settings:
     seed: int = _row(1, "", "seed of the random numbers", 0, None)
     workers: int = _row(1, "", "processes that identify and update", 1, 64)
     baseline_tests: int = _row(1, "", "how many first tests form the baseline", 1, 1000)
+    false_call_years: float = _row(
+        100.0, "years", "mean time until a hanger that has not changed is called changed", 0.1, 1e6
+    )
     hook_timeout_seconds: float = _row(30.0, "s", "a hook is ended after so long", 0.1, 3600)
-    hook_attempts: int = _row(8, "", "deliveries of one alert to one hook at most", 1, 1000)
+    hook_attempts: int = _row(16, "", "deliveries of one alert to one hook at most", 1, 1000)
     hook_backoff_seconds: float = _row(
         5.0, "s", "wait after a failed delivery, doubled each time", 0, 86400
     )

@@ -1,14 +1,34 @@
-"""`shm alerts`: what was raised, and whether the hooks got it."""
+"""`shm alerts`: what was raised, whether the hooks got it, and whether they work."""
 
 from __future__ import annotations
 
+import os
+import time
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
 import rich_click as click
 
-from shm.documents import alert_document
-from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
+from shm.bridge import Bridge, Hook
+from shm.documents import alert_document, format_time
+from shm.errors import NothingThere, UsageError
+from shm.values import Alert
+from shm_cli.acknowledge import acknowledge, acknowledgement_row, acknowledgement_words
+from shm_cli.common import (
+    hanger_option,
+    json_option,
+    open_workspace,
+    opened_store,
+    show,
+    show_table,
+    table,
+)
+
+if TYPE_CHECKING:
+    from shm.store import Delivery, StoredAlert
 
 
-@click.command()
+@click.group(invoke_without_command=True)
 @hanger_option()
 @json_option
 @click.pass_context
@@ -18,38 +38,114 @@ def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     \b
     Example: shm alerts --hanger 7 --json
     """
+    if ctx.invoked_subcommand is None:
+        _list(ctx, hanger_id, as_json)
+
+
+command.add_command(acknowledge)
+
+
+@command.command()
+@click.option("--hook", "name", required=True, metavar="NAME", help="A hook of bridge.toml.")
+@json_option
+@click.pass_context
+def test(ctx: click.Context, name: str, as_json: bool) -> None:
+    """Send a hook a marked test alert, now.
+
+    It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
+    Says what the hook answered, or what went wrong.
+
+    \b
+    Example: shm alerts test --hook mail
+    """
+    from shm.pipeline import utc_now
+    from shm_daemon import HookNotifier
+
+    workspace = open_workspace(ctx)
+    hook = _described(workspace.bridge, name)
+    alert = a_test_alert(workspace.bridge, hook, utc_now())
+    timeout_s = workspace.settings.hook_timeout_seconds
+    notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
+    try:
+        answer = notifier(hook, alert)
+    finally:
+        notifier.close()
+    seconds = time.monotonic() - began
+    if as_json:
+        told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": answer}
+        show({**told, "seconds": round(seconds, 3)})
+        return
+    click.echo(f"The hook {name} took the test alert in {seconds:.1f} s: {answer}.")
+
+
+def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
+    """An alert that says it is none, of the bridge's first hanger; raises NothingThere."""
+    if not bridge.hangers:
+        raise NothingThere(
+            "bridge.toml describes no hanger.", remedy="Describe one: an alert is of a hanger."
+        )
+    hanger = bridge.hangers[0].id
+    message = (
+        f"This is a test of the hook {hook.name} of {bridge.name}. Nothing has happened to hanger "
+        f"{hanger} or any other."
+    )
+    key = f"test:{hook.name}:{format_time(now)}"
+    return Alert(key, hanger, "", now, message, drifts=(), kinds=("test",))
+
+
+def _described(bridge: Bridge, name: str) -> Hook:
+    for hook in bridge.hooks:
+        if hook.name == name:
+            return hook
+    known = ", ".join(hook.name for hook in bridge.hooks) or "none"
+    raise UsageError(
+        f"bridge.toml describes no hook {name} (known: {known}).",
+        remedy="Correct the name, or describe it in a [[hook]] table.",
+    )
+
+
+def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
         alerts = store.alerts(hanger_id)
         deliveries = store.deliveries()
-    rows = [
-        {
-            "id": stored.id,
-            "raised_at": stored.raised_at,
-            "alert": alert_document(stored.alert),
-            "deliveries": [
-                {
-                    "hook": delivery.hook,
-                    "state": delivery.state.value,
-                    "attempts": delivery.attempts,
-                    "last_error": delivery.last_error or None,
-                }
-                for delivery in deliveries
-                if delivery.alert.key == stored.alert.key
-            ],
-        }
-        for stored in alerts
-    ]
+    rows = [_row(stored, deliveries) for stored in alerts]
     if as_json:
         show({"alerts": rows})
         return
     if not alerts:
         click.echo("No alert has been raised.")
         return
-    made = table("alerts", "hanger", "test of", "what", "hooks")
+    made = table("alerts", "number", "hanger", "test of", "what", "hooks", "acknowledged")
     for stored, row in zip(alerts, rows, strict=True):
-        states = ", ".join(f"{d['hook']}: {d['state']}" for d in row["deliveries"])  # type: ignore[attr-defined]
+        states = ", ".join(f"{each['hook']}: {each['state']}" for each in row["deliveries"])
         alert = stored.alert
-        made.add_row(str(alert.hanger), f"{alert.time:%Y-%m-%d}", alert.message, states or "none")
+        made.add_row(
+            str(stored.id),
+            str(alert.hanger),
+            f"{alert.time:%Y-%m-%d}",
+            alert.message,
+            states or "none",
+            acknowledgement_words(stored),
+        )
     show_table(made)
+
+
+def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any]:
+    return {
+        "id": stored.id,
+        "raised_at": stored.raised_at,
+        **acknowledgement_row(stored),
+        "alert": alert_document(stored.alert),
+        "deliveries": [
+            {
+                "hook": delivery.hook,
+                "state": delivery.state.value,
+                "attempts": delivery.attempts,
+                "last_error": delivery.last_error or None,
+            }
+            for delivery in deliveries
+            if delivery.alert.key == stored.alert.key
+        ],
+    }

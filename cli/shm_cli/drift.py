@@ -1,4 +1,4 @@
-"""`shm drift`: how far tension and end stiffness have moved from their baseline."""
+"""`shm drift`: how far tension and end stiffness have moved from their baseline, and setting it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.values import Drift
 from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
+from shm_cli.rebaseline import rebaseline
 
 
-@click.command()
+@click.group(invoke_without_command=True)
 @hanger_option()
 @click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
 @json_option
@@ -24,6 +25,8 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
     \b
     Example: shm drift --hanger 3 --all
     """
+    if ctx.invoked_subcommand is not None:
+        return
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
@@ -53,9 +56,14 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
     show_table(made)
 
 
+command.add_command(rebaseline)
+
+
 def _latest(drifts: tuple[Drift, ...]) -> list[Drift]:
-    newest = {(drift.hanger, drift.quantity): drift for drift in drifts}
-    return [newest[key] for key in sorted(newest)]
+    """Of each hanger's latest test: an earlier one may have been watched in another class."""
+    newest = {drift.hanger: drift.test for drift in drifts}
+    latest = [drift for drift in drifts if newest[drift.hanger] == drift.test]
+    return sorted(latest, key=lambda drift: drift.hanger)
 
 
 def _shift(drift: Drift, value: float) -> str:

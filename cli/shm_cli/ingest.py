@@ -20,7 +20,7 @@ from shm.values import Alert
 from shm_cli.common import counting_bar, json_option, open_workspace, show, show_table, table
 from shm_cli.peek import show_peeks
 from shm_daemon.execution import children_ended, process_pool
-from shm_daemon.hooks import CommandNotifier
+from shm_daemon.hooks import HookNotifier
 
 
 @click.command()
@@ -74,7 +74,7 @@ def _ingest(
     """Receipts of the files that could be taken in, rows of those that could not."""
     with workspace.lock(), workspace.store() as store, children_ended():
         settings = workspace.settings
-        notifier = CommandNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
         executor = process_pool(settings.workers)
         flow = Flow(workspace, store, executor, notifier=notifier, lanes=settings.workers)
         try:

@@ -95,7 +95,9 @@ def _take_workspace(command: click.Command) -> None:
     if isinstance(command, click.Group):
         for member in command.commands.values():
             _take_workspace(member)
-    elif not any(parameter.name == "workspace" for parameter in command.params):
+        if not command.invoke_without_command:
+            return
+    if not any(parameter.name == "workspace" for parameter in command.params):
         command.params.append(
             click.RichOption(
                 ["--workspace"],

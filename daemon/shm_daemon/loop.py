@@ -15,7 +15,7 @@ from shm.pipeline import Clock, Flow, Notifier, utc_now
 from shm.store import Workspace
 from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
 from shm_daemon.execution import children_ended, process_pool
-from shm_daemon.hooks import CommandNotifier
+from shm_daemon.hooks import HookNotifier
 from shm_daemon.spool import FileStabilityTracker, scan
 
 _RECEIVING_S = 1.0
@@ -48,7 +48,7 @@ def run(
         stack.enter_context(children_ended())
         if notifier is None:
             timeout_s = settings.hook_timeout_seconds
-            notifier = CommandNotifier(workspace.folder, timeout_s, os.environ)
+            notifier = HookNotifier(workspace.folder, timeout_s, os.environ)
             stack.callback(notifier.close)
         executor = make_executor(settings.workers)
         flow = Flow(

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
-from shm.bridge.description import Bridge, Disturbance, Hook, load_bridge, load_hanger
+from shm.bridge.description import Bridge, Disturbance, load_bridge, load_hanger
+from shm.bridge.hooks import AppriseHook, CommandHook, Hook, WebhookHook
 
-__all__ = ["Bridge", "Disturbance", "Hook", "load_bridge", "load_hanger"]
+__all__ = [
+    "AppriseHook",
+    "Bridge",
+    "CommandHook",
+    "Disturbance",
+    "Hook",
+    "WebhookHook",
+    "load_bridge",
+    "load_hanger",
+]

@@ -9,17 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from shm.bridge.hanger import hanger_of
+from shm.bridge.hooks import Hook, hook_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
 from shm.values import Hanger
-
-
-@dataclass(frozen=True)
-class Hook:
-    """A command run for each alert, which it gets as JSON on standard input; no shell."""
-
-    name: str
-    command: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,7 @@ def load_bridge(path: Path) -> Bridge:
     document = _parse(path)
     hangers = tuple(hanger_of(table, path) for table in _tables(document, "hanger", path))
     _refuse_doubles([hanger.id for hanger in hangers], "hanger id", path)
-    hooks = tuple(_hook(table, path) for table in _tables(document, "hook", path))
+    hooks = tuple(hook_of(table, path) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     return Bridge(
         name=str(document.get("bridge", {}).get("name", path.parent.name)),
@@ -113,18 +106,6 @@ def _refuse_doubles(keys: list[Any], what: str, path: Path) -> None:
     for key in keys:
         if keys.count(key) > 1:
             raise BadInput(f"{what} {key} is given twice.", file=path, remedy="Keep one of them.")
-
-
-def _hook(table: dict[str, Any], path: Path) -> Hook:
-    name, command = table.get("name"), table.get("command")
-    whole = isinstance(name, str) and name and isinstance(command, list) and command
-    if not whole or not all(isinstance(part, str) for part in command or ()):
-        raise BadInput(
-            "a [[hook]] needs a name and a command.",
-            file=path,
-            remedy='Write name = "mail" and command = ["/path/to/program", "argument"].',
-        )
-    return Hook(name=str(name), command=tuple(command or ()))
 
 
 def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:

@@ -5,6 +5,6 @@ wait, and `flow` begins them, keeps their results and refuses what fails.
 """
 
 from shm.pipeline.flow import Flow, utc_now
-from shm.pipeline.jobs import Clock, Notifier
+from shm.pipeline.jobs import Clock, DeliveryRefused, Notifier
 
-__all__ = ["Clock", "Flow", "Notifier", "utc_now"]
+__all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "utc_now"]

@@ -25,12 +25,11 @@ from typing import Any
 
 from shm.errors import ShmError, StoreError
 from shm.pipeline.intake import receive
-from shm.pipeline.jobs import Clock, Job, Jobs, Notifier, Step
+from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
 from shm.store import Delivery, Receipt, Store, StoredAlert, Workspace
 
-_COURIERS = 4
 _CRASHES = 2
 _LONGEST_S = 86400.0
 
@@ -73,7 +72,7 @@ class Flow:
         self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
         self.notifier, self.wake = notifier, wake
         self._running: dict[tuple[str, int], Running] = {}
-        self._couriers = ThreadPoolExecutor(_COURIERS, thread_name_prefix="hook")
+        self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
         self._crashes: Counter[int] = Counter()
         self._postponed: dict[int, datetime] = {}
         self.use(workspace)
@@ -121,8 +120,8 @@ class Flow:
 
     def _begin_deliveries(self) -> None:
         if self.notifier is not None:
-            ids = [run.job.delivery.id for run in self._running.values() if run.job.delivery]
-            for job in self.jobs.owed(self.notifier, _COURIERS - len(ids), ids):
+            under_way = [run.job.delivery for run in self._running.values() if run.job.delivery]
+            for job in self.jobs.owed(self.notifier, under_way):
                 self._begin(job, self._couriers)
 
     def _begin_steps(self) -> None:
@@ -204,10 +203,14 @@ class Flow:
             log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"])
 
     def _put_off(self, delivery: Delivery, error: BaseException) -> None:
-        """A delivery that failed is tried again, ever later, until it has failed too often."""
+        """A delivery that failed is tried again, ever later, until it has failed too often.
+
+        One that the hook refused is given up at once.
+        """
         settings, now = self.workspace.settings, self.clock()
         wait_s = settings.hook_backoff_seconds * 2.0**delivery.attempts
-        again = delivery.attempts + 1 < settings.hook_attempts
+        refused = isinstance(error, DeliveryRefused)
+        again = not refused and delivery.attempts + 1 < settings.hook_attempts
         next_attempt_at = now + timedelta(seconds=min(wait_s, _LONGEST_S)) if again else None
         self.store.delivery_failed(delivery, str(error), now, next_attempt_at)
         log.warning("hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,6 +14,7 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
 from shm.pipeline.terms import identify_lineage, update_terms
+from shm.pipeline.watching import dated_tests
 from shm.store import (
     Delivery,
     IdentifiedTest,
@@ -25,8 +26,15 @@ from shm.store import (
 )
 from shm.values import Alert, Hanger
 
+DELIVERIES = 16
+_DELIVERIES_A_HOOK = 4
+
 Clock = Callable[[], datetime]
-Notifier = Callable[[Hook, Alert], None]
+Notifier = Callable[[Hook, Alert], object]
+
+
+class DeliveryRefused(ShmError):
+    """A hook has said for good that it does not take an alert: no use in trying again."""
 
 
 def run_step(name: str, *arguments: Any) -> Any:
@@ -80,11 +88,20 @@ class Jobs:
             elif not received:
                 yield from self._first_tests(hanger, waiting[hanger.id])
 
-    def owed(self, notifier: Notifier, limit: int, excluding: Collection[int]) -> Iterator[Job]:
-        """Deliveries that are due."""
-        for delivery in self.store.due_deliveries(self.clock(), limit, excluding):
-            prepare = partial(self._deliver, notifier, delivery)
-            yield Job(("deliver", delivery.id), prepare, delivery=delivery)
+    def owed(self, notifier: Notifier, under_way: Sequence[Delivery]) -> Iterator[Job]:
+        """Deliveries that are due, as many as there is room for beside those `under_way`.
+
+        A hook that hangs takes no more than its own share of the room.
+        """
+        taken = Counter(delivery.hook for delivery in under_way)
+        if taken.total() >= DELIVERIES:
+            return
+        ids = [delivery.id for delivery in under_way]
+        for delivery in self.store.due_deliveries(self.clock(), 2 * DELIVERIES, ids):
+            if taken[delivery.hook] < _DELIVERIES_A_HOOK and taken.total() < DELIVERIES:
+                taken[delivery.hook] += 1
+                prepare = partial(self._deliver, notifier, delivery)
+                yield Job(("deliver", delivery.id), prepare, delivery=delivery)
 
     def _waiting_tests(self, held: Collection[int]) -> defaultdict[int, list[WaitingTest]]:
         waiting: defaultdict[int, list[WaitingTest]] = defaultdict(list)
@@ -152,11 +169,13 @@ class Jobs:
         test = self.store.test(waiting.id)
         current = self.store.posterior_of(test)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
-        baseline = self.store.baseline(hanger.id, current.model)
+        baseline = self.store.baseline(hanger.id, current.model, test.time)
         if baseline is None:
             raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        run = partial(run_step, "watch_test", baseline, current, hanger, test.test.id, test.time)
+        limit_years = self.workspace.settings.false_call_years
+        tests = dated_tests(self.store, baseline, test)
+        run = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
         return Step(
             run,
             lambda found: self.store.watched(

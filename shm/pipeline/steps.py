@@ -19,8 +19,8 @@ from shm.settings import Settings
 from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
 from shm.update import UpdateOptions, refresh, select, update
-from shm.values import Alert, Drift, Hanger, ModalTest, Posterior, Selection
-from shm.watch import assess, decide, joined, watch_gap
+from shm.values import Alert, Hanger, ModalTest, Posterior, Selection, WatchedTest
+from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_hanger
 
 
 def identify_file(
@@ -127,11 +127,21 @@ def update_test(
 
 
 def watch_test(
-    baseline: Baseline, current: Posterior, hanger: Hanger, test: str, time: datetime
-) -> tuple[tuple[Drift, ...], Alert | None]:
-    """How far a test lies from the baseline, and the alert that this calls for."""
-    drifts = assess(baseline.posterior, current, hanger, test=test, time=time)
-    gap = watch_gap(baseline.posterior, current, hanger, test=test, time=time)
-    alert = joined(decide(drifts, hanger.thresholds), gap)
+    baseline: Baseline,
+    tests: tuple[Sequence[DatedTest], Sequence[DatedTest]],
+    current: Posterior,
+    hanger: Hanger,
+    limit_years: float,
+) -> tuple[WatchedTest, Alert | None]:
+    """What the watch says after a test, and the alert that it calls for.
+
+    `tests` are those of the baseline and those since, the last of which is the one in question.
+    """
+    since_baseline, later = tests
+    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
+    watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
+    test, time = later[-1]
+    gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
+    alert = joined(watched.alert(hanger), gap)
     # A new baseline makes a standing condition a new one.
-    return drifts, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")
+    return watched.latest, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")

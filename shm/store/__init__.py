@@ -4,6 +4,7 @@ from shm.store.archive import Archive, Quarantine
 from shm.store.export import samples_npz, samples_table
 from shm.store.queries import WaitingTest
 from shm.store.rows import (
+    Acknowledgement,
     Adoption,
     Baseline,
     Delivery,
@@ -22,11 +23,13 @@ from shm.store.rows import (
     StoredRecording,
     StoredSelection,
     StoredTest,
+    StoredWatch,
 )
 from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
+    "Acknowledgement",
     "Adoption",
     "Archive",
     "Baseline",
@@ -48,6 +51,7 @@ __all__ = [
     "StoredRecording",
     "StoredSelection",
     "StoredTest",
+    "StoredWatch",
     "WaitingTest",
     "Workspace",
     "samples_npz",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from datetime import datetime
+from typing import Any, cast
 
 import numpy as np
 
@@ -13,14 +14,18 @@ from shm.documents import MODES_SCHEMA, parse_modes, parse_time
 from shm.values import (
     NAN,
     Alert,
+    AlertKind,
+    Change,
     Drift,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
+    Moved,
     Posterior,
     PredictedFrequency,
     QualityCheck,
     ResponsePoint,
+    WatchedTest,
 )
 
 _POSTERIOR_PLAIN = ("model", "hanger", "seed", "evaluations")
@@ -144,12 +149,48 @@ def _number(value: float | None) -> float:
 
 
 def alert_from_document(document: Mapping[str, Any]) -> Alert:
-    """An alert back from its document."""
+    """An alert back from its document; one of the first schemas has no kinds and no change."""
+    change = document.get("change")
     return Alert(
         **{name: document[name] for name in ("key", "hanger", "test", "message")},
         time=parse_time(document["time"]),
         drifts=tuple(_drift(entry) for entry in document["drifts"]),
+        kinds=cast(tuple[AlertKind, ...], tuple(document.get("kinds", ()))),
+        change=None if change is None else _change(change),
     )
+
+
+def watch_document(watched: WatchedTest) -> dict[str, Any]:
+    """What the sequential test says after a test; its drifts are kept by themselves."""
+    return {"temperature_c": watched.temperature_c, "change": asdict(watched.change)}
+
+
+def watch_from(
+    document: Mapping[str, Any], test: str, time: datetime, drifts: Sequence[Drift]
+) -> WatchedTest:
+    """The watch after a test back from its document and its drifts."""
+    return WatchedTest(
+        test=test,
+        time=time,
+        temperature_c=_number(document["temperature_c"]),
+        drifts=tuple(drifts),
+        change=_change(document["change"]),
+    )
+
+
+def _change(entry: Mapping[str, Any]) -> Change:
+    numbers = {name: _number(entry[name]) for name in _CHANGE_NUMBERS}
+    return Change(
+        began_after=parse_time(entry["began_after"]),
+        began_by=parse_time(entry["began_by"]),
+        moved=tuple(_moved(each) for each in entry["moved"]),
+        **numbers,
+    )
+
+
+def _moved(entry: Mapping[str, Any]) -> Moved:
+    numbers = {name: _number(entry[name]) for name in _MOVED_NUMBERS}
+    return Moved(**{**entry, **numbers, "alike": tuple(entry["alike"])})
 
 
 def _drift(entry: Mapping[str, Any]) -> Drift:
@@ -158,4 +199,12 @@ def _drift(entry: Mapping[str, Any]) -> Drift:
     return Drift(**{**values, **numbers, "time": parse_time(entry["time"])})
 
 
+_CHANGE_NUMBERS = (
+    "evidence_years",
+    "limit_years",
+    "probability",
+    "sudden",
+    "outlier_probability",
+)
+_MOVED_NUMBERS = ("probability", "shift_mean", "shift_sd")
 _DRIFT_NUMBERS = ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")

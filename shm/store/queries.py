@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
@@ -42,9 +43,13 @@ _undone = adoptions.c.undone_at.is_not(None)
 _undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
-# holds, or it was adopted and that was undone.
-_hidden = sa.select(selection_entries.c.posterior_id).where(
-    (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
+# holds, or it was adopted and that was undone. And those of baselines set anew: their tests have
+# a posterior each, which must still show what moved between them.
+_hidden = sa.union(
+    sa.select(selection_entries.c.posterior_id).where(
+        (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
+    ),
+    sa.select(baselines.c.posterior_id).where(baselines.c.since.is_not(None)),
 )
 
 
@@ -165,8 +170,13 @@ class Queries(Database):
         with self.reading() as connection:
             return {row.hanger: row.model for row in connection.execute(in_force)}
 
-    def baseline(self, hanger: int, model: str | None = None) -> Baseline | None:
-        """The baseline in force, or the last that was in force of one class, with its posterior."""
+    def baseline(
+        self, hanger: int, model: str | None = None, time: datetime | None = None
+    ) -> Baseline | None:
+        """The baseline in force, or the last that was in force of one class, with its posterior.
+
+        With `time` it is that for a test of then: a baseline set anew is none for earlier tests.
+        """
         query = (
             sa.select(posteriors, *(baselines.c[name].label(f"b_{name}") for name in _BASELINE))
             .join(baselines)
@@ -174,22 +184,24 @@ class Queries(Database):
             .order_by(baselines.c.id.desc())
             .limit(1)
         )
-        if model is None:
-            query = query.where(baselines.c.id.not_in(_undone_baselines))
-        else:
-            query = query.where(posteriors.c.model == model)
+        query = query.where(_in_force(hanger) if model is None else posteriors.c.model == model)
+        if time is not None:
+            query = query.where(baselines.c.since.is_(None) | (baselines.c.since <= time))
         with self.reading() as connection:
             row = connection.execute(query).one_or_none()
-        if row is None:
-            return None
-        return Baseline(row.b_id, hanger, _posterior(row), row.b_set_at, row.b_who, row.b_why)
+        return None if row is None else _baseline(row, hanger)
 
     def _tests(self, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
         with self.reading() as connection:
             return tuple(_test(row) for row in connection.execute(query))
 
 
-_BASELINE = ("id", "set_at", "who", "why")
+_BASELINE = ("id", "set_at", "who", "why", "since")
+
+
+def _baseline(row: Row[Any], hanger: int) -> Baseline:
+    values = {name: getattr(row, f"b_{name}") for name in _BASELINE}
+    return Baseline(hanger=hanger, posterior=_posterior(row), **values)
 
 
 def selection_in_force(hanger: int) -> sa.Select[Any]:
@@ -198,6 +210,18 @@ def selection_in_force(hanger: int) -> sa.Select[Any]:
         selections.c.hanger == hanger, selections.c.id.not_in(_undone_selections)
     )
     return query.order_by(selections.c.id.desc()).limit(1)
+
+
+def _in_force(hanger: int) -> sa.ColumnElement[bool]:
+    """Which baselines count: those of the class in force, unless their adoption was undone."""
+    model = sa.select(selection_in_force(hanger).subquery().c.model).scalar_subquery()
+    return baselines.c.id.not_in(_undone_baselines) & (posteriors.c.model == model)
+
+
+def baseline_in_force(hanger: int) -> sa.Select[Any]:
+    """The number of the newest baseline of a hanger in the class in force."""
+    query = sa.select(baselines.c.id).join(posteriors).where(baselines.c.hanger == hanger)
+    return query.where(_in_force(hanger)).order_by(baselines.c.id.desc()).limit(1)
 
 
 def _of_test(name: str) -> sa.Select[Any]:

@@ -204,8 +204,14 @@ def insert_selection(
 
 
 def insert_baseline(
-    connection: Connection, hanger: int, posterior_id: int, who: str, why: str, at: datetime
+    connection: Connection,
+    hanger: int,
+    posterior_id: int,
+    who: str,
+    why: str,
+    at: datetime,
+    since: datetime | None = None,
 ) -> int:
     """Keeps what later tests are compared with; its number."""
-    row = {"hanger": hanger, "posterior_id": posterior_id, "set_at": at, "who": who, "why": why}
-    return insert(connection, baselines, row)
+    row = {"hanger": hanger, "posterior_id": posterior_id, "who": who, "why": why}
+    return insert(connection, baselines, {**row, "set_at": at, "since": since})

@@ -21,6 +21,7 @@ from shm.values import (
     Posterior,
     QualityCheck,
     Selection,
+    WatchedTest,
 )
 
 
@@ -164,7 +165,11 @@ class StoredSelection:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """The posterior that later tests of a hanger are compared with; who set it, when and why."""
+    """The posterior that later tests of a hanger are compared with; who set it, when and why.
+
+    `since` is the time from which on its tests were taken, where a person had the hanger compared
+    with itself anew; tests before it belong to the baseline before.
+    """
 
     id: int
     hanger: int
@@ -172,6 +177,7 @@ class Baseline:
     set_at: datetime
     who: str
     why: str
+    since: datetime | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,13 +224,34 @@ class StoredAdoption:
     undone_who: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class StoredWatch:
+    """What the watch said after a test, and the baseline it was compared with."""
+
+    id: int
+    hanger: int
+    baseline_id: int
+    watched: WatchedTest
+
+
+@dataclass(frozen=True)
+class Acknowledgement:
+    """Who has taken note of an alert, when, and what they say to it."""
+
+    alert_id: int
+    who: str
+    why: str
+    at: datetime
+
+
 @dataclass(frozen=True)
 class StoredAlert:
-    """An alert and when it was raised."""
+    """An alert and when it was raised; it is open while nobody has acknowledged it."""
 
     id: int
     alert: Alert
     raised_at: datetime
+    acknowledgement: Acknowledgement | None = None
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Self
 
 from shm.errors import NothingThere
 from shm.store import schema
+from shm.store.acknowledging import Acknowledging
 from shm.store.adopting import Adopting
 from shm.store.database import make_engine
 from shm.store.files import Files
@@ -16,7 +17,7 @@ from shm.store.results import Results
 from shm.store.watching import Watching
 
 
-class Store(Files, Results, Queries, Watching, Adopting):
+class Store(Files, Results, Queries, Watching, Acknowledging, Adopting):
     """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
 
     @classmethod

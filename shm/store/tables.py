@@ -6,7 +6,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0003"
+SCHEMA = "0004"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -124,8 +124,9 @@ selection_entries = sa.Table(
     sa.Column("probability", Number),
 )
 
-# What later tests of a hanger are compared with; the newest row of a hanger holds, unless it came
-# with an adoption that was undone.
+# What later tests of a hanger are compared with; the newest row of a hanger in its class holds,
+# unless it came with an adoption that was undone. `since` is the day from which on a person had the
+# hanger compared with itself anew; empty of the first baseline, and of those that were adopted.
 baselines = sa.Table(
     "baselines",
     metadata,
@@ -135,6 +136,7 @@ baselines = sa.Table(
     sa.Column("set_at", UtcTime, nullable=False),
     sa.Column("who", sa.Text, nullable=False),
     sa.Column("why", sa.Text, nullable=False),
+    sa.Column("since", UtcTime),
 )
 
 drifts = sa.Table(
@@ -153,6 +155,19 @@ drifts = sa.Table(
     sa.UniqueConstraint("test_id", "baseline_id", "quantity"),
 )
 
+# What the sequential test says after one test; the shifts of the quantities stand in `drifts`.
+watches = sa.Table(
+    "watches",
+    metadata,
+    _id(),
+    _to("tests"),
+    _to("baselines"),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("time", UtcTime, nullable=False),
+    sa.Column("document", Document, nullable=False),
+    sa.UniqueConstraint("test_id", "baseline_id"),
+)
+
 alerts = sa.Table(
     "alerts",
     metadata,
@@ -165,6 +180,17 @@ alerts = sa.Table(
     sa.Column("raised_at", UtcTime, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
     sa.Column("document", Document, nullable=False),
+)
+
+# Who has taken note of an alert, when, and what they say to it: once an alert.
+acknowledgements = sa.Table(
+    "acknowledgements",
+    metadata,
+    _id(),
+    sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
 )
 
 # The outbox: what has yet to be told to which hook, and how that went.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import fields
 from datetime import datetime
@@ -11,15 +12,27 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document
-from shm.store.blobs import alert_from_document
+from shm.store.blobs import alert_from_document, watch_document, watch_from
 from shm.store.database import Database, insert
 from shm.store.results import all_at, move
-from shm.store.rows import Baseline, Delivery, DeliveryState, Stage, StoredAlert, StoredTest
-from shm.store.tables import alerts, deliveries, drifts, tests
-from shm.values import Alert, Drift
+from shm.store.rows import (
+    Acknowledgement,
+    Baseline,
+    Delivery,
+    DeliveryState,
+    Stage,
+    StoredAlert,
+    StoredTest,
+    StoredWatch,
+)
+from shm.store.tables import acknowledgements, alerts, deliveries, drifts, tests, watches
+from shm.values import Alert, Drift, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
 _outbox = sa.select(deliveries, alerts.c.document).join(alerts)
+stored_alerts = sa.select(
+    alerts, *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at"))
+).outerjoin(acknowledgements)
 
 
 class Watching(Database):
@@ -29,7 +42,7 @@ class Watching(Database):
         self,
         test: StoredTest,
         baseline: Baseline,
-        shifts: Sequence[Drift],
+        found: WatchedTest,
         alert: Alert | None,
         hooks: Sequence[str],
         at: datetime,
@@ -41,8 +54,9 @@ class Watching(Database):
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
                 return None
-            for drift in shifts:
+            for drift in found.drifts:
                 insert(connection, drifts, _drift_values(drift, test, baseline))
+            insert(connection, watches, _watch_values(found, test, baseline))
             move(connection, [test], Stage.WATCHED)
             if alert is None or _is_raised(connection, alert):
                 return None
@@ -57,16 +71,34 @@ class Watching(Database):
             query = query.where(tests.c.name == test)
         with self.reading() as connection:
             rows = connection.execute(query.order_by(drifts.c.time, drifts.c.id)).all()
-        return tuple(Drift(test=r.test, **{n: getattr(r, n) for n in _DRIFT_COLUMNS}) for r in rows)
+        return tuple(_drift(row) for row in rows)
+
+    def watches(
+        self, hanger: int | None = None, baseline_id: int | None = None
+    ) -> tuple[StoredWatch, ...]:
+        """What the watch said after each test, by time; of one hanger or baseline where named."""
+        query = sa.select(watches, tests.c.name.label("test")).join(tests)
+        shifts = sa.select(drifts, tests.c.name.label("test")).join(tests).order_by(drifts.c.id)
+        if hanger is not None:
+            query = query.where(watches.c.hanger == hanger)
+            shifts = shifts.where(drifts.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(watches.c.baseline_id == baseline_id)
+            shifts = shifts.where(drifts.c.baseline_id == baseline_id)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
+            found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
+            for row in connection.execute(shifts):
+                found[row.test_id, row.baseline_id].append(_drift(row))
+        return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
 
     def alerts(self, hanger: int | None = None) -> tuple[StoredAlert, ...]:
-        """All alerts, or those of one hanger, as they were raised."""
-        query = sa.select(alerts).order_by(alerts.c.id)
+        """All alerts, or those of one hanger, as they were raised and acknowledged."""
+        query = stored_alerts.order_by(alerts.c.id)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
         with self.reading() as connection:
-            rows = connection.execute(query).all()
-        return tuple(StoredAlert(r.id, alert_from_document(r.document), r.raised_at) for r in rows)
+            return tuple(stored_alert(row) for row in connection.execute(query))
 
     def deliveries(self, state: DeliveryState | None = None) -> tuple[Delivery, ...]:
         """The outbox: what was told to which hook, or is still owed."""
@@ -152,6 +184,33 @@ def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
 def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
     values = {name: getattr(drift, name) for name in _DRIFT_COLUMNS}
     return {**values, "test_id": test.id, "baseline_id": baseline.id}
+
+
+def _drift(row: Row[Any]) -> Drift:
+    return Drift(test=row.test, **{name: getattr(row, name) for name in _DRIFT_COLUMNS})
+
+
+def _watch_values(found: WatchedTest, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
+    return {
+        "test_id": test.id,
+        "baseline_id": baseline.id,
+        "hanger": test.hanger,
+        "time": found.time,
+        "document": watch_document(found),
+    }
+
+
+def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
+    found = watch_from(row.document, row.test, row.time, shifts)
+    return StoredWatch(row.id, row.hanger, row.baseline_id, found)
+
+
+def stored_alert(row: Row[Any]) -> StoredAlert:
+    """An alert and its acknowledgement, of a row of `stored_alerts`."""
+    noted = None
+    if row.ack_at is not None:
+        noted = Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
+    return StoredAlert(row.id, alert_from_document(row.document), row.raised_at, noted)
 
 
 def _delivery(row: Row[Any]) -> Delivery:

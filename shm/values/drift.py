@@ -15,10 +15,13 @@ TENSION = "tension"
 
 @dataclass(frozen=True, eq=False)
 class WatchedQuantity:
-    """One thing that may move: the tension, or a spring of the model class.
+    """One thing that may move: the tension, or the stiffness of an end in the model class.
 
-    `name` is `tension` or that of the parameter, such as `log10_k1`; `end` and `plane` say where a
-    spring acts, None where they do not tell it apart. The watch works in a `coordinate` in which
+    `name` is `tension` or that of a spring's parameter, such as `log10_k1`; `end` and `plane` say
+    where it acts, None where they do not tell it apart. Where frequencies cannot say which end of a
+    plane moves, both are one quantity, `transverse_end_stiffness` for instance: that of two springs
+    alike, 2/(1/k_deck + 1/k_arch), both of which move by the same decades. `parameters` are those
+    of the model class that move. The watch works in a `coordinate` in which
     frequencies change nearly linearly, 0 at the baseline: of the tension the logarithm of its ratio
     to the baseline's; of a spring the change of the mean log frequency. `coordinates` (m,),
     ascending, and `values` (m,) map it to the tension in N or to log10 of the stiffness; `baseline`
@@ -33,6 +36,7 @@ class WatchedQuantity:
     step_sd: float
     end: End | None = None
     plane: Plane | None = None
+    parameters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

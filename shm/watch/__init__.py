@@ -1,16 +1,20 @@
-"""Watching a hanger: how far tension, end stiffness and gap have moved, and when to say so."""
+"""Watching a hanger: what has moved over time, since when, how far, and when to say so."""
 
 from __future__ import annotations
 
-from shm.watch.drift import assess, decide, end_stiffness
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
+from shm.watch.options import WatchOptions
+from shm.watch.stiffness import end_stiffness
+from shm.watch.watching import DatedTest, Watched, watch_hanger
 
 __all__ = [
-    "assess",
-    "decide",
+    "DatedTest",
+    "WatchOptions",
+    "Watched",
     "end_stiffness",
     "gap_percent",
     "has_grown",
     "joined",
     "watch_gap",
+    "watch_hanger",
 ]

@@ -53,6 +53,7 @@ def watch_gap(
         f"{now:.2f} % off the measured ones, {before:.2f} % when it was adopted: its effects do "
         f"not describe this test. Diagnose the gap again.",
         drifts=(),
+        kinds=("gap",),
     )
 
 
@@ -61,4 +62,5 @@ def joined(first: Alert | None, second: Alert | None) -> Alert | None:
     if first is None or second is None:
         return first or second
     key = f"{first.key}:{second.key.partition(':')[2]}"
-    return replace(first, key=key, message=f"{first.message} {second.message}")
+    message = f"{first.message} {second.message}"
+    return replace(first, key=key, message=message, kinds=(*first.kinds, *second.kinds))

@@ -1,4 +1,4 @@
-"""Hooks: a fixed command, JSON on standard input, a bare environment, a time limit."""
+"""Command hooks: a fixed command, JSON on standard input, a bare environment, a time limit."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from shm.bridge import Hook
-from shm_daemon import CommandNotifier, HookFailed
+from shm.bridge import CommandHook
+from shm_daemon import HookFailed, HookNotifier
 from tests.helpers.nouns import an_alert
 
 ENVIRONMENT = {"PATH": os.environ["PATH"], "HOME": "/home/owner", "SHM_SECRET": "token"}
 
 
-def python(code: str, *arguments: str) -> Hook:
-    return Hook("mail", (sys.executable, "-c", code, *arguments))
+def python(code: str, *arguments: str) -> CommandHook:
+    return CommandHook("mail", (sys.executable, "-c", code, *arguments))
 
 
-def a_notifier(tmp_path: Path, timeout_s: float = 20.0) -> CommandNotifier:
-    return CommandNotifier(tmp_path, timeout_s, ENVIRONMENT)
+def a_notifier(tmp_path: Path, timeout_s: float = 20.0) -> HookNotifier:
+    return HookNotifier(tmp_path, timeout_s, ENVIRONMENT)
 
 
 def test_a_hook_gets_the_alert_on_its_standard_input(tmp_path: Path) -> None:
@@ -72,11 +72,19 @@ def test_a_talkative_hook_does_not_fill_the_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("command", [("/no/such/program",), ("/",)])
 def test_a_hook_that_cannot_be_run_says_so(tmp_path: Path, command: tuple[str, ...]) -> None:
     with pytest.raises(HookFailed, match="cannot be run"):
-        a_notifier(tmp_path)(Hook("mail", command), an_alert())
+        a_notifier(tmp_path)(CommandHook("mail", command), an_alert())
+
+
+def test_what_a_hook_answers_is_told(tmp_path: Path) -> None:
+    notifier = a_notifier(tmp_path)
+    assert notifier(python("print('sent\\nto 3 people\\x1b[0m')"), an_alert()) == (
+        "exit code 0: sent to 3 people [0m"
+    )
+    assert notifier(python("pass"), an_alert()) == "exit code 0"
 
 
 def test_a_hook_that_does_not_listen_has_not_failed(tmp_path: Path) -> None:
-    a_notifier(tmp_path)(Hook("mail", ("true",)), an_alert())
+    a_notifier(tmp_path)(CommandHook("mail", ("true",)), an_alert())
 
 
 def test_a_hook_that_hangs_is_ended_with_all_its_children(tmp_path: Path) -> None:
@@ -109,7 +117,7 @@ def test_closing_ends_running_hooks_and_begins_no_more(tmp_path: Path) -> None:
     assert not thread.is_alive()
     assert "exit code -9" in failures[0]
     with pytest.raises(HookFailed, match="ending"):
-        notifier(Hook("mail", ("true",)), an_alert())
+        notifier(CommandHook("mail", ("true",)), an_alert())
 
 
 def is_gone(pid: int) -> bool:

@@ -9,16 +9,19 @@ import numpy as np
 from shm.store import ReceivedFile
 from shm.values import (
     Alert,
+    Change,
     Drift,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
     Mode,
+    Moved,
     Posterior,
     PredictedFrequency,
     QualityCheck,
     ResponsePoint,
     ShapePoint,
+    WatchedTest,
 )
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
@@ -106,6 +109,26 @@ def a_response(points: int = 2, lines: int = 5) -> FrequencyResponse:
 
 def a_drift(test: str = "t2", probability: float = 0.99) -> Drift:
     return Drift(3, test, NOW, "tension", 711e3, 650e3, -0.08, 0.01, 0.05, probability)
+
+
+def a_change(**changes: object) -> Change:
+    deck = Moved("log10_k1", 0.3, -0.2, 0.1, "deck", "transverse", ("tension",))
+    values: dict[str, object] = {
+        "evidence_years": 350.0,
+        "limit_years": 100.0,
+        "probability": 0.98,
+        "sudden": 0.9,
+        "began_after": NOW - timedelta(days=9),
+        "began_by": NOW,
+        "moved": (Moved("tension", 0.7, -0.08, 0.01, alike=("log10_k1",)), deck),
+        "outlier_probability": 0.01,
+        **changes,
+    }
+    return Change(**values)  # type: ignore[arg-type]
+
+
+def a_watched_test(test: str = "t2", **changes: object) -> WatchedTest:
+    return WatchedTest(test, NOW, 11.5, (a_drift(test),), a_change(**changes))
 
 
 def an_alert(key: str = "hanger-3:tension-down", test: str = "t2") -> Alert:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sqlite3
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -17,13 +18,14 @@ from shm.values import Selection
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import (
     NOW,
+    a_change,
     a_check,
-    a_drift,
     a_file,
     a_foreign_mode,
     a_posterior,
     a_response,
     a_test,
+    a_watched_test,
     an_alert,
 )
 
@@ -32,7 +34,8 @@ ADOPTED = "beam1+point_mass@everywhere"
 
 
 def fill(store: Store) -> None:
-    """Two tests with results, one refused file, one twice, an alert, a dropped adoption."""
+    """Two tests with results, one refused file, one twice, an alert that was acknowledged, a
+    dropped adoption, a baseline set anew."""
     for number in (1, 2, 3):
         store.receive(a_file(number), NOW)
     store.receive(a_file(1, arrival="again"), NOW)
@@ -52,7 +55,9 @@ def fill(store: Store) -> None:
     store.updated(second, a_posterior("beam1", ("t2",), seed=8), LINEAGE, NOW)
     baseline = store.baseline(3)
     assert baseline is not None
-    store.watched(second, baseline, [a_drift()], an_alert(), ["mail"], NOW)
+    alert = replace(an_alert(), kinds=("beyond threshold",), change=a_change())
+    store.watched(second, baseline, a_watched_test(), alert, ["mail"], NOW)
+    store.acknowledge(1, "engineer", "looked at the pin", NOW)
     store.add_diagnosis(3, a_diagnosis(), LINEAGE, NOW)
     before = store.selection(3)
     assert before is not None
@@ -61,6 +66,9 @@ def fill(store: Store) -> None:
     posterior = a_posterior(ADOPTED)
     made = store.adopt(adoption, posterior, probabilities, (before, [first]), LINEAGE, NOW)
     store.drop_adoption(made.id, "the lamp is gone", "engineer", NOW)
+    record = ("engineer", "new pin", second.time)
+    joint = a_posterior("beam1", ("t2",), seed=9)
+    store.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
 
 
 def main() -> None:

@@ -14,9 +14,10 @@ from alembic.script import ScriptDirectory
 
 from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store import Stage, Store
+from shm.store import Acknowledgement, Stage, Store
 from shm.store.database import make_engine
 from shm.store.tables import SCHEMA, metadata
+from tests.helpers.nouns import NOW, a_change
 
 RELEASED = sorted(Path(__file__).parent.glob("data/schema_*.db"))
 
@@ -61,6 +62,39 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
         assert [stored.alert.key for stored in store.alerts()] == ["hanger-3:tension-down"]
         assert [delivery.hook for delivery in store.deliveries()] == ["mail"]
         assert [event.kind for event in store.events()] == ["duplicate", "refused"]
+
+
+def test_a_database_of_before_the_watch_has_alerts_open_and_its_first_baseline(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(RELEASED[2], path)
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        (stored,) = store.alerts()
+        assert (stored.alert.kinds, stored.alert.change) == ((), None)
+        assert stored.acknowledgement is None
+        assert store.watches() == ()
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert (baseline.since, baseline.posterior.tests) == (None, ("t1",))
+
+
+def test_the_watch_of_a_released_database_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(RELEASED[3], path)
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        (stored,) = store.alerts()
+        assert stored.alert.kinds == ("beyond threshold",)
+        assert stored.alert.change == a_change()
+        assert stored.acknowledgement == Acknowledgement(1, "engineer", "looked at the pin", NOW)
+        (watch,) = store.watches(3)
+        assert watch.watched.change == a_change()
+        assert [drift.quantity for drift in watch.watched.drifts] == ["tension"]
+        baseline = store.baseline(3)
+        assert baseline is not None
+        assert (baseline.why, baseline.posterior.tests) == ("new pin", ("t2",))
 
 
 @pytest.mark.parametrize("version", ["0000", None])

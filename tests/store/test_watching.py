@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
@@ -18,7 +19,16 @@ from shm.store import (
     StoredTest,
 )
 from shm.values import Alert, Drift, Selection
-from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, an_alert
+from tests.helpers.nouns import (
+    NOW,
+    a_change,
+    a_drift,
+    a_file,
+    a_posterior,
+    a_test,
+    a_watched_test,
+    an_alert,
+)
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
@@ -40,7 +50,7 @@ def updated(store: Store) -> list[StoredTest]:
 def watch(
     store: Store, test: StoredTest, alert: Alert | None = None, *hooks: str
 ) -> StoredAlert | None:
-    return store.watched(test, baseline(store), [a_drift(test.test.id)], alert, hooks, NOW)
+    return store.watched(test, baseline(store), a_watched_test(test.test.id), alert, hooks, NOW)
 
 
 def baseline(store: Store) -> Baseline:
@@ -125,10 +135,57 @@ def test_an_ended_delivery_is_not_due_again(store: Store, updated: list[StoredTe
     assert (given_up.hook, given_up.last_error) == ("siren", "no such program")
 
 
+def test_what_the_watch_said_comes_back_as_it_was(store: Store, updated: list[StoredTest]) -> None:
+    said = a_watched_test("t1")
+    store.watched(updated[0], baseline(store), said, None, [], NOW)
+    (kept,) = store.watches(3)
+    assert vars(kept.watched) == vars(said)
+    assert (kept.hanger, kept.baseline_id) == (3, baseline(store).id)
+    assert store.drifts(3) == said.drifts
+    assert store.watches(4) == store.watches(3, baseline_id=99) == ()
+
+
+def test_what_the_watch_did_not_know_comes_back_unknown(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    nan = float("nan")
+    said = replace(a_watched_test("t1", sudden=nan, moved=()), temperature_c=nan)
+    store.watched(updated[0], baseline(store), said, None, [], NOW)
+    (kept,) = store.watches()
+    assert repr(kept.watched) == repr(said)
+
+
+def test_watches_come_by_time_and_each_with_its_own_shifts(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    for test, hours in zip(updated, (2, 1, 3), strict=True):
+        name, time = test.test.id, NOW + timedelta(hours=hours)
+        shifts = (a_drift(name), replace(a_drift(name), quantity="log10_k1"))
+        said = replace(a_watched_test(name), time=time, drifts=shifts)
+        store.watched(test, baseline(store), said, None, [], NOW)
+    found = [each.watched for each in store.watches(3, baseline(store).id)]
+    assert [each.test for each in found] == ["t2", "t1", "t3"]
+    assert [[drift.test for drift in each.drifts] for each in found] == [
+        ["t2", "t2"], ["t1", "t1"], ["t3", "t3"],
+    ]  # fmt: skip
+
+
+def test_an_alert_keeps_its_kinds_and_the_change_behind_it(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    alert = replace(an_alert(test="t1"), kinds=("slow drift",), change=a_change())
+    watch(store, updated[0], alert, "mail")
+    (stored,) = store.alerts()
+    (delivery,) = store.deliveries()
+    assert stored.alert == delivery.alert == alert
+
+
 def test_unknown_numbers_of_a_drift_come_back_unknown(
     store: Store, updated: list[StoredTest]
 ) -> None:
     nan = float("nan")
     drift = Drift(3, "t1", NOW, "tension", nan, 1.0, nan, 0.0, 0.05, nan)
-    store.watched(updated[0], baseline(store), [drift], None, [], NOW)
+    store.watched(
+        updated[0], baseline(store), replace(a_watched_test(), drifts=(drift,)), None, [], NOW
+    )
     assert repr(store.drifts(3)) == repr((drift,))

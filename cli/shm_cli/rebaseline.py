@@ -1,0 +1,74 @@
+"""`shm drift rebaseline`: a hanger is compared with itself as it is since some day."""
+
+from __future__ import annotations
+
+import getpass
+from datetime import UTC, datetime
+
+import rich_click as click
+
+from shm.pipeline import utc_now
+from shm.pipeline.rebaselining import Order
+from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
+from shm.store import Baseline
+from shm_cli.common import hanger_option, json_option, opened_store, progress_bar, show
+
+_FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
+
+
+@click.command()
+@hanger_option(required=True)
+@click.option(
+    "--since",
+    type=click.DateTime(_FORMATS),
+    required=True,
+    metavar="DAY",
+    help="The first day (UTC) whose tests count, such as 2026-05-01.",
+)
+@click.option("--why", required=True, help="For the record.")
+@click.option("--who", show_default="the user's name", help="For the record.")
+@json_option
+@click.pass_context
+def rebaseline(
+    ctx: click.Context, hanger_id: int, since: datetime, why: str, who: str | None, as_json: bool
+) -> None:
+    """Compare a hanger with itself as it is since some day.
+
+    After works on it, or once a shift was looked into and accepted. The tests since that day are
+    updated jointly in the hanger's class; that is its baseline, and tests taken in later are
+    watched against it. What was compared with the old baseline stays on record, and so do its
+    alerts.
+
+    \b
+    Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"
+    """
+    order = Order(since.replace(tzinfo=UTC), why, who or getpass.getuser())
+    with opened_store(ctx) as (workspace, store):
+        hanger = workspace.bridge.hanger(hanger_id)
+        with progress_bar("updating") as progress:
+            made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
+    if as_json:
+        show(_document(made))
+        return
+    tension = made.posterior.tension_n / 1e3
+    count = len(made.posterior.tests)
+    tests = "one test" if count == 1 else f"{count} tests"
+    click.echo(
+        f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
+        f"{tension.mean():.4g} kN (sd {tension.std(ddof=1):.2g} kN)."
+    )
+
+
+def _document(made: Baseline) -> dict[str, object]:
+    tension = made.posterior.tension_n
+    return {
+        "id": made.id,
+        "hanger": made.hanger,
+        "since": made.since,
+        "set_at": made.set_at,
+        "who": made.who,
+        "why": made.why,
+        "model": made.posterior.model,
+        "tests": list(made.posterior.tests),
+        "tension_n": {"mean": float(tension.mean()), "sd": float(tension.std(ddof=1))},
+    }

@@ -1,0 +1,81 @@
+"""A hook that is mail, chat or a pager, by the library apprise, in a process of its own.
+
+The library has no time limit that holds for all services and cannot be broken off; a process can.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from shm.bridge import AppriseHook
+from shm.bridge.hooks import apprise_scheme
+from shm.values import Alert
+from shm_daemon.hooks.contract import HookFailed, Surroundings, one_line
+from shm_daemon.hooks.processes import Processes
+
+_SENDER = Path(__file__).with_name("apprise_sender.py")
+_TITLE = "shm: hanger {0.hanger}"
+_TEST_TITLE = "shm: test of a hook"
+
+
+class AppriseDeliverer:
+    """Sends each alert to all addresses of the hook; it is delivered when each of them took it."""
+
+    def __init__(self, surroundings: Surroundings):
+        self._folder = surroundings.folder
+        self._processes = Processes(surroundings)
+
+    def __call__(self, hook: AppriseHook, alert: Alert) -> str:
+        """Sends the alert; raises HookFailed naming the services that did not take it."""
+        addresses = hook.addresses or self._addresses(hook)
+        schemes = [_allowed(address) for address in addresses]
+        if find_spec("apprise") is None:
+            raise HookFailed(
+                "the library apprise is not installed.", remedy="Run `pip install 'shm[alerts]'`."
+            )
+        # By standard input, as arguments are seen by everyone on the machine. -P: this folder
+        # holds a module of the library's name.
+        command = [sys.executable, "-P", str(_SENDER)]
+        self._processes.run(command, _told(alert, addresses), {})
+        return f"taken by {', '.join(schemes)}"
+
+    def close(self) -> None:
+        self._processes.close()
+
+    def _addresses(self, hook: AppriseHook) -> tuple[str, ...]:
+        try:
+            text = (self._folder / hook.address_file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "not a text"
+            raise HookFailed(
+                f"{hook.address_file} cannot be read: {reason}.",
+                remedy="Make it a text that the user who runs the daemon can read.",
+            ) from None
+        lines = (line.strip() for line in text.splitlines())
+        found = tuple(line for line in lines if line and not line.startswith("#"))
+        if not found:
+            raise HookFailed(f"{hook.address_file} is empty.", remedy="Write an address a line.")
+        return found
+
+
+def _allowed(address: str) -> str:
+    try:
+        return apprise_scheme(address)
+    except ValueError as error:
+        raise HookFailed(f"{error}.", remedy="See docs/alerts.md for those that do.") from None
+
+
+def _told(alert: Alert, addresses: Sequence[str]) -> bytes:
+    test = "test" in alert.kinds
+    body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
+    told = {
+        "addresses": list(addresses),
+        "title": one_line(_TEST_TITLE if test else _TITLE.format(alert)),
+        "body": f"{alert.message if test else body}\nKey: {alert.key}",
+        "type": "info" if test else "warning",
+    }
+    return json.dumps(told).encode()

@@ -1,0 +1,47 @@
+"""What every kind of hook is given and owes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from shm.errors import ShmError
+from shm.values import Alert
+
+SHOWN_CHARACTERS = 500
+
+
+class HookFailed(ShmError):
+    """A hook could not be run, took too long, or said that it failed; another try may help."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The workspace's folder, the longest a delivery may take, and the daemon's environment."""
+
+    folder: Path
+    timeout_s: float
+    environment: Mapping[str, str]
+
+
+class Deliverer(Protocol):
+    """Delivers alerts to hooks of one kind, from several threads at once."""
+
+    def __init__(self, surroundings: Surroundings): ...
+
+    def __call__(self, hook: object, alert: Alert) -> str:
+        """Delivers one alert; what the hook answered.
+
+        Raises HookFailed where another try may help, DeliveryRefused where none will.
+        """
+
+    def close(self) -> None:
+        """Ends, from another thread, deliveries that are under way; no more are begun."""
+
+
+def one_line(text: str) -> str:
+    """A stranger's words made fit for a log: printable, on one line, not endless."""
+    printable = "".join(character if character.isprintable() else " " for character in text)
+    return " ".join(printable.split())[:SHOWN_CHARACTERS]

@@ -1,0 +1,149 @@
+"""A hook that is an address: the alert is posted to it as JSON, signed with a shared secret.
+
+The signature is over the time and the body, so that who listens can refuse what is forged, and what
+is old. It is made as most services make theirs: HMAC with SHA-256 (RFC 2104, Krawczyk 1997).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import time
+from http import HTTPStatus
+
+import requests
+
+from shm.bridge import WebhookHook
+from shm.documents import alert_document, dump
+from shm.pipeline import DeliveryRefused
+from shm.values import Alert
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings, one_line
+from shm_daemon.hooks.lines import Line, Lines
+
+_WORTH_ANOTHER_TRY = (
+    HTTPStatus.REQUEST_TIMEOUT,
+    HTTPStatus.TOO_EARLY,
+    HTTPStatus.TOO_MANY_REQUESTS,
+)
+_LOOK = "See that its server runs, then try `shm alerts test`."
+
+
+class WebhookDeliverer:
+    """Posts each alert; an answer of 200 to 299 says that it is delivered."""
+
+    def __init__(self, surroundings: Surroundings):
+        self._surroundings = surroundings
+        self._lines = Lines()
+
+    def __call__(self, hook: WebhookHook, alert: Alert) -> str:
+        """Posts the alert; raises HookFailed, or DeliveryRefused where the server wants none."""
+        body = dump(alert_document(alert)).encode()
+        headers = _headers(alert, body, self._secret(hook), int(time.time()))
+        timeout_s = self._surroundings.timeout_s
+        with self._lines.session(timeout_s) as (session, line):
+            try:
+                with session.post(
+                    hook.url,
+                    data=body,
+                    headers=headers,
+                    timeout=timeout_s,
+                    allow_redirects=False,
+                    stream=True,
+                    auth=_unchanged,
+                ) as response:
+                    return _judged(response)
+            except (requests.RequestException, OSError) as error:
+                # Not `from error`: its words hold the whole address, and that may be a key.
+                raise self._failure(hook, line, error) from None
+
+    def close(self) -> None:
+        self._lines.close()
+
+    def _secret(self, hook: WebhookHook) -> bytes:
+        if hook.secret_env:
+            secret = self._surroundings.environment.get(hook.secret_env, "").encode()
+            where = f"the variable {hook.secret_env} of the environment"
+        else:
+            secret, where = self._secret_of_file(hook), hook.secret_file
+        if not secret:
+            raise HookFailed(
+                f"{where} holds no secret.", remedy="Put one there; see docs/alerts.md."
+            )
+        return secret
+
+    def _secret_of_file(self, hook: WebhookHook) -> bytes:
+        try:
+            return (self._surroundings.folder / hook.secret_file).read_bytes().strip()
+        except OSError as error:
+            raise HookFailed(
+                f"the secret in {hook.secret_file} cannot be read: {error.strerror}.",
+                remedy="Make it readable for the user that runs the daemon.",
+            ) from None
+
+    def _failure(self, hook: WebhookHook, line: Line, error: Exception) -> HookFailed:
+        if self._lines.closed:
+            return HookFailed("broken off: the daemon is ending.")
+        if line.cut_off or isinstance(error, requests.Timeout):
+            limit = f"{self._surroundings.timeout_s:g} s"
+            return HookFailed(f"no answer of {hook.host} within {limit}.", remedy=_LOOK)
+        if isinstance(error, requests.exceptions.SSLError):
+            return HookFailed(
+                f"{hook.host} cannot show that it is who it says ({_reason(error)}).",
+                remedy="Have its certificate mended.",
+            )
+        return HookFailed(f"{hook.host} cannot be reached ({_reason(error)}).", remedy=_LOOK)
+
+
+def signature(secret: bytes, timestamp: str, body: bytes) -> str:
+    """What stands in X-Shm-Signature: who listens makes it again and compares."""
+    made = hmac.new(secret, timestamp.encode() + b"." + body, hashlib.sha256)
+    return f"sha256={made.hexdigest()}"
+
+
+def _headers(alert: Alert, body: bytes, secret: bytes, unix_s: int) -> dict[str, str]:
+    return {
+        "Content-Type": "application/json",
+        "User-Agent": "shm",
+        "Idempotency-Key": alert.key.encode("ascii", "backslashreplace").decode(),
+        "X-Shm-Timestamp": str(unix_s),
+        "X-Shm-Signature": signature(secret, str(unix_s), body),
+    }
+
+
+def _judged(response: requests.Response) -> str:
+    """What the server answered, if it took the alert; raises HookFailed or DeliveryRefused."""
+    status = response.status_code
+    if 200 <= status < 300:
+        return f"{status} {one_line(response.reason or '')}".strip()
+    answer = f"answered {status}: {_words(response)}"
+    if 300 <= status < 400:
+        raise HookFailed(answer, remedy="Write the address that it sends to; it is not followed.")
+    if 400 <= status < 500 and status not in _WORTH_ANOTHER_TRY:
+        raise DeliveryRefused(answer, remedy="Correct its address or its secret.")
+    raise HookFailed(answer, remedy=_LOOK)
+
+
+def _words(response: requests.Response) -> str:
+    """The beginning of the server's own words; its answer counts even where they break off."""
+    try:
+        words = next(response.iter_content(SHOWN_CHARACTERS), b"").decode(errors="replace")
+    except (requests.RequestException, OSError):
+        words = ""
+    return one_line(words) or one_line(response.reason or "") or "no message"
+
+
+def _unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
+    """Keeps the library from adding a password of the user's own (`.netrc`) to the request."""
+    return request
+
+
+def _reason(error: BaseException) -> str:
+    """The innermost cause in the operating system's words, without the address."""
+    reason, cause = type(error).__name__, error.__cause__ or error.__context__
+    seen: set[int] = set()
+    while cause is not None and id(cause) not in seen:
+        seen.add(id(cause))
+        if isinstance(cause, OSError) and cause.strerror:
+            reason = cause.strerror
+        cause = cause.__cause__ or cause.__context__
+    return one_line(reason)

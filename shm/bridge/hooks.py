@@ -1,0 +1,199 @@
+"""The `[[hook]]` tables of `bridge.toml`: how people are told of alerts. Secrets never stand here.
+
+A kind of hook is known by the key that only it has (`_KINDS`); what delivers it is in the daemon.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import string
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import SplitResult, urlsplit
+
+from shm.bridge.table import Table
+from shm.errors import BadInput
+
+_ADDRESS = 'Write url = "https://host/path".'
+_WHERE_SECRETS_STAND = (
+    'Write it into a file that only you can read and name it: secret_file = "webhook.secret"; or '
+    'name a variable of the environment: secret_env = "NAME".'
+)
+_ADDRESS_CHARACTERS = frozenset(string.digits + string.ascii_letters + string.punctuation)
+
+# Services that carry a message away over a network. What acts on this machine (syslog, dbus,
+# desktop windows), moves files or only displays something on a screen is left out.
+_SERVICES = """
+    mailto mailtos ses sendgrid mailgun mailersend smtp2go sparkpost postmark brevo resend o365
+    json jsons form forms xml xmls apprise apprises
+    slack workflow workflows mmost mmosts rocket rockets matrix matrixs discord zulip gchat
+    webex wxteams ryver flock twist zoom ringc nctalk nctalks synology synologys
+    feishu lark dingtalk wecombot wechat line guilded groupme kook cliq zohocliq
+    tgram signal signals whatsapp threema viber
+    gotify gotifys ntfy ntfys pover pbul prowl bark barks pushy push simplepush spush
+    pagerduty opsgenie pagertree signl4 splunk victorops squadcast spike goalert goalerts ilert
+    betterstack firehydrant incidentio xmatters lfg
+    twilio vonage nexmo plivo sinch msgbird clicksend clickatell bulksms infobip seven sns telnyx
+    voipms d7sms 46elks elks atalk smseagle smseagles httpsms serwersms freemobile
+"""
+APPRISE_SCHEMES = frozenset(_SERVICES.split())
+
+
+@dataclass(frozen=True)
+class Hook:
+    """Something that is told of each alert."""
+
+    name: str
+
+    @property
+    def kind(self) -> str:
+        """The name of the kind of hook."""
+        return type(self).__name__.removesuffix("Hook").lower()
+
+
+@dataclass(frozen=True)
+class CommandHook(Hook):
+    """A program run for each alert, which it gets as JSON on standard input; no shell."""
+
+    command: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class WebhookHook(Hook):
+    """An address to which each alert is posted as JSON, signed with a secret that both ends know.
+
+    The secret stands in the file `secret_file`, taken from the workspace's folder on, or in the
+    variable `secret_env` of the daemon's environment; the other one is empty.
+    """
+
+    url: str
+    secret_file: str = ""
+    secret_env: str = ""
+
+    @property
+    def host(self) -> str:
+        """The machine that is told: all of the address that may be shown, the rest may be a key."""
+        return urlsplit(self.url).hostname or ""
+
+
+@dataclass(frozen=True, repr=False)
+class AppriseHook(Hook):
+    """Addresses in the notation of the library apprise, or a file of them, one a line."""
+
+    addresses: tuple[str, ...] = ()
+    address_file: str = ""
+
+
+def hook_of(values: Mapping[str, Any], path: Path) -> Hook:
+    """The hook of one `[[hook]]` table; raises BadInput naming the hook and what to write."""
+    name = values.get("name")
+    if not isinstance(name, str) or not name.strip() or not name.isprintable():
+        raise BadInput("a [[hook]] has no name.", file=path, remedy='Write name = "mail".')
+    table = Table(values, f"hook {name}", path)
+    readers = {_KINDS[key] for key in _KINDS if key in table}
+    if len(readers) != 1:
+        raise table.refusal(
+            f"it needs exactly one of {', '.join(_KINDS)}",
+            'Write command = ["/path/to/program", "argument"] or url = "https://host/path".',
+        )
+    return readers.pop()(table, name)
+
+
+def apprise_scheme(address: str) -> str:
+    """The scheme of an address of apprise; raises ValueError where alerts do not go by it.
+
+    The message names the scheme alone: the rest of an address may hold a password.
+    """
+    scheme, separator, rest = address.partition("://")
+    scheme = scheme.lower()
+    if not separator or not rest or not _ADDRESS_CHARACTERS.issuperset(address):
+        raise ValueError("an address is not of the form scheme://...")
+    if scheme not in APPRISE_SCHEMES:
+        raise ValueError(f"alerts do not go by {scheme[:20]}://")
+    return scheme
+
+
+def _command(table: Table, name: str) -> Hook:
+    table.refuse_unknown(("name", "command"))
+    return CommandHook(name, _texts(table, "command", '["/path/to/program", "argument"]'))
+
+
+def _webhook(table: Table, name: str) -> Hook:
+    if "secret" in table:
+        raise table.refusal("bridge.toml is no place for a secret", _WHERE_SECRETS_STAND)
+    table.refuse_unknown(("name", "url", "secret_file", "secret_env", "allow_http"))
+    if ("secret_file" in table) == ("secret_env" in table):
+        raise table.refusal("it needs a secret to sign with, in one place", _WHERE_SECRETS_STAND)
+    secrets = {
+        key: _text(table, key, _WHERE_SECRETS_STAND) for key in ("secret_file", "secret_env")
+    }
+    return WebhookHook(name, _url(table), **secrets)
+
+
+def _apprise(table: Table, name: str) -> Hook:
+    table.refuse_unknown(("name", "apprise", "apprise_file"))
+    if "apprise_file" in table and "apprise" not in table:
+        return AppriseHook(name, address_file=_text(table, "apprise_file", "Name a file."))
+    if "apprise_file" in table:
+        raise table.refusal("it has both apprise and apprise_file", "Keep one of them.")
+    addresses = _texts(table, "apprise", '["mailto://..."], or better apprise_file = "path"')
+    for address in addresses:
+        try:
+            apprise_scheme(address)
+        except ValueError as error:
+            raise table.refusal(str(error), "See docs/alerts.md for those that do.") from None
+    return AppriseHook(name, addresses)
+
+
+_KINDS: dict[str, Callable[[Table, str], Hook]] = {
+    "command": _command,
+    "url": _webhook,
+    "apprise": _apprise,
+    "apprise_file": _apprise,
+}
+
+
+def _url(table: Table) -> str:
+    url = _text(table, "url", _ADDRESS)
+    try:
+        parts = urlsplit(url)
+        _ = parts.port
+    except ValueError:
+        parts = SplitResult("", "", "", "", "")
+    if parts.scheme not in ("http", "https") or not parts.hostname or not url.isprintable():
+        raise table.refusal("url is not an address of the web", _ADDRESS)
+    if "@" in parts.netloc:
+        raise table.refusal("url holds a user or password; alerts are signed instead", _ADDRESS)
+    open_allowed = table.values.get("allow_http", False)
+    if not isinstance(open_allowed, bool):
+        raise table.refusal("allow_http is neither true nor false", "Write allow_http = true.")
+    if parts.scheme == "http" and not open_allowed and not is_loopback(parts.hostname):
+        raise table.refusal(
+            "url is not encrypted", "Write https://, or allow_http = true in a network you trust."
+        )
+    return url
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine itself."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
+
+
+def _text(table: Table, key: str, remedy: str) -> str:
+    """A text of the table, empty where the key is missing."""
+    value = table.values.get(key, "")
+    if key in table and (not isinstance(value, str) or not value.strip()):
+        raise table.refusal(f"{key} is not a text", remedy)
+    return str(value)
+
+
+def _texts(table: Table, key: str, example: str) -> tuple[str, ...]:
+    value = table.values[key]
+    if not isinstance(value, list) or not value or not all(isinstance(v, str) for v in value):
+        raise table.refusal(f"{key} is not a list of texts", f"Write {key} = {example}.")
+    return tuple(value)

@@ -1,0 +1,77 @@
+"""Comparing a hanger with itself anew: the tests since a day become its baseline.
+
+After works on a hanger, or once a shift was looked into and accepted, the old baseline has nothing
+more to say. The tests since then are updated jointly in the class in force, as the first ones were;
+tests after that are watched against the result. What was compared with the old baseline stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from shm.errors import NothingThere
+from shm.models import build
+from shm.pipeline.terms import update_terms
+from shm.store import Baseline, Stage, Store, StoredTest, Workspace
+from shm.update import UpdateOptions, update
+from shm.update.options import Progress, silent
+from shm.values import Hanger
+
+
+@dataclass(frozen=True)
+class Order:
+    """Who wants a hanger compared anew, since when, and why."""
+
+    since: datetime
+    why: str
+    who: str
+
+
+def rebaseline(
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    order: Order,
+    at: datetime,
+    progress: Progress = silent,
+) -> Baseline:
+    """Updates the tests since then jointly and has later tests compared with them.
+
+    Raises NothingThere where the hanger has no baseline, or no test as young as that has been
+    worked through; BadInput where the class in force cannot describe the tests; StoreBusy where
+    another baseline came in meanwhile.
+    """
+    before = store.baseline(hanger.id)
+    if before is None:
+        raise NothingThere(
+            f"hanger {hanger.id} has no baseline yet, and so none to replace.",
+            remedy="Take in its first tests with `shm ingest FILE`.",
+        )
+    chosen = _since(store, hanger, order.since)
+    model = before.posterior.model
+    samples, seed, lineage = update_terms(hanger, [model], chosen, workspace.settings)
+    posterior = update(
+        [test.test for test in chosen],
+        build(model, hanger),
+        UpdateOptions(samples=samples, seed=seed),
+        progress,
+        hint=before.posterior,
+    )
+    record = (order.who, order.why, order.since)
+    return store.rebaseline(before, posterior, chosen, record, lineage, at)
+
+
+def _since(store: Store, hanger: Hanger, since: datetime) -> tuple[StoredTest, ...]:
+    """Tests of then and later that have been watched: those on their way are later ones."""
+    tests = store.tests(hanger.id)
+    found = [test for test in tests if test.time >= since and test.stage is Stage.WATCHED]
+    if not found:
+        latest = f"its latest is of {tests[-1].time:%Y-%m-%d}" if tests else "it has none at all"
+        raise NothingThere(
+            f"hanger {hanger.id} has no test since {since:%Y-%m-%d} that has been worked through; "
+            f"{latest}.",
+            remedy="Hit it first and take the test in with `shm ingest FILE`, or give an earlier "
+            "--since.",
+        )
+    return tuple(found)

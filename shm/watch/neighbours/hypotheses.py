@@ -1,0 +1,144 @@
+"""Everything that may have moved, with its probability: all explanations at all noise scales."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.values import FloatArray, IntArray
+from shm.watch.neighbours.alike import AlikeCause
+from shm.watch.neighbours.evidence import (
+    Bridge,
+    Weighed,
+    beyond,
+    independent,
+    nothing,
+    shed_factors,
+    weighed,
+    with_sign,
+)
+from shm.watch.neighbours.nouns import ExplanationName, HangerShift, NeighbourOptions
+
+# Both of two equal losses stand among the likeliest single ones.
+_FIRST_OF_TWO = 3
+_NOBODY: IntArray = np.empty((0, 0), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Hypotheses of one explanation at one noise scale.
+
+    Log probabilities (h,); `members` (h, m) are the hangers that shed or gained, empty for the
+    other explanations; probabilities (h, n) that each hanger gained or lost more than is
+    negligible; means and standard deviations (h, n) of its shift in N.
+    """
+
+    name: ExplanationName
+    log_weight: FloatArray
+    members: IntArray
+    gained: FloatArray
+    lost: FloatArray
+    mean_n: FloatArray
+    sd_n: FloatArray
+
+
+def hypotheses(
+    shifts: Sequence[HangerShift], causes: Sequence[AlikeCause], options: NeighbourOptions
+) -> tuple[Part, ...]:
+    """All hypotheses with their posterior probabilities, which add to 1."""
+    parts: list[Part] = []
+    for scale, prior in zip(options.noise_scales, options.noise_prior, strict=True):
+        bridge = Bridge.of(shifts, options, scale)
+        for part in _at_one_scale(bridge, causes, options):
+            parts.append(replace(part, log_weight=part.log_weight + math.log(prior)))
+    total = float(logsumexp(np.concatenate([part.log_weight for part in parts])))
+    return tuple(replace(part, log_weight=part.log_weight - total) for part in parts)
+
+
+def _at_one_scale(
+    bridge: Bridge, causes: Sequence[AlikeCause], options: NeighbourOptions
+) -> tuple[Part, ...]:
+    found = nothing(bridge)
+    weight = found.log_evidence + math.log(options.prior["nothing moved"])
+    still = _part("nothing moved", weight, _NOBODY, found, bridge, options)
+    return (
+        still,
+        _alike(bridge, causes, options),
+        *_moves(bridge, options),
+        _by_itself(bridge, options),
+    )
+
+
+def _part(
+    name: ExplanationName,
+    log_weight: FloatArray,
+    members: IntArray,
+    found: Weighed,
+    bridge: Bridge,
+    options: NeighbourOptions,
+) -> Part:
+    least = options.negligible_fraction * bridge.baseline_n
+    gained, lost = beyond(found.mean_n, found.sd_n, least)
+    return Part(name, log_weight, members, gained, lost, found.mean_n, found.sd_n)
+
+
+def _by_itself(bridge: Bridge, options: NeighbourOptions) -> Part:
+    found = independent(bridge, options)
+    weight = found.log_evidence + math.log(options.prior["each by itself"])
+    unknown = np.full((1, len(bridge.shift_n)), np.nan)
+    return Part(
+        "each by itself", np.array([weight]), _NOBODY, found.gained[None], found.lost[None],
+        unknown, unknown,
+    )  # fmt: skip
+
+
+def _alike(bridge: Bridge, causes: Sequence[AlikeCause], options: NeighbourOptions) -> Part:
+    patterns = np.array([each.fractions * bridge.baseline_n for each in causes])
+    found = weighed(bridge, _sized(patterns[:, :, None], options))
+    prior = math.log(options.prior["all alike"] / len(found.log_evidence))
+    return _part("all alike", found.log_evidence + prior, _NOBODY, found, bridge, options)
+
+
+def _sized(factors: FloatArray, options: NeighbourOptions) -> FloatArray:
+    """Each factor at each size, sizes running slowest."""
+    sizes = np.array(options.sizes_fraction)[:, None, None, None]
+    return np.asarray((sizes * factors).reshape(-1, *factors.shape[1:]), np.float64)
+
+
+def _moves(bridge: Bridge, options: NeighbourOptions) -> tuple[Part, Part, Part]:
+    """One hanger sheds, one gains, two shed."""
+    factors, count = shed_factors(bridge, options), len(bridge.shift_n)
+    sizes = len(options.sizes_fraction)
+    one, found = (
+        np.tile(np.arange(count)[:, None], (sizes, 1)),
+        weighed(bridge, _sized(factors, options)),
+    )
+    two = _pairs(with_sign(found, one, -1), count)
+    both = np.concatenate([factors[two[:, 0]], factors[two[:, 1]]], axis=2)
+    found_of_two = weighed(bridge, _sized(both, options))
+    shed, gained = options.prior["shed load"], options.prior["gained load"]
+    one_shed = shed * (1 - options.two_hangers) / (count * sizes)
+    two_shed = shed * options.two_hangers / (count * (count - 1) / 2 * sizes)
+    two = np.tile(two, (sizes, 1))
+
+    def part(
+        name: ExplanationName, members: IntArray, of: Weighed, sign: int, prior: float
+    ) -> Part:
+        weight = with_sign(of, members, sign) + math.log(prior)
+        return _part(name, weight, members, of, bridge, options)
+
+    return (
+        part("shed load", one, found, -1, one_shed),
+        part("gained load", one, found, 1, gained / (count * sizes)),
+        part("shed load", two, found_of_two, -1, two_shed),
+    )
+
+
+def _pairs(logs_of_one: FloatArray, count: int) -> IntArray:
+    """Pairs (p, 2) of hangers of which one is among the likeliest to have shed load by itself."""
+    first = logsumexp(logs_of_one.reshape(-1, count), axis=0).argsort()[-_FIRST_OF_TWO:].tolist()
+    return np.array([(i, j) for i in first for j in range(count) if i < j or j not in first])

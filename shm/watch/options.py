@@ -1,0 +1,41 @@
+"""What the watch over time takes for granted before any test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shm.errors import UsageError
+
+
+@dataclass(frozen=True)
+class WatchOptions:
+    """Limits and priors of the sequential test.
+
+    `limit_years` is the mean time to a false call of one hanger, or less than it. The `scatter`
+    tuples are what tests may differ by beyond what identification explains: fractions of the
+    tension, and shares of a spring's `step_sd`; which pair of them holds is learnt.
+    Temperature coefficients have mean 0 and the sds given, of the tension a fraction per kelvin, of
+    a spring a share of its `step_sd` per kelvin. The first `baseline_tests` readings are taken to
+    precede every change. `beginnings` is how many possible beginnings of a change are kept.
+    """
+
+    limit_years: float = 100.0
+    change_rate_per_year: float = 0.02
+    outlier_probability: float = 0.01
+    tension_scatter: tuple[float, ...] = (0.001, 0.0018, 0.0032, 0.0056, 0.01, 0.018)
+    spring_scatter_of_step: tuple[float, ...] = (0.01, 0.06, 0.2)
+    tension_per_kelvin_sd: float = 0.002
+    spring_per_kelvin_sd_of_step: float = 0.1
+    unknown_temperature_sd_k: float = 10.0
+    baseline_tests: int = 1
+    beginnings: int = 40
+
+    def __post_init__(self) -> None:
+        if not self.tension_scatter or not self.spring_scatter_of_step:
+            raise UsageError("The watch needs one scatter of the tension and of springs at least.")
+        if self.baseline_tests < 1:
+            raise UsageError("The watch needs one baseline test at least.")
+        if not 0 < self.outlier_probability < 1:
+            raise UsageError("The probability of an outlier must lie between 0 and 1.")
+        if self.limit_years <= 0 or self.change_rate_per_year <= 0:
+            raise UsageError("The watch's limit and rate of changes must be more than 0.")

@@ -1,0 +1,289 @@
+"""What one test says of the watched quantities: Gauss-Newton of the model class, without a prior.
+
+The model's error, 0.1 to 1 % of a frequency, is the same in every test of a hanger, and so are the
+deviations of the bar as made. Each mode's own residual at the baseline is therefore taken off
+before anything is read, and what is left over are the errors of the identification.
+
+A reading is the likelihood linearised where it is largest (Gauss and Newton; Bjoerck 1996,
+Numerical Methods for Least Squares Problems). A weak pull to the baseline chooses that place where
+the data do not; it has no part in the reading's mean and information.
+
+Springs that frequencies cannot tell apart move together: how unlike two springs are that are nearly
+alike shows in the square of the difference only, and no normal distribution could follow it. One
+of the two that moves alone is read as a move of both, and a part of it as tension: for a loss of
+30 % up to 0.5 % of it where the softer spring has 1e7 N m/rad and both planes are measured, more
+where it is softer still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+from scipy.special import chdtri
+
+from shm.errors import BadInput
+from shm.models import Model, described
+from shm.models.conditions import Conditions
+from shm.values import (
+    PLANES,
+    TENSION,
+    FloatArray,
+    Hanger,
+    IntArray,
+    ModalTest,
+    Mode,
+    Posterior,
+    Reading,
+    WatchedQuantity,
+)
+from shm.watch.quantities import (
+    MeasuredMode,
+    base_point,
+    moved,
+    shift_of,
+    watched_quantities,
+)
+
+# A frequency without a stated error is as good as a usual identification: its errors go from 1e-4
+# to 1e-3 of a frequency, and who states none is given the worse.
+_UNKNOWN_SD = 1e-3
+_FREQUENCY_ALLOWANCE = 1e-4
+_SLOPE_STEP = 0.1
+# Far above the rounding of a log frequency, far below what a test can tell.
+_LEAST_SLOPE_STEP = 1e-7
+_PULL_SD_IN_STEPS = 10.0
+_MOST_STEPS = 12
+# In units of the reading's variance: a last step of a tenth of its standard deviation is taken
+# along with the reading, which is linear about the place before it.
+_SETTLED = 1e-2
+# Information, per step_sd, of which 10,000 tests together say as much as the prior of a change.
+_UNSEEN = 1e-4
+_SELDOM = 1e-3
+# How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
+_BEYOND = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """The modes (n,) of a test that the baseline has too: what is measured less its own residual.
+
+    `plane` and `order` index the model's frequencies, `own` the reader's modes; `log_frequency`
+    and its `variance` are (n,).
+    """
+
+    conditions: Conditions
+    plane: IntArray
+    order: IntArray
+    own: IntArray
+    log_frequency: FloatArray
+    variance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """The likelihood about coordinates `x` (q,): residuals (n,) and slopes (n, q), both over sd."""
+
+    x: FloatArray
+    residual: FloatArray
+    slopes: FloatArray
+    pull: FloatArray
+
+    @property
+    def information(self) -> FloatArray:
+        return self.slopes.T @ self.slopes
+
+    @property
+    def cost(self) -> float:
+        """What is made small: the misfit and the pull to the baseline."""
+        return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
+
+    @property
+    def step(self) -> FloatArray:
+        """To where the cost is least, were it all linear."""
+        downhill = self.slopes.T @ self.residual - self.pull * self.x
+        return np.asarray(np.linalg.solve(self.information + np.diag(self.pull), downhill))
+
+    def gain(self, step: FloatArray) -> float:
+        """Of a step, in units of the variance."""
+        return float(step @ self.information @ step)
+
+
+class Reader:
+    """Reads tests of one hanger against its baseline.
+
+    Made of the baseline's posterior and its tests, which may be of any conditions. Raises BadInput
+    where these hold no mode. `frequency_allowance`, a fraction of a frequency, is what two tests
+    may differ by beyond their stated errors: a logger's clock, a tenth of a kelvin.
+    """
+
+    def __init__(
+        self,
+        baseline: Posterior,
+        tests: Sequence[ModalTest],
+        hanger: Hanger,
+        *,
+        frequency_allowance: float = _FREQUENCY_ALLOWANCE,
+    ):
+        self._model = described(baseline.model, hanger)
+        self._base = base_point(baseline, self._model)
+        self._allowance = frequency_allowance
+        usable = [test for test in tests if _is_described(test, self._model)]
+        keys = {_key(mode) for test in usable for mode in test.modes if _is_measured(mode)}
+        if not keys:
+            raise BadInput(
+                f"the baseline of hanger {hanger.id} has no test with a mode that model class "
+                f"{baseline.model} describes.",
+                remedy="Set another baseline.",
+            )
+        self.modes: tuple[MeasuredMode, ...] = tuple(sorted(keys))
+        self.quantities = watched_quantities(baseline, hanger, self.modes)
+        self._columns = [_columns(each, self._model) for each in self.quantities]
+        self._scale: FloatArray = np.array([each.step_sd for each in self.quantities])
+        self._pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
+        self._lowest = np.array([each.coordinates[0] for each in self.quantities])
+        self._highest = np.array([each.coordinates[-1] for each in self.quantities])
+        self._residual = np.zeros(len(self.modes))
+        self._residual = self._own_residual([self._seen(test) for test in usable])
+
+    def reading(self, test: ModalTest, time: datetime) -> Reading:
+        """What `test`, made at `time`, says by itself.
+
+        Modes that the baseline does not have are left out; where those that it has fit no state of
+        the hanger, as when one is taken for another, they count for less than their errors say. A
+        test without any that it has, or of conditions that the model class cannot describe, says
+        nothing: information 0.
+        """
+        count = len(self.quantities)
+        mean, information = np.zeros(count), np.zeros((count, count))
+        if _is_described(test, self._model) and len((seen := self._seen(test)).own):
+            mean, information = self._read(self._settled(seen))
+        return Reading(test.id, time, test.temperature_c, mean, information)
+
+    def _own_residual(self, tests: Sequence[_Seen]) -> FloatArray:
+        """Measured less predicted log frequency (modes,), the weighted mean over the tests."""
+        own = np.concatenate([seen.own for seen in tests])
+        weight = 1 / np.concatenate([seen.variance for seen in tests])
+        base = np.zeros((1, len(self.quantities)))
+        off = [seen.log_frequency - self._predicted(base, seen)[0] for seen in tests]
+        total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
+        return np.asarray(total / np.bincount(own, weight, len(self.modes)))
+
+    def _seen(self, test: ModalTest) -> _Seen:
+        modes = [mode for mode in test.modes if _is_measured(mode) and _key(mode) in self.modes]
+        own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
+        frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
+        sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
+        sd = np.where(sd_hz > 0, sd_hz / frequency_hz, _UNKNOWN_SD)
+        return _Seen(
+            conditions=self._model.conditions(test),
+            plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
+            order=np.array([mode.order - 1 for mode in modes], dtype=int),
+            own=own,
+            log_frequency=np.log(frequency_hz) - self._residual[own],
+            variance=sd**2 + self._allowance**2,
+        )
+
+    def _settled(self, seen: _Seen) -> _Linear:
+        """The likelihood about where it is largest, or very nearly; steps that overshoot halve."""
+        best = self._linear(np.zeros(len(self.quantities)), seen)
+        step = best.step
+        for _ in range(_MOST_STEPS):
+            if best.gain(step) < _SETTLED:
+                break
+            near = np.clip(best.x + step, self._lowest - _BEYOND, self._highest + _BEYOND)
+            tried = self._linear(near, seen)
+            if tried.cost <= best.cost:
+                best, step = tried, tried.step
+            else:
+                step = step / 2
+        return best
+
+    def _linear(self, x: FloatArray, seen: _Seen) -> _Linear:
+        """One call of the model: at `x` and to both sides of it along each coordinate.
+
+        Beyond the end of a table the model stands still, and frequencies go on straight.
+        """
+        count, inside = len(x), np.clip(x, self._lowest, self._highest)
+        half = np.maximum(_SLOPE_STEP * self._scale, _LEAST_SLOPE_STEP)
+        low = np.maximum(inside - half, self._lowest)
+        high = np.minimum(inside + half, self._highest)
+        places = np.vstack([inside, *(_with_diagonal(inside, ends) for ends in (low, high))])
+        predicted = self._predicted(places, seen)
+        rise = predicted[1 + count :] - predicted[1 : 1 + count]
+        slopes = (rise / (high - low)[:, None]).T
+        sd = np.sqrt(seen.variance)
+        residual = seen.log_frequency - predicted[0] - slopes @ (x - inside)
+        return _Linear(x, residual / sd, slopes / sd[:, None], self._pull)
+
+    def _read(self, linear: _Linear) -> tuple[FloatArray, FloatArray]:
+        """Mean (q,) and information (q, q) of the likelihood alone, 0 along what is not seen."""
+        slopes = linear.slopes * self._scale
+        shares, axes = np.linalg.eigh(slopes.T @ slopes)
+        seen = shares > _UNSEEN
+        pushed = slopes.T @ (linear.residual + linear.slopes @ linear.x)
+        steps = (axes.T @ pushed)[seen] / shares[seen]
+        share = _credible_share(linear.residual, len(steps))
+        kept = shares[seen] * share > _UNSEEN
+        shares, axes = shares[seen][kept] * share, axes[:, seen][:, kept]
+        information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
+        return self._scale * (axes @ steps[kept]), np.asarray(information + information.T) / 2
+
+    def _predicted(self, x: FloatArray, seen: _Seen) -> FloatArray:
+        """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""
+        theta = np.tile(self._base, (len(x), 1))
+        for quantity, columns, values in zip(self.quantities, self._columns, x.T, strict=True):
+            shift = shift_of(quantity, values)
+            if quantity.name == TENSION:
+                theta[:, columns] *= 1 + shift[:, None]
+            else:
+                theta[:, columns] = moved(self._model, self._base, columns, shift)[:, columns]
+        highest = max(order for _, order in self.modes)
+        found = self._model.frequencies_at(theta, highest, seen.conditions)
+        return np.asarray(np.log(found[:, seen.plane, seen.order]))
+
+
+def _credible_share(misfit: FloatArray, fitted: int) -> float:
+    """The share of its stated information that a test deserves, by its misfit over sd (n,).
+
+    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
+    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
+    """
+    free = len(misfit) - fitted
+    if free < 1:
+        return 1.0
+    most = float(chdtri(free, _SELDOM))
+    return most / max(most, float(misfit @ misfit))
+
+
+def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """`row` (q,) once for each entry of `diagonal` (q,), which replaces its own: (q, q)."""
+    return np.where(np.eye(len(row), dtype=bool), diagonal, row)
+
+
+def _key(mode: Mode) -> MeasuredMode:
+    return mode.plane, mode.order
+
+
+def _is_measured(mode: Mode) -> bool:
+    """Whether the mode has a frequency whose error is not endless."""
+    return (
+        bool(np.isfinite(mode.frequency_hz))
+        and mode.frequency_hz > 0
+        and not np.isinf(mode.frequency_sd_hz)
+    )
+
+
+def _is_described(test: ModalTest, model: Model) -> bool:
+    """Whether the class can describe the conditions of a test."""
+    try:
+        model.refuse(test)
+    except BadInput:
+        return False
+    return True
+
+
+def _columns(quantity: WatchedQuantity, model: Model) -> list[int]:
+    return [model.parameter_names.index(name) for name in quantity.parameters]

@@ -1,0 +1,7 @@
+"""The sequential test of one hanger: has anything changed, what, since when, how far."""
+
+from __future__ import annotations
+
+from shm.watch.sequential.watching import Call, Watch, watch_over, watched
+
+__all__ = ["Call", "Watch", "watch_over", "watched"]

@@ -1,0 +1,72 @@
+"""Shifts in the units that people read, of mixtures of normal distributions in the coordinate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from shm.values import TENSION, FloatArray, WatchedQuantity
+from shm.watch.quantities import coordinate_of, shift_of
+
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_NEGLIGIBLE = 1e-7
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Mean and sd of a shift, and the probability that it is beyond a threshold, one way."""
+
+    mean: float
+    sd: float
+    beyond: float
+
+
+def shift_of_mixture(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float = math.inf,
+) -> Shift:
+    """Of normal distributions (B,) in units of a step; no shift at all with what `weights` leave.
+
+    By Gauss-Hermite quadrature of seven nodes in each.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights = weights[kept]
+    mean, sd = mean[kept] * quantity.step_sd, sd[kept] * quantity.step_sd
+    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
+    first = float(weights @ shifts @ _WEIGHTS)
+    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
+    second += (1 - float(weights.sum())) * first**2
+    return Shift(
+        first, math.sqrt(max(second, 0.0)), _beyond(quantity, weights, mean, sd, threshold)
+    )
+
+
+def _beyond(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float,
+) -> float:
+    """The likelier of a shift below minus the threshold and one above it."""
+    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    sd = np.maximum(sd, 1e-12)
+    down = float(weights @ ndtr((low - mean) / sd))
+    up = float(weights @ ndtr((mean - high) / sd))
+    return min(max(down, up), 1.0)
+
+
+def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
+    """The coordinate of a shift; infinite where the quantity's table ends before it."""
+    tension = quantity.name == TENSION
+    value = quantity.baseline * (1 + shift) if tension else quantity.baseline + shift
+    if not min(quantity.values) < value < max(quantity.values):
+        return math.copysign(math.inf, shift)
+    return coordinate_of(quantity, value)

@@ -1,0 +1,302 @@
+"""What an alert says: an owner reads it on a phone, what moved first, what to do last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+from shm.values import TENSION, Change, Drift, End, Hanger, Moved, Plane, WatchedTest
+
+_NINETY_PERCENT = 1.645
+_CERTAIN = 0.999
+_LISTED = 3
+_EITHER_LIKELY = 0.8
+
+
+def message_of(
+    test: WatchedTest,
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    *,
+    is_call: bool,
+    is_further: bool = False,
+) -> str:
+    """Which hanger, what moved and by how much, where, since when, how sure, what to do.
+
+    `change` is the change behind it, as far as one is known; `is_call` says whether that is called
+    now, and `is_further` whether others were before it, from which on its shift counts. `beyond`
+    are the shifts from the baseline that the alert tells to be beyond their threshold.
+    """
+    change = change if change and change.moved else None
+    head = _shifts(beyond, change) if beyond else _change(change)
+    parts = [
+        f"Hanger {hanger.id}: {'a further change: ' if is_further and not beyond else ''}{head}",
+        _now(test, beyond, change),
+        _when(change),
+        _certainty(change, is_call),
+        "" if beyond else _thresholds(test, change),
+        _blunder(test.change),
+        _advice(change, beyond),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def quantity_words(name: str, end: End | None = None, plane: Plane | None = None) -> str:
+    """`tension`, or `end stiffness k1 (deck end, transverse)`."""
+    if name == TENSION:
+        return "tension"
+    if not name.startswith("log10_k"):
+        return name.replace("_", " ")
+    at = f"{end} end" if end else "which end not known" if plane else ""
+    where = ", ".join(word for word in (at, plane or "") if word)
+    return f"end stiffness {name.removeprefix('log10_')}" + (f" ({where})" if where else "")
+
+
+def shift_words(quantity: str, mean: float, sd: float) -> str:
+    """`fell by 8.2 % (90 % interval 7.1 to 9.3 %)`; of a stiffness the factor it fell or rose to.
+
+    `mean` and `sd` are a fraction of the tension, or decades of a stiffness.
+    """
+    low, high = mean - _NINETY_PERCENT * sd, mean + _NINETY_PERCENT * sd
+    if quantity != TENSION:
+        verb = "fell" if high < 0 else "rose" if low > 0 else "moved"
+        return (
+            f"{verb} to {_factor(mean)} times what it was "
+            f"(90 % interval {_factor(low)} to {_factor(high)} times)"
+        )
+    if low <= 0 <= high:
+        low_percent, high_percent = (f"{100 * each:+.1f} %" for each in (low, high))
+        return f"moved by {100 * mean:+.1f} % (90 % interval {low_percent} to {high_percent})"
+    near, far = sorted((abs(low), abs(high)))
+    verb = "fell" if mean < 0 else "rose"
+    places = 1 if far - near > 0.004 else 2
+    text = f"{100 * abs(mean):.{places}f} % (90 % interval {100 * near:.{places}f} to "
+    return f"{verb} by {text}{100 * far:.{places}f} %)"
+
+
+def _factor(decades: float) -> str:
+    """Of what it was: `0.50`, `3.2`."""
+    if decades > 3:
+        return "more than 1000"
+    factor = 10**decades
+    if factor < 0.01:
+        return "less than 0.01"
+    return f"{factor:.2f}" if factor < 1 else f"{factor:.1f}" if factor < 10 else f"{factor:.0f}"
+
+
+def _probability(value: float) -> str:
+    """Two decimals or three near the ends, with no certainty pretended."""
+    if math.isnan(value):
+        return "not known"
+    if value > _CERTAIN:
+        return "above 0.999"
+    if value < 1 - _CERTAIN:
+        return "below 0.001"
+    return f"{value:.3f}" if not 0.01 <= value <= 0.99 else f"{value:.2f}"
+
+
+# ---------------------------------------------------------------- what moved
+
+
+def _change(change: Change | None) -> str:
+    """What has changed, or what all may have."""
+    if change is None:
+        return "something has changed."
+    first = change.moved[0]
+    if not first.alike:
+        return f"{_moved(first)}. {_only(first, change)}"
+    suspects = _suspects(change)
+    told = "; or ".join(
+        f"{_moved(each)}, probability {_probability(each.probability)}"
+        for each in suspects[:_LISTED]
+    )
+    return (
+        f"something moved, and these tests cannot tell what: {told}"
+        f"{_and_more(len(suspects) - _LISTED)}."
+    )
+
+
+def _moved(moved: Moved) -> str:
+    name = quantity_words(moved.quantity, moved.end, moved.plane)
+    return f"{name} {shift_words(moved.quantity, moved.shift_mean, moved.shift_sd)}"
+
+
+def _only(first: Moved, change: Change) -> str:
+    """How sure it is that it was this, and what else it might be."""
+    text = f"That it is this and nothing else: probability {_probability(first.probability)}"
+    if first.probability > 0.9 or len(change.moved) < 2:
+        return f"{text}."
+    other = change.moved[1]
+    name = quantity_words(other.quantity, other.end, other.plane)
+    return f"{text}; next {name}, {_probability(other.probability)}."
+
+
+def _suspects(change: Change) -> list[Moved]:
+    """The likeliest quantity and those that the data cannot tell from it, the likeliest first."""
+    first = change.moved[0]
+    return [first, *(each for each in change.moved[1:] if each.quantity in first.alike)]
+
+
+def _and_more(count: int) -> str:
+    if count <= 0:
+        return ""
+    return f"; or {count} more" if count > 1 else "; or one more"
+
+
+def _shifts(beyond: Sequence[Drift], change: Change | None) -> str:
+    """What is beyond its threshold and, as far as is known, where the data put it."""
+    places = {each.quantity: (each.end, each.plane) for each in (change.moved if change else ())}
+    told = "; ".join(
+        f"{quantity_words(drift.quantity, *places.get(drift.quantity, (None, None)))} "
+        f"{shift_words(drift.quantity, drift.shift_mean, drift.shift_sd)}, beyond its threshold "
+        f"of {_threshold(drift)} with probability {_probability(drift.probability)}"
+        for drift in beyond
+    )
+    return f"{told}.{_told_apart(change)}"
+
+
+def _told_apart(change: Change | None) -> str:
+    if change is None:
+        return ""
+    first, *others = _suspects(change)
+    if not others:
+        name = quantity_words(first.quantity, first.end, first.plane)
+        return f" That only the {name} has changed: probability {_probability(first.probability)}."
+    told = " or ".join(
+        f"{quantity_words(each.quantity, each.end, each.plane)} "
+        f"(probability {_probability(each.probability)})"
+        for each in (first, *others)[:_LISTED]
+    )
+    more = _and_more(len(others) + 1 - _LISTED)
+    return f" These tests cannot tell whether it is {told}{more} that has changed."
+
+
+def _threshold(drift: Drift) -> str:
+    if drift.quantity == TENSION:
+        return f"{100 * drift.threshold:.3g} %"
+    return f"{_factor(math.copysign(drift.threshold, drift.shift_mean))} times"
+
+
+def _now(test: WatchedTest, beyond: Sequence[Drift], change: Change | None) -> str:
+    """The tension in kN where it is spoken of: a figure that the owner knows."""
+    spoken = [drift.quantity for drift in beyond] + (
+        [each.quantity for each in _suspects(change)] if change else []
+    )
+    for drift in test.drifts:
+        if drift.quantity == TENSION and TENSION in spoken:
+            now, before = drift.value / 1e3, drift.baseline / 1e3
+            return (
+                f"Tension is now {now:.4g} kN, {100 * abs(now / before - 1):.1f} % "
+                f"{'below' if now < before else 'above'} the {before:.4g} kN of the baseline."
+            )
+    return ""
+
+
+# ---------------------------------------------------------------- when, how sure
+
+
+def _when(change: Change | None) -> str:
+    if change is None:
+        return ""
+    since = _between(change.began_after, change.began_by)
+    if change.sudden >= _EITHER_LIKELY:
+        return f"It came suddenly (probability {_probability(change.sudden)}), {since}."
+    if change.sudden <= 1 - _EITHER_LIKELY:
+        return f"It came slowly (probability {_probability(1 - change.sudden)}); it began {since}."
+    return (
+        f"It began {since}; whether suddenly or slowly cannot be told yet (suddenly: probability "
+        f"{_probability(change.sudden)})."
+    )
+
+
+def _between(after: datetime, by: datetime) -> str:
+    first, last = f"{after:%Y-%m-%d}", f"{by:%Y-%m-%d}"
+    return f"on {first}" if first == last else f"between {first} and {last}"
+
+
+def _certainty(change: Change | None, is_call: bool) -> str:
+    if change is None:
+        return ""
+    text = f"That anything has changed: probability {_probability(change.probability)}"
+    if not is_call:
+        return f"{text}."
+    return (
+        f"{text}; a hanger that does not change raises such an alert at most once in "
+        f"{change.limit_years:.3g} years on the average."
+    )
+
+
+def _thresholds(test: WatchedTest, change: Change | None) -> str:
+    """How near what may have changed is to its threshold."""
+    if change is None:
+        return ""
+    by_name = {drift.quantity: drift for drift in test.drifts}
+    found = [by_name[each.quantity] for each in _suspects(change) if each.quantity in by_name]
+    if not found:
+        return ""
+    nearest = max(found, key=lambda drift: drift.probability)
+    name = quantity_words(nearest.quantity)
+    return (
+        f"The threshold of the {name} is {_threshold(nearest)}: passed with probability "
+        f"{_probability(nearest.probability)}."
+    )
+
+
+def _blunder(change: Change) -> str:
+    if not change.outlier_probability > 0.5:
+        return ""
+    chance = _probability(change.outlier_probability)
+    return f"This test itself may be a blunder (probability {chance})."
+
+
+# ---------------------------------------------------------------- what to do
+
+
+def _advice(change: Change | None, beyond: Sequence[Drift]) -> str:
+    return f"What to do: {_urgency(change, bool(beyond))} {_look(change, beyond)}"
+
+
+def _urgency(change: Change | None, is_beyond: bool) -> str:
+    if is_beyond:
+        return "have the engineer in charge decide on traffic now, and hit it again today."
+    if change is not None and change.sudden < 0.5:
+        return "hit it again within weeks."
+    return "hit it again within days."
+
+
+def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
+    first = change.moved[0] if change else None
+    if first is not None and first.alike:
+        return (
+            "A sensor near each end and more modes tell them apart. Compare the hangers beside it "
+            "(`shm drift bridge`), and look at its anchorages."
+        )
+    quantity, shift = _leading(first, beyond)
+    if quantity == TENSION:
+        return _look_at_tension(shift > 0)
+    known = first.end if first and first.quantity == quantity else None
+    end = f"the {known} end" if known else "both ends"
+    if shift < 0:
+        return f"If it holds, look at {end}: a worn pin, a crack in the plate, loose bolts."
+    return f"If it holds, look at {end}: a pin that rust or dirt has seized."
+
+
+def _leading(first: Moved | None, beyond: Sequence[Drift]) -> tuple[str, float]:
+    """What the crew looks after, and its shift; a loss of tension where nothing is known."""
+    for each in (*beyond[:1], *((first,) if first else ())):
+        return each.quantity, each.shift_mean
+    return TENSION, -1.0
+
+
+def _look_at_tension(rose: bool) -> str:
+    if rose:
+        return (
+            "If it holds, compare the hangers beside it (`shm drift bridge`): one of them may have "
+            "shed load."
+        )
+    return (
+        "If it holds, compare the hangers beside it (`shm drift bridge`), which take up what it "
+        "sheds, and look at its anchorages and along the rod."
+    )

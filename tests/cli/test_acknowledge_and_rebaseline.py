@@ -1,0 +1,115 @@
+"""`shm alerts ack` and `shm drift rebaseline`: what a person does about the watch, on record."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from shm.pipeline import rebaselining
+from shm.store import Workspace
+from tests.cli.conftest import Shm
+from tests.helpers import quick_update
+
+ACK = ("alerts", "ack", 1, "--why", "pin replaced")
+ANEW = ("drift", "rebaseline", "--hanger", 3, "--why", "pin replaced")
+
+
+@pytest.fixture
+def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The bridge with a short history and one alert, and a stand-in for the sampler."""
+    monkeypatch.setattr(
+        rebaselining,
+        "update",
+        lambda tests, model, options, *_, **__: quick_update.update(tests, model, options),
+    )
+    folder = tmp_path / "arch"
+    shutil.copytree(bridge.folder, folder)
+    with Workspace.open(folder, {}).store() as store:
+        assert len(store.alerts()) == 1
+    return folder
+
+
+def test_an_alert_is_acknowledged_with_who_and_why(shm: Shm, workspace: Path) -> None:
+    ended = shm("--workspace", workspace, *ACK, "--who", "Jansen")
+    assert ended.code == 0, ended.err
+    assert ended.out == "Alert 1 of hanger 3 is acknowledged.\n"
+    with Workspace.open(workspace, {}).store() as store:
+        (noted,) = [stored.acknowledgement for stored in store.alerts()]
+    assert noted is not None
+    assert (noted.who, noted.why) == ("Jansen", "pin replaced")
+
+
+def test_the_list_of_alerts_says_who_took_note(shm: Shm, workspace: Path) -> None:
+    assert "open" in shm("--workspace", workspace, "alerts").out
+    noted = shm("--workspace", workspace, *ACK, "--who", "Jansen", "--json").document
+    (listed,) = shm("--workspace", workspace, "alerts", "--json").document["alerts"]
+    assert listed["acknowledged"] == noted["acknowledged"]
+    assert (noted["id"], noted["acknowledged"]["who"]) == (1, "Jansen")
+    shown = shm("--workspace", workspace, "alerts").out
+    assert "Jansen" in shown
+    assert "open" not in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("alerts", "ack", 7, "--why", "x"), 4, "no alert 7. See `shm alerts`."),
+        (("alerts", "ack", 1), 2, "--why"),
+        (("alerts", "ack", "x", "--why", "x"), 2, "ID"),
+        ((*ANEW, "--since", "2027-01-01"), 4, "no test since 2027-01-01"),
+        ((*ANEW, "--since", "lately"), 2, "--since"),
+        ((*ANEW,), 2, "--since"),
+        (("drift", "rebaseline", "--since", "2026-05-01", "--why", "x"), 2, "--hanger"),
+        (("drift", "rebaseline", "--hanger", 4, "--since", "2026-05-01", "--why", "x"), 4,
+         "no baseline yet"),
+        (("drift", "rebaseline", "--hanger", 9, "--since", "2026-05-01", "--why", "x"), 3,
+         "hanger 9"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_said_with_its_exit_code(
+    shm: Shm, workspace: Path, arguments: tuple[object, ...], code: int, said: str
+) -> None:
+    ended = shm("--workspace", workspace, *arguments)
+    assert ended.code == code, ended.err
+    assert said in " ".join(ended.err.split())
+    assert ended.out == ""
+
+
+def test_an_alert_is_acknowledged_once(shm: Shm, workspace: Path) -> None:
+    shm("--workspace", workspace, *ACK, "--who", "Jansen")
+    ended = shm("--workspace", workspace, *ACK)
+    assert ended.code == 2
+    assert "acknowledged by Jansen" in ended.err
+
+
+def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> None:
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-05-03")
+    assert ended.code == 0, ended.err
+    assert ended.out.startswith(
+        "Hanger 3 is compared with its one test since 2026-05-03 from now on: 5"
+    )
+    with Workspace.open(workspace, {}).store() as store:
+        baseline = store.baseline(3)
+    assert baseline is not None
+    assert baseline.posterior.tests == ("t2",)
+
+
+def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
+    ended = shm("drift", "rebaseline", "--workspace", workspace, *ANEW[2:], "--json",
+                "--who", "Jansen", "--since", "2026-05-02T09:00:00Z")  # fmt: skip
+    assert ended.code == 0, ended.err
+    document = ended.document
+    assert (document["hanger"], document["who"], document["why"], document["model"]) == (
+        3, "Jansen", "pin replaced", "beam1",
+    )  # fmt: skip
+    assert document["tests"] == ["t1", "t2"]
+    assert document["since"] == "2026-05-02T09:00:00Z"
+
+
+def test_drift_without_a_sub_command_lists_as_ever(shm: Shm, workspace: Path) -> None:
+    plain = shm("--workspace", workspace, "drift", "--json").document["drifts"]
+    assert [row["test"] for row in plain] == ["t2"]
+    after = shm("drift", "--workspace", workspace, "--hanger", 3, "--all", "--json").document
+    assert [row["test"] for row in after["drifts"]] == ["t1", "t2"]

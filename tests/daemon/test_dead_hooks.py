@@ -1,0 +1,136 @@
+"""Hooks that refuse or hang: what becomes of the delivery, and of the daemon."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from shm.bridge import Hook
+from shm.store import Delivery, DeliveryState, Stage, Workspace
+from shm.values import Alert
+from shm_daemon import Bell, HookNotifier, run
+from tests.helpers.flows import Clock, a_flow
+from tests.helpers.listeners import Answer, a_listener, a_silent_listener
+from tests.helpers.outboxes import make_baseline, raise_alerts
+from tests.helpers.workspaces import make_workspace
+
+
+def with_webhook(folder: Path, url: str, **settings: object) -> Workspace:
+    """A workspace whose hook `ops`, which posts to `url`, is owed an alert."""
+    workspace = make_workspace(folder, settings=settings)
+    described = Path(workspace.bridge.source)
+    hook = f'\n[[hook]]\nname = "ops"\nurl = "{url}"\nsecret_file = "secret"\n'
+    described.write_text(described.read_text() + hook)
+    (workspace.folder / "secret").write_text("not for everyone")
+    make_baseline(workspace)
+    raise_alerts(workspace, [1], ["ops"])
+    return workspace.reopened()
+
+
+def outbox(workspace: Workspace) -> Delivery:
+    with workspace.store() as store:
+        (delivery,) = store.deliveries()
+    return delivery
+
+
+@pytest.mark.parametrize(
+    ("status", "state"), [(404, DeliveryState.GIVEN_UP), (503, DeliveryState.WAITING)]
+)
+def test_what_a_server_refuses_is_given_up_at_once_and_what_may_pass_waits(
+    tmp_path: Path, status: int, state: DeliveryState
+) -> None:
+    with a_listener(lambda told: Answer(status, b"no such topic")) as listener:
+        workspace = with_webhook(tmp_path / "bridge", listener.url)
+        run(workspace, once=True, make_executor=ThreadPoolExecutor)
+    delivery = outbox(workspace)
+    assert (delivery.state, delivery.attempts) == (state, 1)
+    assert f"answered {status}: no such topic." in delivery.last_error.replace("topic ", "topic. ")
+    assert "not for everyone" not in delivery.last_error
+
+
+def test_a_server_that_hangs_holds_up_neither_the_files_nor_the_end(tmp_path: Path) -> None:
+    bell = Bell()
+    with a_silent_listener() as url:
+        workspace = with_webhook(tmp_path / "bridge", url)
+        daemon = threading.Thread(
+            target=run,
+            args=(workspace,),
+            kwargs={"bell": bell, "make_executor": ThreadPoolExecutor},
+        )
+        daemon.start()
+        for file in range(2):
+            (workspace.spool / f"{file}.csv").write_text(f"nothing,{file}\n")
+            until_refused(workspace, file + 1)
+        assert any(thread.name.startswith("hook") for thread in threading.enumerate())
+        began = time.monotonic()
+        bell.stop()
+        daemon.join(20)
+        assert not daemon.is_alive()
+        assert time.monotonic() - began < 5
+        assert not [t for t in threading.enumerate() if t.name.startswith("hook") and busy(t)]
+    left = outbox(workspace)
+    assert (left.state, left.attempts) == (DeliveryState.WAITING, 0)
+
+
+def test_a_hook_that_hangs_leaves_room_for_the_others(tmp_path: Path) -> None:
+    told, release = [], threading.Event()
+
+    def notifier(hook: Hook, alert: Alert) -> None:
+        if hook.name == "dead":
+            release.wait(20)
+        else:
+            told.append(alert.key)
+
+    hooks = {"dead": ["true"], "mail": ["true"]}
+    workspace = make_workspace(tmp_path / "bridge", hooks=hooks)
+    make_baseline(workspace)
+    raise_alerts(workspace, range(1, 21), list(hooks))
+    with a_flow(workspace, notifier=notifier) as flow:
+        end = time.monotonic() + 20
+        while len(told) < 20 and time.monotonic() < end:
+            flow.advance()
+            time.sleep(0.01)
+        assert len(told) == 20
+        release.set()
+
+
+def test_each_failure_doubles_the_wait_and_a_webhook_that_recovers_is_told(tmp_path: Path) -> None:
+    clock = Clock()
+    with a_listener(lambda told: Answer(503)) as listener:
+        workspace = with_webhook(tmp_path / "bridge", listener.url, hook_backoff_seconds=10.0)
+        notifier = HookNotifier(workspace.folder, 10.0, os.environ)
+        with a_flow(workspace, clock=clock, notifier=notifier) as flow:
+            flow.drain()
+            waits = []
+            for _ in range(3):
+                waits.append((outbox(workspace).next_attempt_at - clock()).total_seconds())
+                clock.pass_by(waits[-1])
+                flow.drain()
+            assert waits == [10.0, 20.0, 40.0]
+            listener.answer = lambda told: Answer()
+            clock.pass_by(80.0)
+            flow.drain()
+    assert outbox(workspace).state is DeliveryState.DELIVERED
+    assert len({told.headers["Idempotency-Key"] for told in listener.told}) == 1
+    assert len(listener.told) == 5
+
+
+def until_refused(workspace: Workspace, number: int) -> None:
+    end = time.monotonic() + 20
+    while time.monotonic() < end:
+        with workspace.store() as store:
+            if store.stage_counts()[Stage.REFUSED] == number:
+                return
+        time.sleep(0.05)
+    raise TimeoutError(f"{number} files are not refused")
+
+
+def busy(thread: threading.Thread) -> bool:
+    """Whether a thread of the couriers is still there, given a moment."""
+    thread.join(3)
+    return thread.is_alive()

@@ -1,0 +1,42 @@
+"""Outboxes full of alerts, by the store's own verbs, without any sampler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
+from shm.values import Selection
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test, an_alert
+
+_LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+
+
+def make_baseline(workspace: Workspace) -> None:
+    """The first test of hanger 3, with which later ones are compared."""
+    with workspace.store() as store:
+        (test,) = _entered(store, [0])
+        store.selected(3, [test], Selection((a_posterior(),), (1.0,)), _LINEAGE, NOW)
+
+
+def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[str]) -> None:
+    """A test, its alert and the deliveries owed for it, for each number from 1 up."""
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        for test in _entered(store, numbers):
+            name = test.test.id
+            store.updated(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
+            alert = an_alert(f"hanger-3:{name}", name)
+            assert (
+                store.watched(test, baseline, a_watched_test(name), alert, hooks, NOW) is not None
+            )
+
+
+def _entered(store: Store, numbers: Iterable[int]) -> list[StoredTest]:
+    names = set()
+    for number in numbers:
+        recording = store.receive(a_file(number), NOW).recording
+        test = a_test(f"t{number}", days=number / 10)
+        store.identified(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
+        names.add(test.id)
+    return [test for test in store.tests(3) if test.test.id in names]

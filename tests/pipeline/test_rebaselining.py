@@ -1,0 +1,124 @@
+"""A hanger is compared with itself anew: which tests, in which class, and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+import pytest
+
+from shm.errors import NothingThere
+from shm.models import Model
+from shm.pipeline import rebaselining
+from shm.pipeline.rebaselining import Order, rebaseline
+from shm.store import Baseline, Stage, Workspace
+from shm.update import UpdateOptions
+from shm.values import ModalTest, Posterior
+from tests.helpers import quick_update
+from tests.helpers.flows import Clock, a_flow, ingest, receive_all
+from tests.helpers.workspaces import START, write_test
+
+AT = START + timedelta(days=50)
+
+
+@pytest.fixture
+def hints(monkeypatch: pytest.MonkeyPatch) -> list[Posterior]:
+    """The stand-in for the sampler; holds what it was told of where to look."""
+    told: list[Posterior] = []
+
+    def quick(
+        tests: Sequence[ModalTest], model: Model, options: UpdateOptions, *_: Any, hint: Posterior
+    ) -> Posterior:
+        told.append(hint)
+        return quick_update.update(tests, model, options)
+
+    monkeypatch.setattr(rebaselining, "update", quick)
+    return told
+
+
+@pytest.fixture
+def history(workspace: Workspace) -> Workspace:
+    """A test a day; from the third on a tenth of the tension is gone."""
+    for day, tension in enumerate((1.0, 1.0, 0.9, 0.9)):
+        spool(workspace, day, tension)
+    ingest(workspace)
+    return workspace
+
+
+def spool(workspace: Workspace, day: int, tension: float) -> None:
+    path = workspace.spool / f"t{day}.modes.json"
+    write_test(path, workspace, day=day, tension=tension)
+
+
+def anew(workspace: Workspace, day: float, hanger: int = 3) -> Baseline:
+    order = Order(START + timedelta(days=day), "a new pin", "engineer")
+    with workspace.store() as store:
+        return rebaseline(workspace, store, workspace.bridge.hanger(hanger), order, AT)
+
+
+def test_the_tests_since_that_day_make_the_baseline(
+    history: Workspace, hints: list[Posterior]
+) -> None:
+    made = anew(history, 2)
+    assert made.posterior.tests == ("t2", "t3")
+    assert made.posterior.model == "beam1"
+    assert made.posterior.tension_n.mean() == pytest.approx(0.9 * 711e3, rel=0.01)
+    assert (made.who, made.why, made.since, made.set_at) == (
+        "engineer", "a new pin", START + timedelta(days=2), AT,
+    )  # fmt: skip
+    (hint,) = hints
+    assert hint.tests == ("t0",)
+
+
+def test_later_tests_are_compared_with_it_and_earlier_figures_stay(
+    history: Workspace, hints: list[Posterior]
+) -> None:
+    with history.store() as store:
+        before = store.drifts(3)
+    anew(history, 2)
+    spool(history, 5, 0.9)
+    ingest(history)
+    with history.store() as store:
+        after = store.drifts(3)
+        lately = [drift for drift in after if drift.test == "t5" and drift.quantity == "tension"]
+    assert after[: len(before)] == before
+    assert next(drift.shift_mean for drift in before if drift.test == "t3") < -0.08
+    assert lately[0].shift_mean == pytest.approx(0, abs=0.01)
+
+
+def test_the_same_tests_give_the_same_baseline(history: Workspace, hints: list[Posterior]) -> None:
+    first, second = anew(history, 2), anew(history, 2)
+    assert first.id < second.id
+    assert (first.posterior.samples == second.posterior.samples).all()
+
+
+def test_a_test_still_on_its_way_is_a_later_one(history: Workspace, hints: list[Posterior]) -> None:
+    spool(history, 6, 0.9)
+    with a_flow(history, clock=Clock()) as flow:
+        receive_all(flow)
+    with history.store() as store:
+        assert store.stage_counts()[Stage.RECEIVED] == 1
+    assert anew(history, 2).posterior.tests == ("t2", "t3")
+
+
+@pytest.mark.parametrize("day", [3.5, 40])
+def test_without_a_test_as_young_as_that_nothing_is_done(
+    history: Workspace, hints: list[Posterior], day: float
+) -> None:
+    with pytest.raises(NothingThere, match="its latest is of 2026-05-04") as caught:
+        anew(history, day)
+    assert "--since" in caught.value.remedy
+    assert hints == []
+
+
+def test_without_a_baseline_there_is_none_to_replace(
+    workspace: Workspace, hints: list[Posterior]
+) -> None:
+    with pytest.raises(NothingThere, match="no baseline yet"):
+        anew(workspace, 0)
+
+
+def test_the_sampler_itself_takes_such_an_order(history: Workspace) -> None:
+    made = anew(history, 2)
+    assert made.posterior.tension_n.mean() == pytest.approx(0.9 * 711e3, rel=0.02)

@@ -1,0 +1,343 @@
+"""The pattern over the bridge: who shed load, who took it up, and when it is no hanger at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+from shm.errors import NothingThere
+from shm.values import Drift, FloatArray
+from shm.watch.neighbours import (
+    BridgePattern,
+    HangerShift,
+    NeighbourOptions,
+    bridge_pattern,
+    shifts_of,
+)
+from shm.watch.neighbours.evidence import (
+    Bridge,
+    independent,
+    shed_factors,
+    weighed,
+    with_sign,
+)
+
+NOW = datetime(2026, 5, 1, tzinfo=UTC)
+NOISE = 0.003
+HANGERS = 20
+ORDER = tuple(range(1, HANGERS + 1))
+OPTIONS = NeighbourOptions()
+CALIBRATION_RUNS = 100
+QUIET_RUNS = 60
+
+
+def tensions(rng: np.random.Generator) -> FloatArray:
+    return np.asarray(700e3 * np.clip(1 + 0.15 * rng.standard_normal(HANGERS), 0.5, 2))
+
+
+def shed(baseline: FloatArray, index: int, fraction: float, shares: Sequence[float]) -> FloatArray:
+    """Shifts where one hanger loses a fraction of its tension to those within two places."""
+    shift, lost = np.zeros(len(baseline)), fraction * baseline[index]
+    shift[index] -= lost
+    for step, share in zip((-2, -1, 1, 2), shares, strict=True):
+        if 0 <= index + step < len(baseline):
+            shift[index + step] += share * lost
+    return shift
+
+
+def measured(
+    rng: np.random.Generator,
+    baseline: FloatArray,
+    shift: FloatArray,
+    missing: Sequence[int] = (),
+    stated: float = 1.0,
+) -> list[HangerShift]:
+    """Shifts with noise; hangers count from 1. `stated` is the stated noise over the true one."""
+    sd = NOISE * baseline
+    seen = shift + sd * rng.standard_normal(len(baseline))
+    return [
+        HangerShift(i + 1, i, NOW, baseline[i], seen[i], stated * sd[i])
+        for i in range(len(baseline))
+        if i + 1 not in missing
+    ]
+
+
+def named(pattern: BridgePattern) -> str:
+    best = pattern.explanations[0]
+    return best.name if best.probability >= OPTIONS.named_from else "undecided"
+
+
+def sure(shift_n: dict[int, float], **changes: object) -> list[HangerShift]:
+    """Twelve hangers of 700 kN, nearly noiseless, at rest but for `shift_n`."""
+    return [
+        replace(HangerShift(i, i - 1, NOW, 700e3, shift_n.get(i, 0.0), 1.5e3), **changes)  # type: ignore[arg-type]
+        for i in range(1, 13)
+    ]
+
+
+# ---------------------------------------------------------------- the evidence
+
+
+@pytest.fixture(scope="module")
+def pair() -> Bridge:
+    shifts = [
+        HangerShift(1, 0, NOW, 700e3, -9e3, 2e3),
+        HangerShift(2, 1, NOW, 500e3, 5e3, 1.5e3),
+    ]
+    return Bridge.of(shifts, OPTIONS)
+
+
+def test_the_closed_form_agrees_with_integration_over_the_shifts(pair: Bridge) -> None:
+    factor = 0.03 * shed_factors(pair, OPTIONS)[0]
+    covariance = factor @ factor.T
+    grid = np.linspace(-90e3, 90e3, 1201)
+    step = (grid[1] - grid[0]) ** 2
+    points = np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1)
+    density = multivariate_normal(cov=covariance).pdf(points) * multivariate_normal(
+        pair.shift_n, pair.noise
+    ).pdf(points)
+    found = weighed(pair, factor[None])
+    assert found.log_evidence[0] == pytest.approx(np.log(density.sum() * step), abs=1e-4)
+    mean = (points[..., 0] * density).sum() / density.sum()
+    assert found.mean_n[0, 0] == pytest.approx(mean, rel=1e-4)
+    lost = density[grid < 0].sum() * 2 * step
+    of_loss = with_sign(found, np.array([[0]]), -1)[0]
+    assert of_loss == pytest.approx(np.log(lost), abs=1e-3)
+
+
+def test_hangers_by_themselves_agree_with_integration_over_chance_and_common_noise(
+    pair: Bridge,
+) -> None:
+    common = np.linspace(-7, 7, 2001)
+    chance = (np.arange(2000) + 0.5) / 2000
+    still, moved = np.ones((2, len(common))), np.ones((2, len(common)))
+    for index in range(2):
+        left = pair.shift_n[index] - common * pair.common_sd_n[index]
+        still[index] = norm.pdf(left, scale=pair.sd_n[index])
+        moved[index] = np.mean(
+            [
+                norm.pdf(left, scale=np.hypot(pair.sd_n[index], size * pair.baseline_n[index]))
+                for size in OPTIONS.sizes_fraction
+            ],
+            axis=0,
+        )
+    weight = norm.pdf(common) * (common[1] - common[0])
+    whole = sum(
+        np.mean(chance**a * (1 - chance) ** (2 - a)) * (weight * density).sum()
+        for a, density in (
+            (1, still[0] * moved[1] + moved[0] * still[1]),
+            (2, moved[0] * moved[1]),
+        )
+    )
+    assert independent(pair, OPTIONS).log_evidence == pytest.approx(
+        np.log(whole / (2 / 3)), abs=1e-4
+    )
+
+
+def test_a_pattern_keeps_the_sum_and_an_end_leaves_its_neighbours_share_unseen() -> None:
+    factors = shed_factors(Bridge.of(sure({}), OPTIONS), OPTIONS) / 700e3
+    sums = factors.sum(axis=1)
+    assert sums[2:-2] == pytest.approx(np.zeros((8, 5)), abs=1e-12)
+    assert sums[0, 0] == pytest.approx(-0.5)
+    assert factors[5, [5, 6, 7, 9], 0] == pytest.approx([-1, 0.35, 0.15, 0])
+
+
+def test_the_probabilities_add_to_one() -> None:
+    pattern = bridge_pattern(sure({5: -20e3, 6: 9e3}))
+    assert sum(each.probability for each in pattern.explanations) == pytest.approx(1)
+    assert len(pattern.explanations) == 5
+    for row in pattern.rows:
+        assert 0 <= row.gained_probability + row.lost_probability <= 1 + 1e-9
+
+
+# ---------------------------------------------------------------- simulated bridges
+
+
+def test_shed_load_is_named_with_the_right_hanger() -> None:
+    rng, right = np.random.default_rng(1), 0
+    for _ in range(CALIBRATION_RUNS):
+        baseline, index = tensions(rng), int(rng.integers(HANGERS))
+        shift = shed(baseline, index, 0.05, rng.dirichlet([1.5, 4, 4, 1.5]))
+        pattern = bridge_pattern(measured(rng, baseline, shift), ORDER)
+        right += named(pattern) == "shed load" and pattern.suspects[0].hangers == (index + 1,)
+    assert right >= 0.95 * CALIBRATION_RUNS
+
+
+@pytest.mark.parametrize(("stated", "false_names"), [(1.0, 1), (0.6, 3)])
+def test_a_bridge_at_rest_is_not_accused_even_where_the_noise_is_understated(
+    stated: float, false_names: int
+) -> None:
+    rng, wrong = np.random.default_rng(2), 0
+    for _ in range(QUIET_RUNS):
+        baseline = tensions(rng)
+        shifts = measured(rng, baseline, np.zeros(HANGERS), stated=stated)
+        wrong += named(bridge_pattern(shifts)) not in ("nothing moved", "undecided")
+    assert wrong <= false_names
+
+
+def test_a_common_shift_is_named_and_not_put_down_to_a_hanger() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        baseline = tensions(rng)
+        pattern = bridge_pattern(measured(rng, baseline, -0.01 * baseline))
+        assert named(pattern) == "all alike"
+        assert pattern.alike_fraction == pytest.approx(-0.01, abs=0.003)
+        assert pattern.sentence.startswith("All 20 hangers moved by about -")
+
+
+def test_two_hangers_that_shed_at_once_are_both_named() -> None:
+    rng, right = np.random.default_rng(4), 0
+    for _ in range(20):
+        baseline = tensions(rng)
+        shares = rng.dirichlet([1.5, 4, 4, 1.5], 2)
+        shift = shed(baseline, 4, 0.05, shares[0]) + shed(baseline, 12, 0.04, shares[1])
+        pattern = bridge_pattern(measured(rng, baseline, shift))
+        right += named(pattern) == "shed load" and pattern.suspects[0].hangers == (5, 13)
+    assert right >= 19
+
+
+def test_a_hanger_whose_neighbour_has_no_test_is_still_named() -> None:
+    rng, right = np.random.default_rng(5), 0
+    for _ in range(20):
+        baseline = tensions(rng)
+        shift = shed(baseline, 6, 0.05, rng.dirichlet([1.5, 4, 4, 1.5]))
+        pattern = bridge_pattern(measured(rng, baseline, shift, missing=(6,)), ORDER)
+        right += named(pattern) == "shed load" and pattern.suspects[0].hangers == (7,)
+        assert [each.hanger for each in pattern.not_compared] == [6]
+    assert right >= 18
+
+
+# ---------------------------------------------------------------- what the owner reads
+
+
+def test_the_sentence_says_who_lost_and_who_took_it_up() -> None:
+    pattern = bridge_pattern(sure({6: 16e3, 7: -34e3, 8: 15e3, 9: 3e3}))
+    assert pattern.explanations[0].name == "shed load"
+    assert pattern.sentence.startswith(
+        "Hanger 7 has lost 34 kN (90 % 32 to 36) and its neighbours 6 and 8 have taken up 31 kN "
+    )
+    ways = {row.hanger: row.way for row in pattern.rows if row.way != "unchanged"}
+    assert ways == {6: "gained", 7: "lost", 8: "gained"}
+    kept = pattern.sum_kept
+    assert kept.hangers == (5, 6, 7, 8, 9)
+    assert kept.complete
+    assert kept.sum_n == pytest.approx(0, abs=1)
+    assert kept.probability > 0.99
+
+
+def test_load_that_a_hanger_gained_from_its_neighbours_is_told_from_shed_load() -> None:
+    pattern = bridge_pattern(sure({5: -6e3, 6: -12e3, 7: 34e3, 8: -11e3, 9: -5e3}))
+    assert named(pattern) == "gained load"
+    assert "Hanger 7 has gained 34 kN" in pattern.sentence
+    assert "given up" in pattern.sentence
+
+
+def test_a_loss_that_no_neighbour_takes_up_points_to_the_hanger_by_itself() -> None:
+    pattern = bridge_pattern(sure({7: -34e3}))
+    assert named(pattern) == "each by itself"
+    assert pattern.sum_kept.probability < 0.05
+    assert pattern.sentence.startswith("Hanger 7 has lost 34 kN")
+    assert "its sensor" in pattern.sentence
+
+
+def test_a_loss_at_the_end_of_the_bridge_says_that_the_end_may_carry_a_part() -> None:
+    pattern = bridge_pattern(sure({1: -34e3, 2: 12e3, 3: 5e3}))
+    assert pattern.suspects[0].hangers == (1,)
+    assert named(pattern) == "shed load"
+    assert not pattern.sum_kept.complete
+    assert "bridge's end" in pattern.remarks[0]
+
+
+def test_a_doubt_between_two_hangers_is_said() -> None:
+    shifts = [each for each in sure({6: -17e3, 7: 17e3}) if each.hanger not in (5, 8)]
+    pattern = bridge_pattern(shifts)
+    assert named(pattern) == "undecided"
+    assert "cannot be told" in pattern.sentence
+
+
+@pytest.mark.parametrize(
+    ("change_k", "words"),
+    [
+        (0.4, "a clock or a load on the whole deck"),
+        (18.0, r"all tests lie about +18 K from their baselines"),
+        (float("nan"), "a temperature or a clock"),
+    ],
+)
+def test_a_common_shift_is_put_down_to_what_the_temperatures_admit(
+    change_k: float, words: str
+) -> None:
+    shifts = sure(dict.fromkeys(range(1, 13), -12e3), temperature_change_k=change_k)
+    pattern = bridge_pattern(shifts)
+    assert named(pattern) == "all alike"
+    assert words in pattern.sentence
+
+
+def test_shifts_that_go_with_the_temperatures_of_the_tests_name_the_temperature() -> None:
+    changes = np.linspace(-15, 20, 12)
+    shifts = [
+        replace(each, shift_n=-600 * change, temperature_change_k=float(change))
+        for each, change in zip(sure({}), changes, strict=True)
+    ]
+    pattern = bridge_pattern(shifts)
+    assert named(pattern) == "all alike"
+    assert pattern.alike_cause == "the temperature"
+
+
+def test_the_hangers_of_one_logger_name_that_logger() -> None:
+    shifts = [
+        replace(each, logger="B7", shift_n=each.shift_n - 9e3) if each.hanger % 3 == 0 else each
+        for each in sure({}, logger="A1")
+    ]
+    pattern = bridge_pattern(shifts)
+    assert named(pattern) == "all alike"
+    assert pattern.alike_cause == "logger B7"
+    assert pattern.alike_fraction == pytest.approx(-9 / 700, abs=2e-3)
+
+
+# ---------------------------------------------------------------- which tests are compared
+
+
+def test_tests_older_than_the_window_are_listed_and_not_compared() -> None:
+    shifts = sure({7: -34e3, 6: 16e3, 8: 18e3})
+    shifts[0] = replace(shifts[0], time=NOW - timedelta(days=31), shift_n=-90e3)
+    shifts[1] = replace(shifts[1], time=NOW - timedelta(days=29))
+    pattern = bridge_pattern(shifts, (*range(1, 13), 40))
+    assert [(each.hanger, each.time) for each in pattern.not_compared] == [
+        (1, shifts[0].time),
+        (40, None),
+    ]
+    assert [row.hanger for row in pattern.rows] == list(range(2, 13))
+    assert pattern.suspects[0].hangers == (7,)
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_fewer_than_three_hangers_make_no_pattern(old: bool) -> None:
+    shifts = sure({})[:3] if old else sure({})[:2]
+    if old:
+        shifts[0] = replace(shifts[0], time=NOW - timedelta(days=99))
+    with pytest.raises(NothingThere, match="only 2 of the hangers"):
+        bridge_pattern(shifts)
+
+
+def test_shifts_are_the_latest_known_drifts_of_the_tension_in_their_order() -> None:
+    def drift(hanger: int, day: int, shift: float, quantity: str = "tension") -> Drift:
+        time = NOW + timedelta(days=day)
+        return Drift(hanger, f"t{day}", time, quantity, 700e3, 0, shift, 0.002, 0.05, 0.1)
+
+    drifts = {
+        4: [drift(4, 2, -0.03), drift(4, 1, 0.5), drift(4, 3, 0.2, "log10_k1")],
+        9: [drift(9, 1, 0.01), drift(9, 2, float("nan"))],
+        5: [drift(5, 1, 0.1, "log10_k1")],
+    }
+    found = shifts_of(drifts, (9, 7, 5, 4), temperature_changes_k={9: 3.0}, loggers={4: "A"})
+    assert [(each.hanger, each.place) for each in found] == [(9, 0), (4, 3)]
+    assert [each.shift_n for each in found] == pytest.approx([7e3, -21e3])
+    assert [each.shift_sd_n for each in found] == pytest.approx([1.4e3, 1.4e3])
+    assert found[0].temperature_change_k == 3.0
+    assert np.isnan(found[1].temperature_change_k)
+    assert found[1].logger == "A"

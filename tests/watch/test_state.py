@@ -1,0 +1,397 @@
+"""The state over time: exact where it can be checked, calibrated where it is simulated."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from shm.errors import NothingThere, UsageError
+from shm.values import FloatArray
+from shm.values.drift import Change, Reading, WatchedQuantity
+from shm.watch.history import StateHistory
+from shm.watch.state import StateOptions, set_free, states
+
+START = datetime(2024, 1, 1, tzinfo=UTC)
+BASELINE_N = 711e3
+_GRID = np.linspace(-1, 1, 201)
+TENSION = WatchedQuantity("tension", BASELINE_N, _GRID, BASELINE_N * np.exp(_GRID), 0.05)
+SPRING = WatchedQuantity("log10_k1", 7.0, _GRID, 7 + 40 * np.tanh(_GRID), 0.01, end="deck")
+OPTIONS = StateOptions(reference_temperature_c=12.0)
+FIXED = replace(OPTIONS, rate_log_sd=1e-6, scatter_log_sd=1e-6)
+"""Rates and scatters as good as known, so that nothing is mixed over them."""
+SERIES = 50
+
+
+def reading(
+    day: float, mean: FloatArray | list[float], sd: float = 1e-3, temperature_c: float = 12.0
+) -> Reading:
+    """A test that sees every quantity with the same sd."""
+    where = np.asarray(mean, np.float64)
+    time = START + timedelta(days=day)
+    return Reading(f"t{day:g}", time, temperature_c, where, np.eye(len(where)) / sd**2)
+
+
+def weekly(levels: FloatArray, seed: int = 0, sd: float = 1e-3) -> list[Reading]:
+    """Weekly readings about `levels` (n,) of the tension."""
+    noisy = levels + np.random.default_rng(seed).normal(0, sd, len(levels))
+    return [reading(7.0 * week, [x], sd) for week, x in enumerate(noisy)]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A simulated hanger: its true level (n,), its coefficient, and what is found of them."""
+
+    level: FloatArray
+    coefficient: float
+    history: StateHistory
+
+
+def simulated(seed: int) -> Simulated:
+    """Two years of irregular tests with seasons, a wandering level, scatter and reading errors."""
+    rng = np.random.default_rng(seed)
+    days = np.cumsum(rng.exponential(14.0, 50))
+    steps = 0.005 * np.sqrt(np.diff(days, prepend=days[0]) / 365.25)
+    level = 0.01 * rng.normal() + np.cumsum(steps * rng.normal(size=len(days)))
+    temperatures = 12 + 12 * np.sin(2 * np.pi * days / 365.25) + rng.normal(0, 4, len(days))
+    coefficient, sds = 2e-3 * rng.normal(), rng.uniform(5e-4, 2e-3, len(days))
+    means = level + coefficient * (temperatures - 12) + np.hypot(sds, 1e-3) * rng.normal(size=50)
+    readings = [
+        reading(float(day), [x], float(sd), float(c))
+        for day, x, sd, c in zip(days, means, sds, temperatures, strict=True)
+    ]
+    return Simulated(level, coefficient, states(readings, [TENSION], options=OPTIONS))
+
+
+@pytest.fixture(scope="module")
+def series() -> list[Simulated]:
+    return [simulated(seed) for seed in range(SERIES)]
+
+
+def held(truth: FloatArray, mean: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Whether the 90 % band holds the truth, (n,)."""
+    reach = 1.645 * np.sqrt(covariance[:, 0, 0])
+    return np.asarray(np.abs(mean[:, 0] - truth) < reach)
+
+
+def _per_kelvin(quantity: WatchedQuantity) -> float:
+    if quantity.name == "tension":
+        return OPTIONS.tension_per_kelvin_sd
+    return OPTIONS.spring_per_kelvin_sd_of_step * quantity.step_sd
+
+
+def jointly(history: StateHistory, upto: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Level (q,) and covariance at test `upto` - 1 by the joint normal law of all, no recursion.
+
+    Also the coefficients' means, and the log density of the readings; every reading sees all.
+    """
+    readings, q = history.readings[:upto], len(history.quantities)
+    warmth = [r.temperature_c - history.reference_temperature_c for r in readings]
+    years = [(b.time - a.time) / timedelta(days=365.25) for a, b in pairwise(readings)]
+    rows = np.block([[np.eye(q) * (s <= t) for s in range(upto)] for t in range(upto)])
+    rows = np.hstack([rows, np.kron(np.array(warmth)[:, None], np.eye(q))])
+    steps = [np.array([3 * each.step_sd for each in history.quantities]) ** 2]
+    steps += [history.level_rate**2 * dt for dt in years]
+    prior = np.diag(
+        np.concatenate([*steps, [_per_kelvin(each) ** 2 for each in history.quantities]])
+    )
+    noise = np.kron(np.eye(upto), np.diag(history.scatter**2))
+    for t, each in enumerate(readings):
+        noise[t * q : (t + 1) * q, t * q : (t + 1) * q] += np.linalg.inv(each.information)
+    total, y = rows @ prior @ rows.T + noise, np.concatenate([r.mean for r in readings])
+    gain = np.linalg.solve(total, rows @ prior).T
+    mean, covariance = gain @ y, prior - gain @ rows @ prior
+    last = np.hstack([*[np.eye(q)] * upto, np.zeros((q, q))])
+    density = -(y @ np.linalg.solve(total, y) + np.linalg.slogdet(2 * np.pi * total)[1]) / 2
+    return last @ mean, last @ covariance @ last.T, mean[-q:], float(density)
+
+
+def test_a_level_that_does_not_wander_is_the_weighted_mean() -> None:
+    still = replace(FIXED, rate_of_step=1e-9, scatter_of_step=1e-9, tension_per_kelvin_sd=1e-12)
+    sds, means = np.array([1e-3, 2e-3, 5e-4, 1e-3]), np.array([0.004, 0.001, 0.003, 0.002])
+    readings = [reading(10.0 * i, [x], s) for i, (x, s) in enumerate(zip(means, sds, strict=True))]
+    history = states(readings, [TENSION], options=still)
+    weight = np.append(1 / sds**2, 1 / 0.15**2)
+    assert history.smoothed_mean[:, 0] == pytest.approx(
+        np.full(4, weight[:4] @ means / weight.sum())
+    )
+    assert history.smoothed_covariance[:, 0, 0] == pytest.approx(np.full(4, 1 / weight.sum()))
+    assert history.filtered_mean[0, 0] == pytest.approx(means[0] * weight[0] / weight[[0, 4]].sum())
+
+
+def test_a_single_level_follows_a_hand_written_kalman_filter() -> None:
+    readings = [reading(day, [x]) for day, x in [(0, 0.001), (3, 0.004), (40, -0.002), (400, 0.01)]]
+    history = states(readings, [TENSION], options=FIXED)
+    mean, variance = 0.0, 0.15**2
+    rate, noise = history.level_rate[0], 1e-6 + history.scatter[0] ** 2
+    before = 0.0
+    for at, each in enumerate(readings):
+        day = (each.time - START) / timedelta(days=1)
+        variance += rate**2 * (day - before) / 365.25 * (at > 0)
+        gain, before = variance / (variance + noise), day
+        mean, variance = mean + gain * (each.mean[0] - mean), (1 - gain) * variance
+        assert history.filtered_mean[at, 0] == pytest.approx(mean, rel=1e-6)
+        assert history.filtered_covariance[at, 0, 0] == pytest.approx(variance, rel=1e-6)
+
+
+def two_quantities() -> list[Reading]:
+    rng = np.random.default_rng(5)
+    readings = []
+    for day in np.cumsum(rng.exponential(20, 12)):
+        root = rng.normal(size=(2, 2)) * 800
+        each = reading(float(day), rng.normal(0, 2e-3, 2), temperature_c=float(rng.normal(12, 9)))
+        readings.append(replace(each, information=root.T @ root + 1e5 * np.eye(2)))
+    return readings
+
+
+def test_two_quantities_follow_the_joint_normal_law() -> None:
+    history = states(two_quantities(), [TENSION, SPRING], options=FIXED)
+    for upto in (1, 5, 12):
+        mean, covariance, _, _ = jointly(history, upto)
+        assert history.filtered_mean[upto - 1] == pytest.approx(mean, rel=1e-5, abs=1e-9)
+        assert history.filtered_covariance[upto - 1] == pytest.approx(covariance, rel=1e-4)
+    mean, covariance, coefficients, _ = jointly(history, 12)
+    assert history.smoothed_mean[-1] == pytest.approx(mean, rel=1e-5)
+    assert history.coefficient_mean == pytest.approx(coefficients, rel=1e-5)
+
+
+def test_rates_and_scatters_are_those_of_the_largest_posterior_density() -> None:
+    history = states(two_quantities(), [TENSION, SPRING], options=OPTIONS)
+    steps = np.array([TENSION.step_sd, SPRING.step_sd])
+
+    def density(rates: FloatArray, scatters: FloatArray) -> float:
+        z = np.log(rates / OPTIONS.rate_of_step / steps) / OPTIONS.rate_log_sd
+        w = np.log(scatters / OPTIONS.scatter_of_step / steps) / OPTIONS.scatter_log_sd
+        tried = replace(history, level_rate=rates, scatter=scatters)
+        return jointly(tried, 12)[3] - float(z @ z + w @ w) / 2
+
+    best = density(history.level_rate, history.scatter)
+    for j in range(2):
+        for factor in (0.8, 1.25):
+            other = np.where(np.arange(2) == j, factor, 1.0)
+            assert density(history.level_rate * other, history.scatter) < best
+            assert density(history.level_rate, history.scatter * other) < best
+
+
+def test_ninety_percent_bands_hold_the_true_level_nine_times_in_ten(
+    series: list[Simulated],
+) -> None:
+    filtered, smoothed = [], []
+    for each in series:
+        found = each.history
+        filtered.append(held(each.level, found.filtered_mean, found.filtered_covariance))
+        smoothed.append(held(each.level, found.smoothed_mean, found.smoothed_covariance))
+    assert 0.84 <= np.mean(filtered) <= 0.95
+    assert 0.84 <= np.mean(smoothed) <= 0.95
+
+
+def test_the_temperature_coefficient_is_found_and_its_sd_is_honest(series: list[Simulated]) -> None:
+    errors = []
+    for each in series:
+        (found,) = each.history.temperature_coefficients()
+        assert found.sd < 1.5e-4
+        errors.append((found.mean - each.coefficient) / found.sd)
+    assert 0.8 <= np.mean(np.abs(errors) < 1.645) <= 0.98
+
+
+def test_a_gap_of_a_year_widens_the_band_and_no_more() -> None:
+    readings = weekly(np.zeros(40))
+    late = [replace(r, time=r.time + timedelta(days=365)) for r in readings[20:]]
+    history = states([*readings[:20], *late], [TENSION], options=OPTIONS)
+    sd = np.sqrt(history.filtered_covariance[:, 0, 0])
+    assert sd[20] > 1.1 * sd[19]
+    assert sd[-1] < 1.1 * sd[19]
+    assert np.all(np.abs(history.smoothed_mean[:, 0]) < 3e-3)
+
+
+def test_known_outliers_of_ten_sd_move_the_level_by_less_than_half_its_sd() -> None:
+    clean = weekly(np.zeros(60), seed=3)
+    blunders = {11: 1, 30: -1, 31: -1, 59: 1}
+    dirty = [
+        replace(r, mean=r.mean + 0.01 * blunders[at]) if at in blunders else r
+        for at, r in enumerate(clean)
+    ]
+    weights = np.array([0.999 if at in blunders else 0.003 for at in range(60)])
+    before = states(clean, [TENSION], options=OPTIONS)
+    after = states(dirty, [TENSION], weights, options=OPTIONS)
+    trusting = states(dirty, [TENSION], options=OPTIONS)
+    sd = np.sqrt(before.smoothed_covariance[:, 0, 0])
+    assert np.all(np.abs(after.smoothed_mean - before.smoothed_mean)[:, 0] < sd / 2)
+    assert np.any(np.abs(trusting.smoothed_mean - before.smoothed_mean)[:, 0] > sd)
+
+
+def test_a_called_step_is_followed_within_one_test() -> None:
+    readings = weekly(np.where(np.arange(40) < 25, 0.0, -0.08), seed=4)
+    called = states(readings, [TENSION], changes=[readings[25].time], options=OPTIONS)
+    assert called.filtered_mean[24, 0] == pytest.approx(0.0, abs=2e-3)
+    assert called.filtered_mean[25, 0] == pytest.approx(-0.08, abs=4e-3)
+    assert called.smoothed_mean[24, 0] == pytest.approx(0.0, abs=2e-3)
+    assert called.level_rate[0] < 0.01
+    uncalled = states(readings, [TENSION], options=OPTIONS)
+    assert uncalled.level_rate[0] > 5 * called.level_rate[0]
+
+
+def test_a_change_between_two_tests_frees_the_level_at_the_later_one() -> None:
+    readings = weekly(np.where(np.arange(20) < 10, 0.0, 0.05), seed=6)
+    between, after = readings[10].time - timedelta(days=2), readings[-1].time + timedelta(days=1)
+    exact = states(readings, [TENSION], changes=[readings[10].time], options=OPTIONS)
+    history = states(readings, [TENSION], changes=[between, after], options=OPTIONS)
+    assert np.array_equal(history.filtered_mean, exact.filtered_mean)
+    assert history.filtered_mean[10, 0] == pytest.approx(0.05, abs=4e-3)
+
+
+def called(readings: list[Reading], first: int, last: int, sudden: float) -> Change:
+    """A change that began after test `first` and by test `last`."""
+    return Change(900.0, 100.0, 1.0, sudden, readings[first].time, readings[last].time, ())
+
+
+def test_a_called_step_frees_the_tests_of_its_beginning_a_ramp_none() -> None:
+    readings = weekly(np.zeros(30))
+    times = [each.time for each in readings]
+    clear, vague = called(readings, 3, 6, 0.9), called(readings, 8, 20, 0.9)
+    assert set_free([clear], readings) == tuple(times[4:7])
+    assert set_free([clear, clear, vague], readings) == (*times[4:7], times[20])
+    assert set_free([called(readings, 3, 6, 0.1), called(readings, 3, 6, math.nan)], readings) == ()
+
+
+@pytest.mark.parametrize("tests", [1, 2, 3])
+def test_with_few_tests_the_priors_decide(tests: int) -> None:
+    readings = weekly(np.array([0.001, 0.012, -0.004])[:tests], seed=7)
+    history = states(readings, [TENSION], options=OPTIONS)
+    (coefficient,) = history.temperature_coefficients()
+    assert coefficient.sd == pytest.approx(OPTIONS.tension_per_kelvin_sd)
+    assert 1e-3 < history.level_rate[0] < 0.05
+    assert 3e-4 < history.scatter[0] < 0.012
+    band = history.filtered("tension")
+    assert np.all((band.low < band.middle) & (band.middle < band.high))
+    assert np.all((band.high - band.low) < 0.05 * BASELINE_N)
+
+
+def test_directions_not_seen_keep_their_uncertainty() -> None:
+    """Tests that see only the sum of two quantities tell the sum, and no more of each."""
+    along = np.array([1.0, 1.0]) / math.sqrt(2)
+    readings = [
+        replace(reading(7.0 * week, 0.004 * along), information=np.outer(along, along) * 1e6)
+        for week in range(30)
+    ]
+    history = states(readings, [TENSION, TENSION], options=OPTIONS)
+    across = np.array([1.0, -1.0]) / math.sqrt(2)
+    assert along @ history.smoothed_mean[-1] == pytest.approx(0.004, rel=0.01)
+    assert across @ history.smoothed_covariance[-1] @ across == pytest.approx(0.15**2, rel=0.01)
+
+
+def test_coordinates_of_very_different_size_are_both_followed() -> None:
+    """A spring of an end that is nearly clamped moves frequencies by a part in a million."""
+    tiny = replace(SPRING, step_sd=2e-6)
+    information = np.linalg.inv(np.array([[1e-6, -5e-10], [-5e-10, 1e-12]]))
+    readings = [
+        replace(reading(7.0 * week, [-0.03, 4e-6]), information=information) for week in range(40)
+    ]
+    history = states(readings, [TENSION, tiny], options=OPTIONS)
+    assert history.smoothed_mean[-1] == pytest.approx([-0.03, 4e-6], rel=0.05)
+    assert history.level_rate[1] < 1e-6
+
+
+def test_a_quantity_that_no_test_sees_is_not_read() -> None:
+    blind = [
+        replace(r, mean=np.append(r.mean, 0.0), information=np.diag([1e6, 0.0]))
+        for r in weekly(np.zeros(5))
+    ]
+    history = states(blind, [TENSION, SPRING], options=OPTIONS)
+    assert np.all(np.isnan(history.read("log10_k1").middle))
+    assert np.all(np.isfinite(history.read("tension").middle))
+    assert np.all(np.isfinite(history.smoothed("log10_k1").high))
+
+
+def test_a_test_that_saw_nothing_leaves_the_level_to_wander() -> None:
+    readings = weekly(np.zeros(10))
+    empty = replace(readings[5], mean=np.array([np.nan]), information=np.zeros((1, 1)))
+    history = states([*readings[:5], empty, *readings[6:]], [TENSION], options=OPTIONS)
+    assert history.filtered_mean[5, 0] == pytest.approx(history.filtered_mean[4, 0])
+    assert history.filtered_covariance[5, 0, 0] > history.filtered_covariance[4, 0, 0]
+    assert np.isnan(history.read("tension").middle[5])
+
+
+def test_a_test_without_temperature_weighs_less() -> None:
+    rng = np.random.default_rng(8)
+    warm = 12 + rng.normal(0, 10, 40)
+    readings = [
+        reading(7.0 * i, [0.001 * (c - 12) + rng.normal(0, 1e-3)], temperature_c=float(c))
+        for i, c in enumerate(warm)
+    ]
+    unknown = replace(readings[-1], temperature_c=math.nan, mean=np.array([0.03]))
+    history = states([*readings[:-1], unknown], [TENSION], options=OPTIONS)
+    told = states(
+        [*readings[:-1], replace(unknown, temperature_c=12.0)], [TENSION], options=OPTIONS
+    )
+    assert abs(history.filtered_mean[-1, 0]) < 0.2 * abs(told.filtered_mean[-1, 0])
+    assert history.coefficient_mean[0] == pytest.approx(0.001, abs=1e-4)
+
+
+def test_a_test_without_temperature_counts_in_full_where_the_coefficient_is_known_to_be_0() -> None:
+    rng = np.random.default_rng(9)
+    readings = [
+        reading(7.0 * i, [rng.normal(0, 1e-3)], temperature_c=float(rng.normal(12, 10)))
+        for i in range(60)
+    ]
+    unknown = replace(readings[30], temperature_c=math.nan)
+    known = states(readings, [TENSION], options=OPTIONS)
+    history = states([*readings[:30], unknown, *readings[31:]], [TENSION], options=OPTIONS)
+    sd, usual = (np.sqrt(each.filtered_covariance[30, 0, 0]) for each in (history, known))
+    assert sd < 1.2 * usual
+
+
+def test_without_any_temperature_the_coefficient_stays_at_its_prior() -> None:
+    unknown = [replace(r, temperature_c=math.nan) for r in weekly(np.zeros(20))]
+    history = states(unknown, [TENSION])
+    assert history.coefficient_mean[0] == pytest.approx(0.0, abs=1e-12)
+    assert history.coefficient_sd[0] == pytest.approx(StateOptions().tension_per_kelvin_sd)
+    assert math.isnan(history.reference_temperature_c)
+
+
+def test_bands_are_in_newtons_and_in_decades() -> None:
+    readings = [reading(7.0 * week, [-0.05, 0.01], 1e-4) for week in range(30)]
+    history = states(readings, [TENSION, SPRING], options=OPTIONS)
+    tension, spring = history.smoothed("tension"), history.smoothed("log10_k1")
+    assert tension.middle[-1] == pytest.approx(BASELINE_N * math.exp(-0.05), rel=1e-3)
+    assert spring.middle[-1] == pytest.approx(7.4, abs=0.02)
+    assert tension.low[-1] < tension.middle[-1] < tension.high[-1]
+    assert history.read("tension").middle[3] == pytest.approx(tension.middle[3], rel=1e-3)
+
+
+def test_coefficients_of_a_stiffness_are_in_decades_per_kelvin() -> None:
+    history = states(two_quantities(), [TENSION, SPRING], options=OPTIONS)
+    tension, spring = history.temperature_coefficients()
+    assert tension.mean == history.coefficient_mean[0]
+    assert spring.mean == pytest.approx(40 * history.coefficient_mean[1], rel=1e-3)
+    assert spring.sd == pytest.approx(40 * history.coefficient_sd[1], rel=1e-3)
+
+
+def test_readings_are_drawn_at_the_reference_temperature(series: list[Simulated]) -> None:
+    warmest = max(series, key=lambda each: abs(each.coefficient))
+    read, level = warmest.history.read("tension"), BASELINE_N * np.exp(warmest.level)
+    raw = BASELINE_N * np.exp([r.mean[0] for r in warmest.history.readings])
+    assert np.std(read.middle - level) < np.std(raw - level) / 5
+
+
+def test_what_cannot_be_used_is_refused() -> None:
+    readings = weekly(np.zeros(3))
+    with pytest.raises(NothingThere):
+        states([], [TENSION])
+    with pytest.raises(UsageError, match="order of time"):
+        states(readings[::-1], [TENSION])
+    with pytest.raises(UsageError, match="probabilities"):
+        states(readings, [TENSION], np.array([0.0, 2.0, 0.0]))
+    with pytest.raises(UsageError, match="Watched: tension"):
+        states(readings, [TENSION]).filtered("log10_k9")
+
+
+def test_naming_the_module_does_not_load_statsmodels() -> None:
+    script = "import sys, shm.watch.state; sys.exit('statsmodels' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

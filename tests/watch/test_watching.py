@@ -1,0 +1,100 @@
+"""The watch of a hanger as a whole, and the stiffness of its ends by a posterior."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from functools import cache
+
+import numpy as np
+import pytest
+
+from shm.models import build
+from shm.update import UpdateOptions, update
+from shm.values import PLANES, ModalTest, Mode, Posterior
+from shm.watch import Watched, WatchOptions, end_stiffness, watch_hanger
+from tests.helpers.hangers import HANGER_3
+
+BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
+SD, MODES = 2e-4, 6
+SOUND = (1.0, 1.0, 7.3, 7.1, 7.2, 7.4)
+BASELINE_TESTS = 3
+
+
+def _test(number: int, theta: tuple[float, ...], rng: np.random.Generator) -> ModalTest:
+    exact = build("beam2", HANGER_3).frequencies_hz(np.array([theta]), MODES)[0]
+    modes = tuple(
+        Mode(plane, order + 1, float(hz * (1 + SD * rng.standard_normal())), float(hz * SD))
+        for plane, row in zip(PLANES, exact, strict=True)
+        for order, hz in enumerate(row)
+    )
+    time = BEGIN + timedelta(weeks=2 * number)
+    return ModalTest(id=f"t{number}", hanger=3, modes=modes, time=time, temperature_c=10.0)
+
+
+@cache
+def _baseline() -> tuple[Posterior, tuple[ModalTest, ...]]:
+    rng = np.random.default_rng(1)
+    tests = tuple(_test(number, SOUND, rng) for number in range(BASELINE_TESTS))
+    model = build("beam2", HANGER_3)
+    return update(tests, model, UpdateOptions(samples=300, seed=1)), tests
+
+
+def _dated(tests: tuple[ModalTest, ...]) -> list[tuple[ModalTest, datetime]]:
+    return [(test, test.time) for test in tests if test.time is not None]
+
+
+def _watched(*later: tuple[float, ...]) -> Watched:
+    posterior, tests = _baseline()
+    rng = np.random.default_rng(2)
+    since = tuple(_test(BASELINE_TESTS + k, theta, rng) for k, theta in enumerate(later))
+    options = WatchOptions(baseline_tests=BASELINE_TESTS)
+    return watch_hanger(posterior, _dated(tests), _dated(since), HANGER_3, options)
+
+
+def test_a_hanger_that_has_not_changed_gives_no_alert() -> None:
+    found = _watched(*[SOUND] * 8)
+    assert found.alert(HANGER_3) is None
+    assert len(found.watch.tests) == len(found.readings) == BASELINE_TESTS + 8
+    assert found.latest.test == "t10"
+    assert found.latest.drifts[0].shift_mean == pytest.approx(0, abs=0.005)
+
+
+def test_a_loss_of_tension_is_told_at_its_second_test_and_what_it_is() -> None:
+    lost = (0.92, *SOUND[1:])
+    alert = _watched(SOUND, SOUND, lost, lost).alert(HANGER_3)
+    assert alert is not None
+    assert alert.change is not None
+    assert alert.change.moved[0].quantity == "tension"
+    assert alert.change.moved[0].shift_mean == pytest.approx(-0.08, abs=0.01)
+    assert {"sudden change", "beyond threshold"} == set(alert.kinds)
+
+
+def test_a_pin_that_loosens_is_told_as_stiffness_of_its_plane() -> None:
+    loose = (*SOUND[:2], 6.8, *SOUND[3:])
+    alert = _watched(SOUND, SOUND, loose, loose, loose).alert(HANGER_3)
+    assert alert is None, "told at the second test already"
+    first = _watched(SOUND, SOUND, loose, loose)
+    assert first.latest.change.called
+    assert first.latest.change.moved[0].quantity == "transverse_end_stiffness"
+
+
+def test_a_test_older_than_the_baseline_is_compared_with_it_all_the_same() -> None:
+    posterior, tests = _baseline()
+    old, since = _dated(tests[:1]), _dated(tests[1:])
+    found = watch_hanger(posterior, since, old, HANGER_3, WatchOptions(baseline_tests=2))
+    assert found.latest.test == "t0"
+    assert found.latest.time == tests[-1].time
+
+
+def test_a_solid_class_is_watched_by_the_rotational_stiffness_of_its_faces() -> None:
+    names = ("theta_F", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
+    samples = np.column_stack([np.ones(100), np.full((100, 4), 8.0)])
+    solid = replace(_baseline()[0], model="solid2", names=names, samples=samples)
+    found = end_stiffness(solid, HANGER_3)
+    spacing, thickness, width = 0.0425, 0.040, 1.0644
+    thin = 2e8 / spacing * (width * thickness**2 / 4 + thickness**3 / 12)
+    wide = 2e8 / spacing * (width**3 / 12 + thickness * width**2 / 4)
+    expected = np.log10(2 / (1 / thin + 1 / wide))
+    assert list(found) == ["transverse_end_stiffness", "longitudinal_end_stiffness"]
+    np.testing.assert_allclose(list(found.values()), expected)
