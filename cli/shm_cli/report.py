@@ -63,7 +63,10 @@ def command(
     form = "json" if as_json else form or _FORMS.get(out.suffix if out else "", "text")
     with opened_store(ctx) as (workspace, store):
         if test_id is None:
-            written = _WRITERS[form](hanger_report(workspace, store, hanger_id, utc_now()))
+            content = hanger_report(
+                workspace, store, hanger_id, utc_now(), with_states=form == "html"
+            )
+            written = _WRITERS[form](content)
         else:
             written = _SHEET_WRITERS[form](test_sheet(workspace, store, hanger_id, test_id))
     if out is None:

@@ -11,15 +11,24 @@ from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage
+from shm.pipeline.watching import watch_again
 from shm.read import read_test
 from shm.report import HangerReport, TestSheet, trend_row
-from shm.store import Store, StoredTest, Workspace
+from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
+from shm.store import Baseline, Store, StoredTest, Workspace
+from shm.values import Hanger, WatchedTest
+from shm.watch.wording import watch_words
 
 
 def hanger_report(
-    workspace: Workspace, store: Store, hanger_id: int, generated_at: datetime
+    workspace: Workspace,
+    store: Store,
+    hanger_id: int,
+    generated_at: datetime,
+    *,
+    with_states: bool = False,
 ) -> HangerReport:
-    """All that the store knows of a hanger, for its report.
+    """All that the store knows of a hanger, for its report; its states over time take seconds.
 
     Raises BadInput for an unknown hanger, NothingThere before its first test is through.
     """
@@ -49,12 +58,30 @@ def hanger_report(
         quality=latest.quality,
         diagnosis=diagnosis.diagnosis if diagnosis else None,
         gap_watch=str(watch) if watch else "",
+        drift_watch=watch_words(_watched_against(store, baseline)),
+        states=_states(workspace, store, hanger, baseline) if with_states else NOTHING_WATCHED,
         lineage={
             "input_sha256": latest.lineage.input_sha256,
             "settings_sha256": latest.lineage.settings_sha256,
             "version": latest.lineage.version,
         },
     )
+
+
+def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
+    if baseline is None:
+        return ()
+    found = store.watches(baseline.hanger, baseline.id)
+    return tuple(each.watched for each in found)
+
+
+def _states(
+    workspace: Workspace, store: Store, hanger: Hanger, baseline: Baseline | None
+) -> StatesOverTime:
+    if baseline is None:
+        return NOTHING_WATCHED
+    watched = watch_again(store, baseline, hanger, workspace.settings.false_call_years)
+    return states_over_time(watched, hanger)
 
 
 def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) -> TestSheet:

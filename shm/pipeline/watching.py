@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 
 from shm.store import Baseline, Stage, Store, StoredTest
-from shm.values import ModalTest
+from shm.values import Hanger
+from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger
 
 MOST_TESTS = 500
 """So many of the latest tests are gone over beside those of the baseline."""
@@ -14,7 +14,7 @@ MOST_TESTS = 500
 
 def dated_tests(
     store: Store, baseline: Baseline, last: StoredTest | None = None
-) -> tuple[list[tuple[ModalTest, datetime]], list[tuple[ModalTest, datetime]]]:
+) -> tuple[list[DatedTest], list[DatedTest]]:
     """The tests of a baseline, and those since that were watched, up to and with `last`; by time.
 
     Tests that were watched against an earlier baseline count, but for those before a day since
@@ -35,5 +35,12 @@ def _counts(test: StoredTest, baseline: Baseline, last: StoredTest | None) -> bo
     return last is None or (test.time, test.id) < (last.time, last.id)
 
 
-def _dated(tests: Sequence[StoredTest]) -> list[tuple[ModalTest, datetime]]:
+def _dated(tests: Sequence[StoredTest]) -> list[DatedTest]:
     return [(each.test, each.time) for each in tests]
+
+
+def watch_again(store: Store, baseline: Baseline, hanger: Hanger, limit_years: float) -> Watched:
+    """The watch over all tests of a hanger that were watched, once more."""
+    since_baseline, later = dated_tests(store, baseline)
+    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
+    return watch_hanger(baseline.posterior, since_baseline, later, hanger, options)

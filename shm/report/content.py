@@ -9,6 +9,7 @@ from datetime import datetime
 
 import numpy as np
 
+from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.values import (
     NAN,
     Alert,
@@ -96,7 +97,9 @@ class HangerReport:
     stand oldest first like `trend`. `drifts` are those of the latest test, `alerts` all of the
     hanger. `lineage` names where the numbers come from: checksums, settings, files. `quality` is
     that of the latest test, empty where it was not checked; `diagnosis` the latest of its gap.
-    `gap_watch` says in a sentence how the gap has gone since an effect was adopted.
+    `gap_watch` says in a sentence how the gap has gone since an effect was adopted, `drift_watch`
+    what the sequential test has called since the baseline. `states` are empty where no figure of
+    them is wanted.
     """
 
     bridge: str
@@ -115,6 +118,8 @@ class HangerReport:
     quality: tuple[QualityCheck, ...] = ()
     diagnosis: Diagnosis | None = None
     gap_watch: str = ""
+    drift_watch: str = ""
+    states: StatesOverTime = NOTHING_WATCHED
 
     @property
     def latest(self) -> ModalTest:

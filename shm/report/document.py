@@ -35,6 +35,7 @@ def json(data: HangerReport) -> dict[str, Any]:
         "quality": [asdict(check) for check in data.quality],
         "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
         "gap_watch": data.gap_watch,
+        "drift_watch": data.drift_watch,
         "lineage": dict(data.lineage),
         "version": data.version,
         "generated_at": data.generated_at,

@@ -45,7 +45,8 @@ def drift(data: HangerReport) -> Table:
         "Shift since the baseline",
         ("quantity", "shift", "90 % interval", "threshold", "probability beyond it"),
         tuple(_drift_row(row) for row in data.drifts),
-        note="Tension in percent of the baseline, stiffness in decades (factors of ten).",
+        note="Tension in percent of the baseline, stiffness in decades (factors of ten), the swing "
+        f"with the temperature taken out. {data.drift_watch}".strip(),
     )
 
 

@@ -108,7 +108,7 @@ def _is_exchangeable(
     softer = min(base[columns].min(), middle - 1)
     theta = np.tile(base, (2, 1))
     theta[:, columns] = [[softer, softer + 1], [softer + 1, softer]]
-    one, other = _log_frequencies(model, theta, modes)
+    one, other = log_frequencies(model, theta, modes)
     return bool(np.abs(one - other).max() < _INVISIBLE)
 
 
@@ -207,7 +207,7 @@ def _responses(
         ]
     )
     starts = np.cumsum([len(grid) for grid in grids])[:-1]
-    parts = np.split(_log_frequencies(model, theta, modes), starts)
+    parts = np.split(log_frequencies(model, theta, modes), starts)
     return [_response(model, *each) for each in zip(held, centres, grids, parts, strict=True)]
 
 
@@ -222,7 +222,7 @@ def moved(
     return theta
 
 
-def _log_frequencies(model: Model, theta: FloatArray, modes: Sequence[MeasuredMode]) -> FloatArray:
+def log_frequencies(model: Model, theta: FloatArray, modes: Sequence[MeasuredMode]) -> FloatArray:
     """Of parameter sets (n, parameters): (n, modes)."""
     planes, orders = np.array([(PLANES.index(plane), order - 1) for plane, order in modes]).T
     frequencies = model.frequencies_at(theta, int(orders.max()) + 1, Conditions())

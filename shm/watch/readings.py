@@ -8,6 +8,10 @@ A reading is the likelihood linearised where it is largest (Gauss and Newton; Bj
 Numerical Methods for Least Squares Problems). A weak pull to the baseline chooses that place where
 the data do not; it has no part in the reading's mean and information.
 
+Steel softens as it warms, by 0.03 % of its modulus per kelvin: over the year a stiff hanger's
+frequencies swing by half a percent, as if its tension and its ends moved. What the modulus does is
+known and taken off, too, from the mean temperature of the baseline's tests on.
+
 Springs that frequencies cannot tell apart move together: how unlike two springs are that are nearly
 alike shows in the square of the difference only, and no normal distribution could follow it. One
 of the two that moves alone is read as a move of both, and a part of it as tension: for a loss of
@@ -17,8 +21,9 @@ where it is softer still.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -42,6 +47,7 @@ from shm.values import (
 from shm.watch.quantities import (
     MeasuredMode,
     base_point,
+    log_frequencies,
     moved,
     shift_of,
     watched_quantities,
@@ -51,6 +57,10 @@ from shm.watch.quantities import (
 # to 1e-3 of a frequency, and who states none is given the worse.
 _UNKNOWN_SD = 1e-3
 _FREQUENCY_ALLOWANCE = 1e-4
+# Of steel's modulus: Ledbetter and Reed (1973), Elastic properties of metals and alloys, I.
+_MODULUS_PER_KELVIN = -3e-4
+_STIFFER = 0.01
+_CLAMPED = "beam1"
 _SLOPE_STEP = 0.1
 # Far above the rounding of a log frequency, far below what a test can tell.
 _LEAST_SLOPE_STEP = 1e-7
@@ -115,7 +125,8 @@ class Reader:
     """Reads tests of one hanger against its baseline.
 
     Made of the baseline's posterior and its tests, which may be of any conditions. Raises BadInput
-    where these hold no mode. `frequency_allowance`, a fraction of a frequency, is what two tests
+    where these hold no mode. `reference_temperature_c` is their mean, NaN where none has one.
+    `frequency_allowance`, a fraction of a frequency, is what two tests
     may differ by beyond their stated errors: a logger's clock, a tenth of a kelvin.
     """
 
@@ -145,6 +156,8 @@ class Reader:
         self._pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
         self._lowest = np.array([each.coordinates[0] for each in self.quantities])
         self._highest = np.array([each.coordinates[-1] for each in self.quantities])
+        self.reference_temperature_c = mean_temperature_c(usable)
+        self._per_kelvin = self._softening(hanger, baseline.model)
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
@@ -171,18 +184,46 @@ class Reader:
         total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
         return np.asarray(total / np.bincount(own, weight, len(self.modes)))
 
+    def _softening(self, hanger: Hanger, name: str) -> FloatArray:
+        """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
+
+        Nothing where the class follows the temperature itself: it was fitted to what softens, too.
+        Where the class is expensive, that of a clamped beam: it differs by a few percent.
+        """
+        base, model = self._base, self._model
+        mild, warm = (
+            model.frequencies_at(base[None], 1, Conditions(temperature_shift_k=kelvin))
+            for kelvin in (0.0, 1.0)
+        )
+        if not np.array_equal(mild, warm):
+            return np.zeros(len(self.modes))
+        if model.expensive:
+            name, model = _CLAMPED, described(_CLAMPED, hanger)
+            known = dict(zip(self._model.parameter_names, base.tolist(), strict=True))
+            base = np.array([known.get(each, 1.0) for each in model.parameter_names])
+        stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
+        change = log_frequencies(described(name, stiffer), base[None], self.modes)
+        change = change - log_frequencies(model, base[None], self.modes)
+        return np.asarray(_MODULUS_PER_KELVIN * change[0] / _STIFFER)
+
     def _seen(self, test: ModalTest) -> _Seen:
         modes = [mode for mode in test.modes if _is_measured(mode) and _key(mode) in self.modes]
         own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
         sd = np.where(sd_hz > 0, sd_hz / frequency_hz, _UNKNOWN_SD)
+        known = math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
+        swing = (
+            (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[own]
+            if known
+            else 0.0
+        )
         return _Seen(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
             own=own,
-            log_frequency=np.log(frequency_hz) - self._residual[own],
+            log_frequency=np.log(frequency_hz) - self._residual[own] - swing,
             variance=sd**2 + self._allowance**2,
         )
 
@@ -261,6 +302,12 @@ def _credible_share(misfit: FloatArray, fitted: int) -> float:
 def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:
     """`row` (q,) once for each entry of `diagonal` (q,), which replaces its own: (q, q)."""
     return np.where(np.eye(len(row), dtype=bool), diagonal, row)
+
+
+def mean_temperature_c(tests: Sequence[ModalTest]) -> float:
+    """Of those tests that have one; NaN where none has."""
+    known = [test.temperature_c for test in tests if math.isfinite(test.temperature_c)]
+    return sum(known) / len(known) if known else math.nan
 
 
 def _key(mode: Mode) -> MeasuredMode:

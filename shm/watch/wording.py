@@ -43,6 +43,21 @@ def message_of(
     return " ".join(part for part in parts if part)
 
 
+def watch_words(watched: Sequence[WatchedTest]) -> str:
+    """What the sequential test has called since the baseline, or that it has called nothing."""
+    if not watched:
+        return ""
+    called = [each.change for each in watched if each.change.called]
+    if called:
+        told = (f"{_change(each)} {_when(each)}" for each in called)
+        return f"Called since the baseline: {' Then: '.join(told)}"
+    latest = watched[-1].change
+    return (
+        f"No change is called: the evidence for one stands for {latest.evidence_years:.2g} years "
+        f"without change, and is believed from {latest.limit_years:.3g} years on."
+    )
+
+
 def quantity_words(name: str, end: End | None = None, plane: Plane | None = None) -> str:
     """`tension`, or `end stiffness k1 (deck end, transverse)`."""
     if name == TENSION:

@@ -69,6 +69,7 @@ def write_test(
         modes=modes_of(described, tension),
         hanger=hanger,
         time=START + timedelta(days=day),
+        temperature_c=11.5,
     )
     put(path, dump(modes_document([test])))
     return test

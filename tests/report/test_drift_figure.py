@@ -10,7 +10,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report.figures.drift import FIGURE, CalledChange, QuantityOverTime, StatesOverTime
+from shm.report.figures.drift import STATES
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
 from shm.watch.history import Band
 
@@ -60,7 +61,7 @@ def data() -> StatesOverTime:
 
 
 def drawn(data: StatesOverTime) -> Figure:
-    figure = FIGURE.draw(data)
+    figure = STATES.draw(data)
     assert figure is not None
     figure.draw_without_rendering()
     return figure
@@ -149,15 +150,15 @@ def test_one_test_is_drawn(data: StatesOverTime) -> None:
 
 
 def test_nothing_is_drawn_of_nothing(data: StatesOverTime) -> None:
-    assert FIGURE.draw(replace(data, quantities=())) is None
+    assert STATES.draw(replace(data, quantities=())) is None
 
 
 def test_caption_and_alternative_text_say_what_is_seen(data: StatesOverTime) -> None:
-    caption, alt = FIGURE.caption(data), FIGURE.alt(data)
+    caption, alt = STATES.caption(data), STATES.alt(data)
     assert "at 12.0 °C" in caption
     assert caption.endswith(".")
     assert "tension 683 kN (90 % interval 681.2 to 684.8 kN), baseline 711 kN" in alt
     assert "sudden: tension -3.9 %, begun by 2025-07-14" in alt
     unknown = replace(data, reference_temperature_c=float("nan"), changes=())
-    assert "nan" not in FIGURE.caption(unknown) + FIGURE.alt(unknown)
-    assert FIGURE.alt(unknown).endswith("Changes called: none.")
+    assert "nan" not in STATES.caption(unknown) + STATES.alt(unknown)
+    assert STATES.alt(unknown).endswith("Changes called: none.")

@@ -297,3 +297,16 @@ def test_a_reading_takes_milliseconds(reader: Reader) -> None:
         reader.reading(test, WHEN)
         seconds.append(time.perf_counter() - start)
     assert min(seconds) < 0.010
+
+
+def test_steel_that_softens_as_it_warms_is_no_change() -> None:
+    """Twenty kelvin warmer its modulus is 0.6 % lower: tension and ends are what they were."""
+    mild = measured(frequencies(SPRUNG), temperature_c=10.0)
+    warm = replace(HANGER_3, elastic_modulus_pa=HANGER_3.elastic_modulus_pa * (1 - 20 * 3e-4))
+    softer = frequencies(SPRUNG, hanger=warm)
+    told = Reader(posterior(SPRUNG), [mild], HANGER_3)
+    known = told.reading(measured(softer, temperature_c=30.0), WHEN)
+    unknown = told.reading(measured(softer), WHEN)
+    nothing = np.zeros(3)
+    assert distance(known, nothing) < 0.05
+    assert distance(unknown, nothing) > 20 * distance(known, nothing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shm.report.content import HangerReport
+from shm.report.figures.drift import FIGURE as DRIFT
 from shm.report.figures.frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.member import Illustration, Member, drawn
 from shm.report.figures.response import FIGURE as RESPONSE
@@ -12,7 +13,14 @@ from shm.report.figures.trend import FIGURE as TREND
 
 __all__ = ["MEMBERS", "Illustration", "illustrations"]
 
-MEMBERS: tuple[Member[HangerReport], ...] = (TREND, TENSION, FREQUENCIES, RESPONSE, STIFFNESS)
+MEMBERS: tuple[Member[HangerReport], ...] = (
+    TREND,
+    DRIFT,
+    TENSION,
+    FREQUENCIES,
+    RESPONSE,
+    STIFFNESS,
+)
 
 
 def illustrations(data: HangerReport) -> tuple[Illustration, ...]:

@@ -3,70 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import datetime
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shm.report.content import HangerReport
 from shm.report.figures import style, timeline
 from shm.report.figures.member import Member
-from shm.values import TENSION, BoolArray, FloatArray
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
+from shm.values import BoolArray, FloatArray
 from shm.watch.history import Band
 
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
 _MARGIN = 0.08
 _THINNEST = 0.004
-
-
-@dataclass(frozen=True, eq=False)
-class QuantityOverTime:
-    """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
-
-    The tension is in N, a stiffness log10 of it. `title` is what people call it, `unit` that of a
-    stiffness. Thresholds are values, not shifts; NaN where there is none.
-    """
-
-    name: str
-    title: str
-    read: Band
-    filtered: Band
-    smoothed: Band
-    baseline: float
-    lower_threshold: float
-    upper_threshold: float
-    unit: str = "N m/rad"
-
-    @property
-    def is_tension(self) -> bool:
-        return self.name == TENSION
-
-
-@dataclass(frozen=True)
-class CalledChange:
-    """A change that was called: when it began, with 90 % probability, and a few words for it."""
-
-    began_after: datetime
-    began_by: datetime
-    words: str
-
-
-@dataclass(frozen=True, eq=False)
-class StatesOverTime:
-    """All that the figure shows of a hanger's n tests, oldest first.
-
-    `outlier` (n,) marks readings taken as blunders; `temperatures_c` (n,) is NaN where unknown;
-    levels hold at `reference_temperature_c`, NaN where no temperature is known.
-    """
-
-    times: tuple[datetime, ...]
-    temperatures_c: FloatArray
-    reference_temperature_c: float
-    outlier: BoolArray
-    quantities: tuple[QuantityOverTime, ...]
-    changes: tuple[CalledChange, ...] = ()
 
 
 def _draw(data: StatesOverTime) -> Figure | None:
@@ -310,4 +262,11 @@ def _last(quantity: QuantityOverTime) -> str:
     )
 
 
-FIGURE = Member("drift", "States over time", _draw, _caption, _alt)
+STATES = Member("drift", "States over time", _draw, _caption, _alt)
+FIGURE = Member[HangerReport](
+    STATES.name,
+    STATES.title,
+    lambda data: _draw(data.states),
+    lambda data: _caption(data.states),
+    lambda data: _alt(data.states),
+)

@@ -1,0 +1,126 @@
+"""Tension and stiffness of a hanger over time, as its report shows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from shm.values import (
+    NAN,
+    TENSION,
+    BoolArray,
+    Change,
+    FloatArray,
+    Hanger,
+    TemperatureCoefficient,
+    WatchedQuantity,
+)
+from shm.watch import Watched
+from shm.watch.history import Band, StateHistory
+from shm.watch.state import StateOptions, set_free, states
+from shm.watch.wording import quantity_words
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityOverTime:
+    """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
+
+    The tension is in N, a stiffness log10 of it. `title` is what people call it, `unit` that of a
+    stiffness. Thresholds are values, not shifts; NaN where there is none.
+    """
+
+    name: str
+    title: str
+    read: Band
+    filtered: Band
+    smoothed: Band
+    baseline: float
+    lower_threshold: float
+    upper_threshold: float
+    unit: str = "N m/rad"
+
+    @property
+    def is_tension(self) -> bool:
+        return self.name == TENSION
+
+
+@dataclass(frozen=True)
+class CalledChange:
+    """A change that was called: when it began, with 90 % probability, and a few words for it."""
+
+    began_after: datetime
+    began_by: datetime
+    words: str
+
+
+@dataclass(frozen=True, eq=False)
+class StatesOverTime:
+    """All that the figure shows of a hanger's n tests, oldest first.
+
+    `outlier` (n,) marks readings taken as blunders; `temperatures_c` (n,) is NaN where unknown;
+    levels hold at `reference_temperature_c`, NaN where no temperature is known.
+    `temperature_coefficients` are per kelvin, beside what the softening of steel explains.
+    """
+
+    times: tuple[datetime, ...]
+    temperatures_c: FloatArray
+    reference_temperature_c: float
+    outlier: BoolArray
+    quantities: tuple[QuantityOverTime, ...]
+    changes: tuple[CalledChange, ...] = ()
+    temperature_coefficients: tuple[TemperatureCoefficient, ...] = ()
+
+
+NOTHING_WATCHED = StatesOverTime((), np.empty(0), NAN, np.empty(0, bool), ())
+
+
+def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
+    """The states of a hanger at all tests of its watch, at the baseline's mean temperature."""
+    outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
+    calls = [call.change for call in watched.watch.calls]
+    options = StateOptions(reference_temperature_c=watched.reader.reference_temperature_c)
+    changes = set_free(calls, watched.readings)
+    history = states(watched.readings, watched.reader.quantities, outlier, changes, options)
+    return StatesOverTime(
+        history.times,
+        history.temperatures_c,
+        history.reference_temperature_c,
+        outlier > 0.5,
+        tuple(_over_time(each, history, hanger) for each in watched.reader.quantities),
+        tuple(_called(call) for call in calls),
+        history.temperature_coefficients(),
+    )
+
+
+def _over_time(
+    quantity: WatchedQuantity, history: StateHistory, hanger: Hanger
+) -> QuantityOverTime:
+    thresholds, level = hanger.thresholds, quantity.baseline
+    if quantity.name == TENSION:
+        reach = thresholds.tension_shift_fraction * level
+    else:
+        reach = thresholds.stiffness_shift_decades
+    return QuantityOverTime(
+        quantity.name,
+        quantity_words(quantity.name, quantity.end, quantity.plane),
+        history.read(quantity.name),
+        history.filtered(quantity.name),
+        history.smoothed(quantity.name),
+        level,
+        level - reach,
+        level + reach,
+    )
+
+
+def _called(change: Change) -> CalledChange:
+    first = change.moved[0]
+    kind = "sudden" if change.sudden > 0.5 else "slow"
+    what = first.quantity.replace("_", " ")
+    size = (
+        f"{100 * first.shift_mean:+.1f} %"
+        if first.quantity == TENSION
+        else f"{first.shift_mean:+.2f} decades"
+    )
+    return CalledChange(change.began_after, change.began_by, f"{kind}: {what} {size}")
