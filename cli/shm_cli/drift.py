@@ -7,6 +7,7 @@ import rich_click as click
 from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.values import Drift
+from shm_cli.bridge_pattern import command as bridge
 from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
 from shm_cli.rebaseline import rebaseline
 
@@ -57,6 +58,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
 
 
 command.add_command(rebaseline)
+command.add_command(bridge)
 
 
 def _latest(drifts: tuple[Drift, ...]) -> list[Drift]:

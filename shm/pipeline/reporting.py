@@ -11,12 +11,13 @@ from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage
-from shm.pipeline.watching import watch_again
+from shm.pipeline.watching import dated_tests
 from shm.read import read_test
 from shm.report import HangerReport, TestSheet, trend_row
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredTest, Workspace
 from shm.values import Hanger, WatchedTest
+from shm.watch import WatchOptions, watch_hanger
 from shm.watch.wording import watch_words
 
 
@@ -80,7 +81,10 @@ def _states(
 ) -> StatesOverTime:
     if baseline is None:
         return NOTHING_WATCHED
-    watched = watch_again(store, baseline, hanger, workspace.settings.false_call_years)
+    since_baseline, later = dated_tests(store, baseline)
+    limit_years = workspace.settings.false_call_years
+    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
+    watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
     return states_over_time(watched, hanger)
 
 

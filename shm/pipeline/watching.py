@@ -1,12 +1,17 @@
-"""Which tests of a hanger the watch goes over."""
+"""Which tests of a hanger the watch goes over.
+
+Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from shm.store import Baseline, Stage, Store, StoredTest
-from shm.values import Hanger
-from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger
+
+if TYPE_CHECKING:
+    from shm.watch import DatedTest
 
 MOST_TESTS = 500
 """So many of the latest tests are gone over beside those of the baseline."""
@@ -37,10 +42,3 @@ def _counts(test: StoredTest, baseline: Baseline, last: StoredTest | None) -> bo
 
 def _dated(tests: Sequence[StoredTest]) -> list[DatedTest]:
     return [(each.test, each.time) for each in tests]
-
-
-def watch_again(store: Store, baseline: Baseline, hanger: Hanger, limit_years: float) -> Watched:
-    """The watch over all tests of a hanger that were watched, once more."""
-    since_baseline, later = dated_tests(store, baseline)
-    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
-    return watch_hanger(baseline.posterior, since_baseline, later, hanger, options)

@@ -22,9 +22,9 @@ class WatchOptions:
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     outlier_probability: float = 0.01
-    tension_scatter: tuple[float, ...] = (0.001, 0.0018, 0.0032, 0.0056, 0.01, 0.018)
+    tension_scatter: tuple[float, ...] = (0.001, 0.0018, 0.0032, 0.0056, 0.01)
     spring_scatter_of_step: tuple[float, ...] = (0.01, 0.06, 0.2)
-    tension_per_kelvin_sd: float = 0.003
+    tension_per_kelvin_sd: float = 0.001
     spring_per_kelvin_sd_of_step: float = 0.1
     unknown_temperature_sd_k: float = 10.0
     baseline_tests: int = 1

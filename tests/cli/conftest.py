@@ -13,7 +13,7 @@ import pytest
 from shm.store import Workspace
 from shm_cli.main import run
 from tests.helpers.flows import ingest
-from tests.helpers.workspaces import make_workspace, write_test
+from tests.helpers.workspaces import make_workspace, write_loss, write_test
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,9 @@ def shm(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.fixture(scope="session")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """Hanger 3 has three tests, the last with a fifth less tension; hanger 4 has none."""
+    """Hanger 3 has three tests, the last two with a fifth less tension; hanger 4 has none."""
     workspace = make_workspace(tmp_path_factory.mktemp("cli") / "bridge", hangers=(3, 4))
-    for number, tension in enumerate((1.0, 1.0, 0.8)):
-        path = workspace.spool / f"t{number}.modes.json"
-        write_test(path, workspace, day=number, tension=tension)
+    write_loss(workspace.spool, workspace)
     ingest(workspace)
     return workspace
 

@@ -85,10 +85,10 @@ def test_an_alert_is_acknowledged_once(shm: Shm, workspace: Path) -> None:
 
 
 def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> None:
-    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-05-03")
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30")
     assert ended.code == 0, ended.err
     assert ended.out.startswith(
-        "Hanger 3 is compared with its one test since 2026-05-03 from now on: 5"
+        "Hanger 3 is compared with its one test since 2026-06-30 from now on: 5"
     )
     with Workspace.open(workspace, {}).store() as store:
         baseline = store.baseline(3)
@@ -98,14 +98,14 @@ def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> N
 
 def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
     ended = shm("drift", "rebaseline", "--workspace", workspace, *ANEW[2:], "--json",
-                "--who", "Jansen", "--since", "2026-05-02T09:00:00Z")  # fmt: skip
+                "--who", "Jansen", "--since", "2026-05-31T09:00:00Z")  # fmt: skip
     assert ended.code == 0, ended.err
     document = ended.document
     assert (document["hanger"], document["who"], document["why"], document["model"]) == (
         3, "Jansen", "pin replaced", "beam1",
     )  # fmt: skip
     assert document["tests"] == ["t1", "t2"]
-    assert document["since"] == "2026-05-02T09:00:00Z"
+    assert document["since"] == "2026-05-31T09:00:00Z"
 
 
 def test_drift_without_a_sub_command_lists_as_ever(shm: Shm, workspace: Path) -> None:

@@ -70,7 +70,7 @@ def test_the_record_names_who_and_why_and_outlives_the_dropping(shm: Shm, worksp
         (("adopt", "--hanger", 3, "--effect", "gremlins", "--why", "x"), 2, "unknown effect"),
         (("adopt", "--hanger", 3, "--effect", "effective_length", "--why", "x"), 2, "Give --at"),
         (("adopt", "--hanger", 3, "--effect", "sensor_mass", "--why", "x"), 2, "of the sensors"),
-        (("adopt", "--hanger", 3, "--effect", "temperature_tension", "--why", "x"), 3, "no test"),
+        (("adopt", "--hanger", 3, "--effect", "temperature_tension", "--why", "x"), 3, "single"),
         (("adopt", "--hanger", 3, "--effect", "geometric_hardening", "--why", "x"), 3, "diagnos"),
         (("adopt", "--hanger", 4, "--effect", "sag", "--why", "x"), 4, "no baseline yet"),
         (("adopt", "--hanger", 9, "--effect", "sag", "--why", "x"), 3, "hanger 9"),

@@ -31,14 +31,15 @@ def shm_process(*arguments: object) -> subprocess.CompletedProcess[str]:
 def taken_in(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Workspace, Path, subprocess.CompletedProcess[str]]:
-    """A baseline, a test with a fifth less tension, an empty file, and the first one again."""
+    """A baseline, two tests with a fifth less tension, an empty file, and the first one again."""
     folder = tmp_path_factory.mktemp("ingest")
     workspace = make_workspace(folder / "bridge")
     write_test(folder / "a.modes.json", workspace)
-    write_test(folder / "b.modes.json", workspace, day=1, tension=0.8)
+    write_test(folder / "b.modes.json", workspace, day=30, tension=0.8)
+    write_test(folder / "c.modes.json", workspace, day=60, tension=0.8)
     (folder / "empty.csv").write_text("")
     shutil.copy(folder / "a.modes.json", folder / "again.modes.json")
-    names = ("a.modes.json", "b.modes.json", "empty.csv", "again.modes.json")
+    names = ("a.modes.json", "b.modes.json", "c.modes.json", "empty.csv", "again.modes.json")
     files = (folder / name for name in names)
     ended = shm_process("--workspace", workspace.folder, "ingest", *files, "--json")
     return workspace, folder, ended
@@ -50,12 +51,13 @@ def test_ingest_does_the_whole_job_and_reports_each_file(
     _, _, ended = taken_in
     document = json.loads(ended.stdout)
     told = [(row["file"], row["outcome"], row["stage"]) for row in document["files"]]
-    assert told[:3] == [
+    assert told[:4] == [
         ("a.modes.json", "taken in", "done"),
         ("b.modes.json", "taken in", "done"),
+        ("c.modes.json", "taken in", "done"),
         ("empty.csv", "refused", "refused"),
     ]
-    assert [alert["test"] for alert in document["alerts"]] == ["b"]
+    assert [alert["test"] for alert in document["alerts"]] == ["c"]
 
 
 def test_a_refused_file_makes_exit_code_3_and_is_given_its_reason(
@@ -82,7 +84,7 @@ def test_a_file_that_is_known_is_said_to_be_known_and_not_stored_twice(
     (row,) = [row for row in json.loads(ended.stdout)["files"] if row["outcome"] == "known already"]
     assert (row["file"], row["known_as"]) == ("again.modes.json", "a.modes.json")
     with workspace.store() as store:
-        assert len(store.recordings()) == 3
+        assert len(store.recordings()) == 4
 
 
 def test_while_a_daemon_serves_the_workspace_ingest_says_what_to_do(

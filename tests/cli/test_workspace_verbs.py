@@ -59,7 +59,7 @@ def test_status_counts_tests_and_alerts_of_each_hanger(shm: Shm, bridge: Workspa
     assert document["alerts"] == 1
     three, four = document["hangers"]
     assert (three["hanger"], three["tests"], three["model"]) == (3, 3, "beam1")
-    assert three["latest_test"] == "2026-05-03T10:00:00Z"
+    assert three["latest_test"] == "2026-06-30T10:00:00Z"
     assert (four["tests"], four["latest_test"]) == (0, None)
     told = shm("--workspace", bridge.folder, "status").out
     assert "Test bridge: recordings: 3 done" in told
@@ -125,7 +125,7 @@ def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) 
     (row,) = shm(*call, "--json").document["alerts"]
     assert row["alert"]["schema"] == "shm.alert/1"
     assert (row["alert"]["test"], row["deliveries"]) == ("t2", [])
-    assert "tension moved" in shm(*call, "--hanger", 3).out.replace("\n", " ")
+    assert "tension fell by" in shm(*call, "--hanger", 3).out.replace("\n", " ")
     assert shm(*call, "--hanger", 4).out.strip() == "No alert has been raised."
 
 

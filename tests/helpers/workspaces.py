@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -63,16 +64,31 @@ def write_test(
     name: str = "",
 ) -> ModalTest:
     """Writes a `*.modes.json` of one test, whole at once, and returns the test."""
-    described = workspace.bridge.hangers[0]
-    test = ModalTest(
-        id=name or path.name.removesuffix(".modes.json"),
-        modes=modes_of(described, tension),
-        hanger=hanger,
+    described = replace(workspace.bridge.hangers[0], id=hanger)
+    test = modelled_test(name or path.name.removesuffix(".modes.json"), described, day, tension)
+    put(path, dump(modes_document([test])))
+    return test
+
+
+def modelled_test(name: str, hanger: Hanger, day: float = 0.0, tension: float = 1.0) -> ModalTest:
+    """A test at a fraction of the nominal tension, all of one temperature."""
+    return ModalTest(
+        id=name,
+        modes=modes_of(hanger, tension),
+        hanger=hanger.id,
         time=START + timedelta(days=day),
         temperature_c=11.5,
     )
-    put(path, dump(modes_document([test])))
-    return test
+
+
+def write_loss(folder: Path, workspace: Workspace, lost: int = 2) -> None:
+    """Writes `t0`, and of each month after it a test with a fifth less tension.
+
+    The loss is called at `t2`: one test that shows it may be a blunder.
+    """
+    for number in range(1 + lost):
+        path = folder / f"t{number}.modes.json"
+        write_test(path, workspace, day=30 * number, tension=0.8 if number else 1.0)
 
 
 def put(path: Path, content: str | bytes) -> None:

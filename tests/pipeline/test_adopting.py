@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -82,12 +83,14 @@ def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace)
     made = adopted(begun, "point_mass")
     assert made.adoption.model == MASS_MODEL
     assert made.adoption.gap_percent == pytest.approx(0.2)
-    spool(begun, "t2", day=1, tension=1.01)
+    for number in (2, 3):
+        spool(begun, f"t{number}", day=30 * number, tension=0.8)
     ingest(begun)
     with begun.store() as store:
-        assert models(store) == {"t1": MASS_MODEL, "t2": MASS_MODEL}
-        (drift,) = store.drifts(3)
-        assert (drift.test, drift.shift_mean) == ("t2", pytest.approx(0.01, abs=0.005))
+        assert models(store) == dict.fromkeys(("t1", "t2", "t3"), MASS_MODEL)
+        drift = store.drifts(3)[-1]
+        assert (drift.test, drift.quantity) == ("t3", "tension")
+        assert drift.shift_mean == pytest.approx(-0.2, abs=0.03)
         baseline, selection = store.baseline(3), store.selection(3)
         assert baseline is not None
         assert (baseline.posterior.tests, baseline.why) == (
@@ -120,11 +123,11 @@ def test_a_test_updated_before_the_adoption_is_watched_against_its_own_class(
     seen: list[tuple[str, str]] = []
     watch = steps.watch_test
 
-    def note(baseline, current, *others):  # type: ignore[no-untyped-def]
+    def note(baseline, tests, current, *others):  # type: ignore[no-untyped-def]
         if current.tests == ("t2",) and not seen:
             adopted(begun, "point_mass")
         seen.append((baseline.posterior.model, current.model))
-        return watch(baseline, current, *others)
+        return watch(baseline, tests, current, *others)
 
     monkeypatch.setattr(steps, "watch_test", note)
     for day in (1, 2):
@@ -181,19 +184,26 @@ def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
 ) -> None:
     adopted(begun, "point_mass")
     monkeypatch.setattr(steps, "watch_gap", lambda *a, **k: _gap_alert(*a, **k))
-    spool(begun, "t2", day=1, tension=0.8)
+    for number in (2, 3):
+        spool(begun, f"t{number}", day=30 * number, tension=0.8)
     ingest(begun)
     with begun.store() as store:
         (stored,) = store.alerts()
-    assert stored.alert.key.startswith("hanger-3:tension-down:gap-up:baseline-")
-    assert "tension moved" in stored.alert.message
+    assert stored.alert.key.startswith(
+        "hanger-3:beyond-threshold+sudden-change:tension-down:t3:gap-up:baseline-"
+    )
+    assert stored.alert.kinds == ("beyond threshold", "sudden change", "gap")
+    assert "tension fell by" in stored.alert.message
     assert stored.alert.message.endswith("The gap opened.")
 
 
 def _gap_alert(_before: Any, _now: Any, hanger: Any, *, test: str, time: Any) -> Any:
     from shm.values import Alert
 
-    return Alert(f"hanger-{hanger.id}:gap-up", hanger.id, test, time, "The gap opened.", ())
+    if test != "t3":
+        return None
+    key = f"hanger-{hanger.id}:gap-up"
+    return Alert(key, hanger.id, test, time, "The gap opened.", (), ("gap",))
 
 
 def test_there_is_nothing_to_adopt_before_the_first_test(workspace: Workspace) -> None:
@@ -274,9 +284,12 @@ def _with_temperature(test: ModalTest, temperature_c: float) -> str:
     return dump(modes_document([replace(test, temperature_c=temperature_c)]))
 
 
-def test_an_effect_of_the_temperature_needs_tests_with_temperatures(begun: Workspace) -> None:
+def test_an_effect_of_the_temperature_needs_tests_with_temperatures(workspace: Workspace) -> None:
+    path = workspace.spool / "t1.modes.json"
+    put(path, _with_temperature(write_test(path, workspace), math.nan))
+    ingest(workspace)
     with pytest.raises(BadInput, match="no test of hanger 3 has"):
-        adopted(begun, "temperature_tension")
+        adopted(workspace, "temperature_tension")
 
 
 def test_each_effect_needs_its_place(begun: Workspace) -> None:

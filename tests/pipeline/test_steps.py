@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -13,13 +13,16 @@ from typing import Any
 import pytest
 
 from shm.errors import BadInput, ShmError
+from shm.models import build
 from shm.pipeline import steps
 from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
-from shm.values import Hanger, ModalTest, Recording
-from tests.helpers.nouns import NOW, a_check, a_foreign_mode, a_posterior, a_response, a_test
-from tests.helpers.workspaces import put
+from shm.update import UpdateOptions
+from shm.values import Alert, Hanger, ModalTest, Recording, WatchedTest
+from tests.helpers import quick_update
+from tests.helpers.nouns import NOW, a_check, a_foreign_mode, a_response, a_test
+from tests.helpers.workspaces import START, modelled_test, put
 
 Identify = Callable[..., tuple[IdentifiedTest, ...]]
 
@@ -155,16 +158,28 @@ def test_seeds_depend_on_what_is_computed_not_on_the_order() -> None:
 
 def test_an_alert_belongs_to_its_baseline(workspace: Workspace) -> None:
     hanger = workspace.bridge.hanger(3)
-    low = replace(a_posterior(), samples=a_posterior().samples * 0.8)
+    first, *later = (
+        modelled_test(f"t{number}", hanger, 30 * number, 0.8 if number else 1.0)
+        for number in range(3)
+    )
+    posteriors = [
+        quick_update.update([test], build("beam1", hanger), UpdateOptions(samples=100, seed=1))
+        for test in (first, *later)
+    ]
+
+    def watch(number: int, tests: Sequence[ModalTest]) -> tuple[WatchedTest, Alert | None]:
+        baseline = Baseline(number, 3, posteriors[0], NOW, "shm", "first")
+        dated = [(first, START)], [(test, test.time or NOW) for test in tests]
+        return watch_test(baseline, dated, posteriors[len(tests)], hanger, 100.0)
+
     keys = set()
     for number in (1, 2):
-        baseline = Baseline(number, 3, a_posterior(), NOW, "shm", "first")
-        drifts, alert = watch_test(baseline, low, hanger, "t2", NOW)
+        found, alert = watch(number, later)
         assert alert is not None
-        assert drifts[0].shift_mean == pytest.approx(-0.2, abs=0.01)
+        assert found.drifts[0].shift_mean == pytest.approx(-0.2, abs=0.02)
         keys.add(alert.key)
     assert len(keys) == 2
-    assert watch_test(baseline, a_posterior(), hanger, "t2", NOW)[1] is None
+    assert watch(1, later[:1])[1] is None
 
 
 def test_a_reason_names_file_line_channel_and_remedy() -> None:
