@@ -87,7 +87,8 @@ def test_a_hook_has_a_name_that_can_be_shown(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(
     "address",
-    ["syslog://", "syslog://local0", "dbus://x", "windows://x", "rsyslog://h", "file://x"],
+    ["syslog://", "syslog://local0", "rsyslog://h"]
+    + [f"{kind}://x" for kind in ("dbus", "windows", "file")],
 )
 def test_alerts_do_not_go_by_what_acts_on_this_machine(tmp_path: Path, address: str) -> None:
     with pytest.raises(BadInput, match="hook ops"):

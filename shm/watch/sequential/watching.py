@@ -24,6 +24,10 @@ from shm.watch.sequential.conclusions import Watcher, changed, drifted, probabil
 from shm.watch.sequential.measurement import measurements
 from shm.watch.sequential.segments import taken_over
 
+# All is measured from a baseline of one test: taken for a blunder, every loss after it would be the
+# truth that it missed.
+_ALONE = WatchOptions(outlier_probability=1e-6)
+
 
 @dataclass(frozen=True, eq=False)
 class Call:
@@ -75,7 +79,9 @@ def watch_over(
     calls: list[Call] = []
     still_same = 1.0
     for index, measurement in enumerate(measurements(readings, quantities, options)):
-        bank = read(bank, measurement, options, may_change=index >= options.baseline_tests)
+        is_baseline = index < options.baseline_tests
+        believed = _ALONE if is_baseline and options.baseline_tests == 1 else options
+        bank = read(bank, measurement, believed, may_change=not is_baseline)
         tests.append(_result(watcher, bank, readings[index], 1 - still_same))
         if tests[-1].change.called:
             still_same *= 1 - probability_of_change(bank, options)
