@@ -22,6 +22,10 @@ _HTML = "blind_trial.html"
 _DOTS_PER_INCH = 110
 
 
+def _sentence(title: str) -> str:
+    return title if title.endswith("?") else f"{title}."
+
+
 def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
     """What came out, for people: words, what is missed, figures, tables."""
     seal = f"Seed {score.seed}; SHA-256 of the key `{score.key_sha256}`."
@@ -29,7 +33,7 @@ def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
     if lost := misses(score):
         parts.append("\n".join(["Missed:\n", *(f"- {each}" for each in lost)]))
     parts += [
-        f"![{item.alt}](figures/{item.name}.png)\n\n*{item.title}.* {item.caption}"
+        f"![{item.alt}](figures/{item.name}.png)\n\n*{_sentence(item.title)}* {item.caption}"
         for item in drawn
     ]
     return "\n\n".join([*parts, *map(_markdown, (*answers(score), *evidence(score)))])

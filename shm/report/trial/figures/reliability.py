@@ -41,7 +41,7 @@ def _caption(score: TrialScore) -> str:
         )
     )  # fmt: skip
     told = (
-        f" Expected calibration error {value(error.score)}; as counted {value(counted.score)}, of "
+        f" Expected calibration error of sizes above 4 {value(error.score)}; as counted {value(counted.score)}, of "
         f"which chance alone gives {value(chance.score)} with so many cases."
         if error and counted and chance
         else ""
