@@ -40,6 +40,9 @@ def _tension_row(label: str, tension_n: Interval, nominal_n: float) -> tuple[str
     return (label, words.mean(kilonewtons), words.span(kilonewtons), f"{share:.1f}")
 
 
+_UNMOVED = 0.01
+
+
 def drift(data: HangerReport) -> Table:
     return Table(
         "Shift since the baseline",
@@ -53,10 +56,12 @@ def drift(data: HangerReport) -> Table:
 def _drift_row(row: Drift) -> tuple[str, ...]:
     scale, unit = (100.0, "%") if row.quantity == "tension" else (1.0, "decades")
     shift = Interval.normal(row.shift_mean, row.shift_sd).scaled(scale)
+    # Nearly all of the probability is that nothing has changed: a spread about 0 has no width.
+    unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
     return (
         words.quantity(row.quantity),
-        f"{words.mean(shift, True)} {unit}",
-        f"{words.span(shift, True)} {unit}",
+        "no change seen" if unmoved else f"{words.mean(shift, True)} {unit}",
+        "" if unmoved else f"{words.span(shift, True)} {unit}",
         threshold(row),
         words.probability(row.probability),
     )
