@@ -19,6 +19,7 @@ from shm.watch.quantities import (
     watched_quantities,
 )
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.modelled_tests import posterior
 
 SPRUNG = (1.1, 0.97, 7.2, 7.6, 8.6, 6.6)
 TRANSVERSE: list[MeasuredMode] = [("transverse", order) for order in range(1, 7)]
@@ -35,23 +36,12 @@ def baseline(
     samples = np.tile(np.array(theta), (500, 1)) + spread * rng.standard_normal((500, len(theta)))
     samples[:, 0] = 1.02 * theta[0] * (1 + 0.01 * rng.standard_normal(500))
     samples = np.clip(samples, made.prior.lower, made.prior.upper)
-    return Posterior(
-        model=model,
-        hanger=3,
+    return replace(
+        posterior(theta, model, hanger),
         names=(*made.parameter_names, "sigma"),
         samples=np.column_stack([samples, np.full(500, 0.003)]),
         log_likelihood=np.zeros(500),
         most_probable=np.append(theta, 0.003),
-        nominal_tension_n=hanger.nominal_tension_n,
-        log_evidence=0.0,
-        log_evidence_sd=0.01,
-        effective_sample_size=500,
-        r_hat=1.0,
-        evaluations=1,
-        predicted=(),
-        tests=("b",),
-        seed=1,
-        seconds=0.0,
     )
 
 
