@@ -94,14 +94,16 @@ def _draws(found: list[Optimum], rng: np.random.Generator) -> FloatArray:
     counts = rng.multinomial(_DRAWS, np.exp(log - logsumexp(log)))
     return np.vstack(
         [
-            each.branch.z(_scattered(each, count, rng))
+            each.branch.z(each.w + scattered(each.curvature, count, rng))
             for each, count in zip(found, counts, strict=True)
         ]
     )
 
 
-def _scattered(optimum: Optimum, count: int, rng: np.random.Generator) -> FloatArray:
-    """Draws (count, d) by the curvature's own factor: its inverse may be too uneven for one."""
-    factor = np.linalg.cholesky(optimum.curvature)
-    normal = rng.standard_normal((count, len(optimum.w)))
-    return np.asarray(optimum.w + np.linalg.solve(factor.T, normal.T).T)
+def scattered(curvature: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
+    """Normal draws about 0 (count, d) by the curvature's own factor: its inverse may be too uneven.
+
+    `curvature` (d, d) is the inverse of their covariance.
+    """
+    normal = rng.standard_normal((count, len(curvature)))
+    return np.asarray(np.linalg.solve(np.linalg.cholesky(curvature).T, normal.T).T)

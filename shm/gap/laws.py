@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
+from shm.gap.fit import scattered
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
@@ -135,12 +136,6 @@ def _moved(
         covariance=covariance,
         predicted=predicted[best],
         noise=errors,
-        draws=places[best] + _scattered(linear.curvature, len(fit.draws), rng)[:, :own],
+        draws=places[best] + scattered(linear.curvature, len(fit.draws), rng)[:, :own],
         log_fit=float(log[best]),
     )
-
-
-def _scattered(curvature: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
-    """Normal draws (count, d) by the curvature's own factor: its inverse may be too uneven."""
-    normal = rng.standard_normal((len(curvature), count))
-    return np.asarray(np.linalg.solve(np.linalg.cholesky(curvature).T, normal).T)

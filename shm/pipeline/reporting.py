@@ -82,8 +82,7 @@ def _states(
     if baseline is None:
         return NOTHING_WATCHED
     since_baseline, later = dated_tests(store, baseline)
-    limit_years = workspace.settings.false_call_years
-    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
+    options = WatchOptions(limit_years=workspace.settings.false_call_years)
     watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
     return states_over_time(watched, hanger)
 

@@ -138,7 +138,7 @@ def watch_test(
     `tests` are those of the baseline and those since, the last of which is the one in question.
     """
     since_baseline, later = tests
-    options = WatchOptions(limit_years=limit_years, baseline_tests=len(since_baseline))
+    options = WatchOptions(limit_years=limit_years)
     watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
     test, time = later[-1]
     gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from shm.values import Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
@@ -26,7 +26,6 @@ class Watched:
     reader: Reader
     readings: tuple[Reading, ...]
     watch: Watch
-    options: WatchOptions
 
     @property
     def latest(self) -> WatchedTest:
@@ -46,6 +45,7 @@ def watch_hanger(
 ) -> Watched:
     """The watch of a hanger over the tests of its baseline and `later` ones, both by time.
 
+    How many tests precede every change follows from `baseline_tests`, whatever `options` say.
     A test that is older than the baseline's counts as made right after them: all later ones are
     compared with the baseline. Raises BadInput where the baseline's tests hold no mode that its
     class describes.
@@ -54,6 +54,5 @@ def watch_hanger(
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
-    return Watched(
-        reader, readings, watch_over(readings, reader.quantities, hanger, options), options
-    )
+    options = replace(options, baseline_tests=len(baseline_tests))
+    return Watched(reader, readings, watch_over(readings, reader.quantities, hanger, options))

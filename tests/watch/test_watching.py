@@ -48,7 +48,7 @@ def _watched(*later: tuple[float, ...]) -> Watched:
     posterior, tests = _baseline()
     rng = np.random.default_rng(2)
     since = tuple(_test(BASELINE_TESTS + k, theta, rng) for k, theta in enumerate(later))
-    options = WatchOptions(baseline_tests=BASELINE_TESTS)
+    options = WatchOptions()
     return watch_hanger(posterior, _dated(tests), _dated(since), HANGER_3, options)
 
 
@@ -82,7 +82,7 @@ def test_a_pin_that_loosens_is_told_as_stiffness_of_its_plane() -> None:
 def test_a_test_older_than_the_baseline_is_compared_with_it_all_the_same() -> None:
     posterior, tests = _baseline()
     old, since = _dated(tests[:1]), _dated(tests[1:])
-    found = watch_hanger(posterior, since, old, HANGER_3, WatchOptions(baseline_tests=2))
+    found = watch_hanger(posterior, since, old, HANGER_3, WatchOptions())
     assert found.latest.test == "t0"
     assert found.latest.time == tests[-1].time
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from shm.watch.sequential.segments import taken_over
 
 # All is measured from a baseline of one test: taken for a blunder, every loss after it would be the
 # truth that it missed.
-_ALONE = WatchOptions(outlier_probability=1e-6)
+_OUTLIER_IF_ALONE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,10 @@ def watch_over(
     tests: list[WatchedTest] = []
     calls: list[Call] = []
     still_same = 1.0
+    alone = replace(options, outlier_probability=_OUTLIER_IF_ALONE)
     for index, measurement in enumerate(measurements(readings, quantities, options)):
         is_baseline = index < options.baseline_tests
-        believed = _ALONE if is_baseline and options.baseline_tests == 1 else options
+        believed = alone if is_baseline and options.baseline_tests == 1 else options
         bank = read(bank, measurement, believed, may_change=not is_baseline)
         tests.append(_result(watcher, bank, readings[index], 1 - still_same))
         if tests[-1].change.called:
