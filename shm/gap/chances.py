@@ -21,6 +21,9 @@ SINGLE = 0.5
 PAIR = 0.125
 UNKNOWN = 0.125
 """Before any data: half of the hangers have one effect, a quarter none."""
+AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
+"""How often something unknown comes with an effect or a pair, to how often these come alone: as
+often as a second cause comes at all, and as seldom as a cause is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +122,7 @@ def _family(members: Sequence[Tried], variants: dict[str, int]) -> Family:
 
 def _prior(hypothesis: Hypothesis, effects: int) -> float:
     count = len(hypothesis.effects)
-    if hypothesis.flexible:
-        return UNKNOWN / 2 / (effects if count else 1)
-    if count == 2:
-        return PAIR / max(1, effects * (effects - 1) // 2)
-    return SINGLE / effects if count else NO_GAP
+    if count == 0:
+        return UNKNOWN if hypothesis.flexible else NO_GAP
+    known = SINGLE / effects if count == 1 else PAIR / max(1, effects * (effects - 1) // 2)
+    return AND_UNKNOWN * known if hypothesis.flexible else known

@@ -54,21 +54,30 @@ class Design:
 class Observations:
     """The data vector of a design: `value` and `sd` (data,).
 
-    `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one.
+    `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one. `turned`
+    (data,), None where nothing is, is what one standard deviation of a turn about the hanger's axis
+    does to a component of a shape; all of a mode turn together.
     """
 
     design: Design
     value: FloatArray
     sd: FloatArray
+    turned: FloatArray | None = None
+
+    def part(self, design: Design, data: IntArray) -> Observations:
+        """Those of another design, which are `data` of these."""
+        turned = None if self.turned is None else self.turned[data]
+        return Observations(design, self.value[data], self.sd[data], turned)
 
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
     """Of the data about a prediction: `frequency` (F, F), and of the components of shapes.
 
-    Those err independently with the variances `shape` (S,), and together by k errors of sensors,
-    which repeat in every mode and test: `shape_loads` (S, k) is what one standard deviation of each
-    does. So the covariance of shapes is diag(shape) + shape_loads shape_loads'.
+    Those err independently with the variances `shape` (S,), and together by k errors: of sensors,
+    which repeat in every mode and test, and of the directions of modes. `shape_loads` (S, k) is
+    what one standard deviation of each does. So the covariance of shapes is
+    diag(shape) + shape_loads shape_loads'.
     """
 
     frequency: FloatArray

@@ -4,8 +4,9 @@ Corrosion has no edges, sockets taper, joints slip by another power. The larger 
 its law's own error stands out of the noise, and without an allowance a second effect or something
 unknown would take the blame. So the data may err about a prediction in two ways: by an unknown
 multiple, about 1 in size, of what each other law of the effect would change; and by a fraction of
-what the effect does to each of them beyond what the baseline can follow, the same in all tests of a
-mode. The fraction is unknown.
+what the effect does beyond what the baseline can follow, the same in all tests of a mode: of what
+it does to that very mode or, where a law shifts its action from mode to mode, to the modes of a
+test and plane on the whole. The fraction is unknown.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from shm.gap.likelihood import Likelihood
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
-FRACTIONS = ((0.003, 0.2), (0.03, 0.2), (0.1, 0.15), (0.2, 0.1), (0.4, 0.05))
-"""By how much an effect's law is off, each with its prior probability."""
+FRACTIONS = ((0.003, 0.15), (0.03, 0.15), (0.1, 0.13), (0.2, 0.08), (0.4, 0.04))
+"""By how much an effect's law is off mode by mode, each with its prior probability."""
+FRACTIONS_ON_THE_WHOLE = ((0.01, 0.05), (0.03, 0.05), (0.1, 0.05))
+"""The same of what the effect does to the modes of a test and plane on the whole."""
 EXACT = 0.3
 """The prior probability that it is not off at all."""
 SHOWN = 3.0
@@ -56,13 +59,15 @@ def by_its_laws(
     """
     others = _changes(problem, fit)
     shift = fit.predicted - baseline.predicted
+    whole = _on_the_whole(problem.design, shift)
+    allowances = [(fraction * shift, share) for fraction, share in FRACTIONS]
+    allowances += [(fraction * whole, share) for fraction, share in FRACTIONS_ON_THE_WHOLE]
     exact = _linear(problem, fit, fit.noise, fit.slopes)
     wide = np.column_stack([fit.slopes, others])
     off = [
-        _linear(problem, fit, _allowed(problem.design, fit, fraction * shift), wide)
-        for fraction, _ in FRACTIONS
+        _linear(problem, fit, _allowed(problem.design, fit, error), wide) for error, _ in allowances
     ]
-    share = np.array([share for _, share in FRACTIONS])
+    share = np.array([share for _, share in allowances])
     weight = np.log(share) + np.array([each.log_evidence for each in off])
     of_exact = np.log(EXACT) + exact.log_evidence
     gain = float(np.logaddexp(of_exact, logsumexp(weight)) - exact.log_evidence)
@@ -87,6 +92,26 @@ def _otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
             effects = list(hypothesis.effects)
             effects[index] = name, replace(variant, law=law)
             yield replace(hypothesis, effects=tuple(effects))
+
+
+def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:
+    """Root mean squares of a shift (data,) over each test and plane, and over each shape."""
+    count = design.frequencies
+    planes = 1 + int(design.frequency_plane.max())
+    return np.concatenate(
+        [
+            _root_mean_square(
+                design.frequency_test * planes + design.frequency_plane, shift[:count]
+            ),
+            _root_mean_square(design.shape_mode, shift[count:]),
+        ]
+    )
+
+
+def _root_mean_square(group: IntArray, values: FloatArray) -> FloatArray:
+    """Of the values (n,) of each group, given to each of its members."""
+    mean = np.bincount(group, values**2) / np.maximum(np.bincount(group), 1)
+    return np.asarray(np.sqrt(mean)[group])
 
 
 def _allowed(design: Design, fit: Fit, off: FloatArray) -> Covariance:

@@ -20,6 +20,7 @@ import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
 from shm.gap.repeated import Repeated
+from shm.gap.shapes import turned_modes
 from shm.values import FloatArray, IntArray
 
 MODEL_ERROR_SCALE = 2e-5
@@ -158,6 +159,8 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
             design.shape_component,
         ]
     )
+    # What is turned at will scatters by more than its own standard deviations say.
+    keys = np.vstack([keys, np.where(turned_modes(observations), np.arange(len(mode)), -1)])
     kind = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
     value, sd = observations.value[design.frequencies :], observations.sd[design.frequencies :]
     count = np.bincount(kind)

@@ -8,12 +8,13 @@ component spread over the certain ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
+from shm.gap.turns import told_apart
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
@@ -31,6 +32,7 @@ class _Component:
     axis: int
     value: float
     sd: float
+    turned: float = 0.0
 
 
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
@@ -43,7 +45,9 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     _refuse_nonsense(tests, hanger)
     frequency = np.array([mode.frequency_hz for _, mode in modes])
     sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
-    components, lengths = _scaled([_components(k, mode) for k, (_, mode) in enumerate(modes)])
+    least = _least_sd(tests)
+    shapes = [_as_turned(_components(k, mode), least) for k, (_, mode) in enumerate(modes)]
+    components, lengths = _scaled(shapes)
     survey = survey_of(tests)
     design = Design(
         survey=survey,
@@ -58,10 +62,12 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     )
     shape = np.array([each.value for each in components]) / lengths
     shape_sd = np.array([each.sd for each in components]) / lengths
+    turned = np.array([each.turned for each in components]) / lengths
     return Observations(
         design,
         np.concatenate([np.log(frequency), shape]),
         np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
+        np.concatenate([np.zeros_like(sd), turned]) if turned.any() else None,
     )
 
 
@@ -121,6 +127,28 @@ def _components(index: int, mode: Mode) -> list[_Component]:
     ]
     usable = [each for each in both if np.isfinite([each.value, each.sd]).all() and each.sd > 0]
     return usable if len(usable) > 1 and any(each.value != 0 for each in usable) else []
+
+
+def _as_turned(shape: list[_Component], least: float) -> list[_Component]:
+    """A shape of two-axis sensors whose direction may be uncertain (see `shm.gap.turns`)."""
+    pairs = list(zip(shape[::2], shape[1::2], strict=False))
+    if len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
+        return shape
+    size = np.array([max(abs(one.value), abs(other.value)) for one, other in pairs])
+    own, turn = told_apart(np.array([one.sd for one, _ in pairs]), size, least)
+    return [
+        replace(
+            each, sd=float(sd), turned=turn * (beside.value if each.axis == 0 else -beside.value)
+        )
+        for (one, other), sd in zip(pairs, own, strict=True)
+        for each, beside in ((one, other), (other, one))
+    ]
+
+
+def _least_sd(tests: Sequence[ModalTest]) -> float:
+    """The smallest standard deviation of all shapes' components; 0 where there is none."""
+    each = (p.sd for test in tests for mode in test.modes for p in mode.shape)
+    return min((sd for sd in each if sd > 0), default=0.0)
 
 
 def _scaled(shapes: Sequence[list[_Component]]) -> tuple[list[_Component], FloatArray]:

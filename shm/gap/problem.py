@@ -15,7 +15,7 @@ from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
 from shm.gap.readings import reading_loads
 from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
-from shm.gap.shapes import ShapeScaling
+from shm.gap.shapes import ShapeScaling, turn_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Variant, parameters_of
 from shm.models.hanger import HangerModes
@@ -105,7 +105,8 @@ class GapProblem:
         """What the errors that repeat do to the data, from the baseline near the data."""
         length_m = self.hanger.length_m
         sensors = sensor_loads(self.observations, self._predicted_near, length_m)
-        return Repeated(self.section_of(self.design), self.readings_of(self.design), sensors)
+        shapes = np.hstack([sensors, turn_loads(self.observations)])
+        return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes)
 
     def readings_of(self, design: Design) -> FloatArray:
         """What errors of tensions read do to the frequencies of a design: loads (F, tests)."""
@@ -201,4 +202,4 @@ def _part(observations: Observations, rows: BoolArray | IntArray) -> Observation
         shape_place=design.shape_place[shapes],
         shape_component=design.shape_component[shapes],
     )
-    return Observations(part, observations.value[data], observations.sd[data])
+    return observations.part(part, data)

@@ -41,7 +41,8 @@ class Repeated:
     """Loads of what repeats.
 
     `section` (F, k) is that of the section along the bar and `readings` (F, tests with a reading)
-    that of tensions read, both of frequencies; `sensors` (S, l) is that of shapes.
+    that of tensions read, both of frequencies; `sensors` (S, l) is that of shapes, with those of
+    modes that may be turned, which do not repeat (`shm.gap.shapes.turn_loads`).
     """
 
     section: FloatArray

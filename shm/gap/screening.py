@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -84,3 +85,14 @@ def hopeful(
     own = np.where(coarse, HOPELESS_IF_COARSE, HOPELESS)
     reach = np.maximum(own, HOPELESS_SHARE * gap)
     return tuple(tried[i] for i in order if weighed[i] > best - reach[i])
+
+
+def varied(tried: Sequence[Tried], alike: int, most: int) -> tuple[Tried, ...]:
+    """The best by their evidence, at most `most`, and no more than `alike` of one family."""
+    before: Counter[str] = Counter()
+    kept = []
+    for each in sorted(tried, key=lambda each: -each.log_evidence):
+        before[each.hypothesis.name] += 1
+        if before[each.hypothesis.name] <= alike:
+            kept.append(each)
+    return tuple(kept[:most])

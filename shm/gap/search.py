@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,14 @@ from shm.gap.options import GapOptions, Progress
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
 from shm.gap.sampled import sampled
-from shm.gap.screening import STARTS, hopeful, paired, screened, tried_by_screening
+from shm.gap.screening import (
+    STARTS,
+    hopeful,
+    paired,
+    screened,
+    tried_by_screening,
+    varied,
+)
 from shm.gap.sensitivity import Scan
 
 SAMPLED_WITHIN = 4.0
@@ -24,8 +31,9 @@ MOST_FITS = 30
 MOST_SAMPLED = 5
 LEADERS = 3
 MOST_PAIRS = 8
+MANY_LEADERS, MANY_PAIRS, ALIKE = 6, 30, 2
 SUPPORTED = 2.0
-LAWS_WITHIN = 500.0
+LAWS_WITHIN, LAWS_WITHIN_SHARE = 500.0, 0.2
 DROWNED = "Even at its largest it would drown in the errors of these data."
 
 
@@ -59,7 +67,8 @@ class Search:
         rival = self.baseline.log_evidence + log_prior(Hypothesis(), self.variants)
         rough = tried_by_screening(self.problem, self.baseline, self.scans)
         nothing = self.baseline.log_evidence
-        fits = self._fitted(self.scans, rough, nothing, rival, MOST_FITS, 0.4, 0.6)
+        chosen = self._hopeful(self.scans, rough, nothing, rival, MOST_FITS)
+        fits = self._fitted(self.scans, chosen, 0.4, 0.6)
         rest = [each for each in rough if each.hypothesis not in fits]
         return [self._tried(self.baseline), *map(self._tried, fits.values()), *rest]
 
@@ -75,18 +84,40 @@ class Search:
         return any(fit is not None and fit.log_evidence > level for fit in fits)
 
     def with_pairs(self, tried: list[Tried]) -> list[Tried]:
-        """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
-        scans: dict[Hypothesis, Scan] = {}
-        rough: list[Tried] = []
-        for fit in (family.best.fit for family in self.leaders(tried)):
-            if fit is not None:
-                found = _new(paired(self.problem, fit, self.scans), scans)
-                rough += tried_by_screening(self.problem, fit, found)
-                scans |= found
+        """Adds the pairs of a leading effect with another one that may be as likely, fitted.
+
+        Where something unknown leads all the same, pairs of all kinds are fitted, for where the gap
+        is large the scans, which add up what each effect does alone, say little.
+        """
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
         single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
-        fits = list(self._fitted(scans, rough, single, rival, MOST_PAIRS, 0.7, 0.85).values())
+        scans, rough = self._pairs(tried, LEADERS)
+        chosen = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
+        some = self._with_fitted_pairs(tried, scans, chosen)
+        if not families(self.with_laws(some), self.variants)[0].flexible:
+            return some
+        scans, rough = self._pairs(some, MANY_LEADERS)
+        return self._with_fitted_pairs(some, scans, varied(rough, ALIKE, MANY_PAIRS))
+
+    def _pairs(
+        self, tried: Sequence[Tried], leaders: int
+    ) -> tuple[dict[Hypothesis, Scan], list[Tried]]:
+        """Pairs of the leading effects that are not tried yet, scanned, and what the scans say."""
+        known = {each.hypothesis for each in tried}
+        scans: dict[Hypothesis, Scan] = {}
+        rough: list[Tried] = []
+        for fit in (family.best.fit for family in self.leaders(tried, leaders)):
+            if fit is not None:
+                found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
+                rough += tried_by_screening(self.problem, fit, found)
+                scans |= found
+        return scans, rough
+
+    def _with_fitted_pairs(
+        self, tried: list[Tried], scans: Mapping[Hypothesis, Scan], chosen: Sequence[Tried]
+    ) -> list[Tried]:
+        fits = list(self._fitted(scans, chosen, 0.7, 0.85).values())
         first = sorted(fits, key=lambda fit: -fit.log_evidence)[:1]
         return [*tried, *map(self._tried, fits), *map(self._flexible, first)]
 
@@ -103,10 +134,9 @@ class Search:
     def with_laws(self, tried: list[Tried]) -> list[Tried]:
         """Allows for the error of the effects' own laws, where it may decide something."""
         first = max(each.log_evidence for each in tried)
-        return [
-            self._by_its_laws(each) if each.log_evidence > first - LAWS_WITHIN else each
-            for each in tried
-        ]
+        gap = first - self.baseline.log_evidence
+        least = first - max(LAWS_WITHIN, LAWS_WITHIN_SHARE * gap)
+        return [self._by_its_laws(each) if each.log_evidence > least else each for each in tried]
 
     @property
     def invisible(self) -> tuple[tuple[str, str], ...]:
@@ -119,31 +149,35 @@ class Search:
         """Of the absolute fit, with the errors as they are expected to be."""
         return predictive_p_value(self.problem.observations, fit, fit.noise)
 
-    def leaders(self, tried: Sequence[Tried]) -> list[Family]:
+    def leaders(self, tried: Sequence[Tried], most: int = LEADERS) -> list[Family]:
         """The likeliest families of one effect."""
         singles = [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
-        return singles[:LEADERS]
+        return singles[:most]
 
-    def _fitted(
+    def _hopeful(
         self,
         scans: Mapping[Hypothesis, Scan],
         rough: Sequence[Tried],
         without: float,
         rival: float,
         most: int,
-        begin: float,
-        end: float,
-    ) -> dict[Hypothesis, Fit]:
-        """Fits, from the scans' best points, of what stands a chance.
-
-        `rough` is what the scans say, `without` the log evidence without what was scanned.
-        """
+    ) -> tuple[Tried, ...]:
+        """What stands a chance; `without` is the log evidence without what was scanned."""
         if not rough:
-            return {}
+            return ()
         priors = [log_prior(each.hypothesis, self.variants) for each in rough]
         coarse = [scans[each.hypothesis].share.shape[1] > 1 for each in rough]
         gap = max(each.log_evidence for each in rough) - without
-        chosen = hopeful(rough, priors, coarse, rival, gap, most)
+        return hopeful(rough, priors, coarse, rival, gap, most)
+
+    def _fitted(
+        self,
+        scans: Mapping[Hypothesis, Scan],
+        chosen: Sequence[Tried],
+        begin: float,
+        end: float,
+    ) -> dict[Hypothesis, Fit]:
+        """Fits of what was chosen, from the scans' best points."""
         found: dict[Hypothesis, Fit] = {}
         for hypothesis in (each.hypothesis for each in chosen):
             fraction = begin + (end - begin) * len(found) / len(chosen)
@@ -183,8 +217,10 @@ def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
     return {name: names.count(name) for name in names}
 
 
-def _new(pairs: dict[Hypothesis, Scan], known: dict[Hypothesis, Scan]) -> dict[Hypothesis, Scan]:
-    """Pairs that are not known in the other order of their effects."""
+def _new(pairs: Mapping[Hypothesis, Scan], known: Set[Hypothesis]) -> dict[Hypothesis, Scan]:
+    """Pairs that are not known, in whichever order of their effects."""
     return {
-        pair: found for pair, found in pairs.items() if Hypothesis(pair.effects[::-1]) not in known
+        pair: found
+        for pair, found in pairs.items()
+        if pair not in known and Hypothesis(pair.effects[::-1]) not in known
     }

@@ -1,4 +1,4 @@
-"""The scale and sign of predicted mode shapes: unit length, turned to a reference."""
+"""Mode shapes: scale and sign of predicted ones, and errors of the direction of measured ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.gap.contract import Design, Observations
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,36 @@ class ShapeScaling:
         agrees = np.add.reduceat(raw * self.reference, begins, axis=1)
         factor = np.where(agrees < 0, -1.0, 1.0) / np.maximum(length, np.finfo(float).tiny)
         return np.asarray(raw * factor[:, self.shape])
+
+
+def turn_loads(observations: Observations) -> FloatArray:
+    """Loads (S, k) of the turns of modes whose direction is uncertain, two for each.
+
+    The first is that of a small turn; the second what a larger one takes off the length along the
+    measured shape: turn^2 / 2, whose root mean square is sqrt(3) / 2 times the turn's variance.
+    """
+    design, columns = observations.design, []
+    value = observations.value[design.frequencies :]
+    for mode in np.unique(design.shape_mode[turned_modes(observations)]):
+        own = design.shape_mode == mode
+        turned = own * _turned(observations)
+        variance = (turned @ turned) / (value[own] @ value[own])
+        columns += [turned, np.sqrt(3) / 2 * variance * own * value]
+    return np.column_stack(columns) if columns else np.zeros((len(value), 0))
+
+
+def turned_modes(observations: Observations) -> BoolArray:
+    """Which components (S,) are of shapes whose direction is uncertain."""
+    mode = observations.design.shape_mode
+    return np.asarray(np.isin(mode, mode[_turned(observations) != 0]))
+
+
+def _turned(observations: Observations) -> FloatArray:
+    """What one standard deviation of its mode's turn does to each component (S,)."""
+    count = observations.design.frequencies
+    if observations.turned is None:
+        return np.zeros(len(observations.value) - count)
+    return observations.turned[count:]
 
 
 def _counted(design: Design) -> IntArray:

@@ -11,11 +11,12 @@ import numpy as np
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, Hit, Measurement, Poles
 from shm.identify.finding.jackknife import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.finding.registry import WITHOUT_FORCE, identifier
+from shm.identify.finding.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.finishing import coherent_only, without_window
 from shm.identify.joining.fit import fitted
 from shm.identify.joining.joined import Joined, joined
 from shm.identify.joining.products import joined_response
+from shm.identify.joining.together import alike, sharpened, together
 from shm.identify.measuring.setups import measured
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.placing.placement import Placement, placed
@@ -124,7 +125,12 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [_finished(function(m, alone), m, options) for m in measurements]
-    return _allowed_for(joined(measurements, findings, options), options.shape_allowance)
+    found = joined(measurements, findings, options)
+    if name in HIT_BY_HIT and alike(measurements):
+        every = together(measurements)
+        whole = _finished(function(every, options), every, options)
+        found = sharpened(measurements, found, whole)
+    return _allowed_for(found, options.shape_allowance)
 
 
 def _allowed_for(found: Joined, shape_allowance: float) -> Joined:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.chances import NO_GAP, SINGLE, UNKNOWN, Tried, families, probabilities
+from shm.gap.chances import NO_GAP, SINGLE, UNKNOWN, Tried, families, log_prior, probabilities
 from shm.gap.contract import Hypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
@@ -56,6 +56,17 @@ def test_what_is_unknown_may_pass_for_an_effect() -> None:
     chances, passing = probabilities(kinds, 0.6)
     assert chances.sum() + passing == pytest.approx(1.0)
     assert passing / chances[0] == pytest.approx(0.6 * UNKNOWN / SINGLE, rel=1e-6)
+
+
+def test_something_unknown_beside_a_cause_is_rarer_than_a_second_cause_and_than_it_alone() -> None:
+    variants = {"a": 1, "b": 1}
+    priors = [
+        log_prior(_tried(0.0, *names, flexible=flexible).hypothesis, variants)
+        for names, flexible in (((), True), (("a",), False), (("a", "b"), False), (("a",), True))
+    ]
+    assert priors[3] < min(priors[:3])
+    pair = _tried(0.0, "a", "b", flexible=True).hypothesis
+    assert log_prior(pair, variants) - priors[2] == pytest.approx(priors[3] - priors[1])
 
 
 def test_the_best_variant_comes_first() -> None:

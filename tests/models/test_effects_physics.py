@@ -217,6 +217,28 @@ def test_a_slow_heavy_support_pushes_the_hangers_modes_up() -> None:
     np.testing.assert_allclose(found[1], frequencies()[1], rtol=2e-6)
 
 
+def test_each_other_law_of_a_support_swings_at_a_higher_frequency_of_its_own() -> None:
+    """Between 1.5 and 6 times that of the first; a support of infinite mass has none."""
+    effect, at = EFFECTS["support_motion"], place("support_motion", "deck end, transverse")
+    values = np.array([[4000.0, 3.0], [np.inf, 3.0]])
+    ratios = []
+    for law in range(1, len(effect.other_laws) + 1):
+        moved = effect.applied(
+            PhysicalHanger.clamped(ROD, np.full(2, 711e3)),
+            values,
+            replace(at, law=law),
+            Conditions("t1"),
+            ROD,
+        )
+        (mode,) = moved.support_modes
+        mass_kg, compliance = mode.mass_kg[0, 0, 0], mode.compliance_m_n[0, 0, 0]
+        assert mass_kg > 4000.0
+        assert np.count_nonzero(mode.mass_kg) == np.count_nonzero(mode.compliance_m_n) == 1
+        ratios.append(1 / np.sqrt(mass_kg * compliance) / (2 * np.pi * 3.0))
+    assert ratios == sorted(ratios)
+    assert 1.5 < ratios[0] < ratios[-1] < 6.0
+
+
 def test_warmth_and_level_change_the_tension() -> None:
     warm = Conditions("t1", temperature_shift_k=10.0, amplitude=2.0)
     slack = physical("temperature_tension", values=(-3000.0,), conditions=warm)
@@ -277,6 +299,7 @@ def test_springs_alike_in_both_planes_are_two_of_one_size(name: str) -> None:
         ("section_loss", (0.1, 5.0, 1.0)),
         ("stiff_end_zones", (0.2, 3.0)),
         ("point_mass", (5.0, 4.0)),
+        ("support_motion", (4000.0, 60.0)),
     ],
 )
 def test_another_law_of_an_effect_does_nearly_the_same(
@@ -292,4 +315,5 @@ def test_another_law_of_an_effect_does_nearly_the_same(
 
 
 def place_of(name: str) -> str:
-    return "both ends" if name == "stiff_end_zones" else "everywhere"
+    ends = {"stiff_end_zones": "both ends", "support_motion": "deck end, transverse"}
+    return ends.get(name, "everywhere")

@@ -10,7 +10,7 @@ those by which each channel sees one mode most (quartimax: Neuhaus and Wrigley 1
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,7 +58,8 @@ def told_apart(
     """The candidates with near pairs, one of which would be dropped, on axes that noise leaves.
 
     `models` are those of all hits at the final orders, and those with each hit left out. Pairs
-    that cannot be trusted then, either, stay as they were; so do all below three hits.
+    that cannot be trusted then, either, stay as they were; so do all below three hits. The axes are
+    a choice that noise does not move: how well hits know the shapes is said by those without it.
     """
     by_id = {id(c): (c, r) for c, r in zip(candidates, repeats, strict=True)}
     if len(models[1]) >= LEAST_HITS:
@@ -66,7 +67,8 @@ def told_apart(
             pair = _pair(one, other, seconds)
             apart = _apart(pair, (one, other), models) if pair else []
             if apart and not any(doubt(c, r, options) for c, r in apart):
-                by_id[id(one)], by_id[id(other)] = apart
+                for old, (candidate, repeat) in zip((one, other), apart, strict=True):
+                    by_id[id(old)] = candidate, replace(repeat, shape=by_id[id(old)][1].shape)
     return [c for c, _ in by_id.values()], [r for _, r in by_id.values()]
 
 

@@ -15,6 +15,8 @@ IDENTIFIERS: dict[str, Identifier] = {
 }
 WITHOUT_FORCE = frozenset({"ssi"})
 """Those that can do with accelerations alone."""
+HIT_BY_HIT = frozenset({"ssi", "ssi-input"})
+"""Those that see hits one by one, so that these need not be of one direction."""
 
 
 def identifier(name: str) -> Identifier:

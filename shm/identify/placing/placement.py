@@ -13,7 +13,7 @@ from shm.identify.placing.alignment import PlaneModes
 from shm.identify.placing.foreign import doubts, explained, without_tones
 from shm.identify.placing.order import Expected, Numbering, assign_orders
 from shm.identify.placing.pairs import blurred, pair_note, with_both_planes
-from shm.identify.placing.planes import CLOSE, planes_of, principal_angle, shape_points
+from shm.identify.placing.planes import CLOSE, planes_of, principal_angle, sd_in_plane, shape_points
 from shm.values import NAN, PLANES, ForeignMode, Hanger, Mode, Plane, ResponsePoint, ShapePoint
 
 _NOTED_DEGREES = 5.0
@@ -35,6 +35,7 @@ class _Candidate:
     found: FoundMode
     plane: Plane
     shape: tuple[ShapePoint, ...]
+    shape_sd: float
     doubt: float
 
 
@@ -86,7 +87,13 @@ def _candidates(
     pairs = list(zip(*with_both_planes(found, planes, points, turned_rad), strict=True))
     return [
         [
-            _Candidate(mode, plane, shape_points(mode, plane, points), float(doubt[id(mode)]))
+            _Candidate(
+                mode,
+                plane,
+                shape_points(mode, plane, points),
+                sd_in_plane(mode, plane, points),
+                float(doubt[id(mode)]),
+            )
             for mode, own in pairs
             if own == plane
         ]
@@ -97,18 +104,14 @@ def _candidates(
 def _plane_modes(group: Sequence[_Candidate], length_m: float) -> PlaneModes:
     shapes = [candidate.shape for candidate in group]
     position = np.array([point.x_m for point in shapes[0]] if shapes else [])
-    values, sd = (
-        np.array([[getattr(point, name) for point in shape] for shape in shapes]).reshape(
-            len(group), len(position)
-        )
-        for name in ("value", "sd")
-    )
+    values = np.array([[point.value for point in shape] for shape in shapes])
+    values = values.reshape(len(group), len(position))
     seen = np.all(np.isfinite(values), axis=0) & bool(np.isfinite(length_m))
     return PlaneModes(
         frequency_hz=np.array([candidate.found.frequency_hz for candidate in group]),
         position=position[seen] / length_m,
         shapes=values[:, seen],
-        shape_sd=np.nan_to_num(sd[:, seen]).max(axis=1, initial=0.0),
+        shape_sd=np.array([candidate.shape_sd for candidate in group]),
         doubt=np.array([candidate.doubt for candidate in group]),
     )
 

@@ -112,12 +112,27 @@ def shape_points(
 ) -> tuple[ShapePoint, ...]:
     """The mode's shape by position: value in its plane, cross in the other, largest value 1.
 
+    The standard deviation is the larger of both: where a shape may be turned, that of `cross`.
     Channels without a position are left out; those at one position and in one plane are averaged.
     """
-    inside = [index for index, point in enumerate(points) if (point.plane or plane) == plane]
-    largest = mode.shape[max(inside, key=lambda index: abs(mode.shape[index]))]
+    largest = mode.shape[_largest(mode, plane, points)]
     positions = sorted({point.x_m for point in points if np.isfinite(point.x_m)})
     return tuple(_shape_point(mode, x_m, plane, points, largest) for x_m in positions)
+
+
+def sd_in_plane(mode: FoundMode, plane: Plane, points: Sequence[ResponsePoint]) -> float:
+    """The largest standard deviation of the shape's values in a plane, the largest value 1.
+
+    0 where it is not known. What may turn a shape hardly changes them.
+    """
+    inside = [(point.plane or plane) == plane for point in points]
+    largest = abs(mode.shape[_largest(mode, plane, points)])
+    return float(np.nan_to_num(mode.shape_sd[inside]).max() / largest)
+
+
+def _largest(mode: FoundMode, plane: Plane, points: Sequence[ResponsePoint]) -> int:
+    inside = [index for index, point in enumerate(points) if (point.plane or plane) == plane]
+    return max(inside, key=lambda index: abs(mode.shape[index]))
 
 
 def _shape_point(
@@ -130,7 +145,7 @@ def _shape_point(
         x_m=x_m,
         value=_mean(mode.shape[inside]) / scale,
         cross=_mean(mode.shape[outside]) / scale,
-        sd=_mean(mode.shape_sd[inside]) / abs(scale),
+        sd=float(np.fmax(_mean(mode.shape_sd[inside]), _mean(mode.shape_sd[outside]))) / abs(scale),
     )
 
 

@@ -7,8 +7,17 @@ from shm.models.hanger.physical import (
     LateralSpring,
     PhysicalHanger,
     PointMass,
+    SupportMode,
     Zone,
 )
 from shm.models.hanger.solution import solve
 
-__all__ = ["HangerModes", "LateralSpring", "PhysicalHanger", "PointMass", "Zone", "solve"]
+__all__ = [
+    "HangerModes",
+    "LateralSpring",
+    "PhysicalHanger",
+    "PointMass",
+    "SupportMode",
+    "Zone",
+    "solve",
+]

@@ -17,6 +17,9 @@ from shm.values import BoolArray, FloatArray, IntArray
 _LEAST = 1e-6
 """What omega^2 is taken for where a bar buckles."""
 
+_ROUNDING = 1e-15
+"""Smaller mu than this share of the largest one are noise."""
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -64,13 +67,14 @@ def spectrum(
         return Spectrum(_omega_squared(lone, shift), None)
     rising, vectors = np.linalg.eigh(reduced)
     mu = rising[:, ::-1]
-    unit = vectors[:, :, ::-1] / np.sqrt(_positive(mu))[:, None]
+    unit = vectors[:, :, ::-1] / np.sqrt(_resolved(mu))[:, None]
     return Spectrum(_omega_squared(mu, shift), transposed @ unit)
 
 
 def _omega_squared(mu: FloatArray, shift: FloatArray) -> FloatArray:
-    return np.asarray(np.maximum(1 / _positive(mu) - shift[:, None], _LEAST))
+    return np.asarray(np.maximum(1 / _resolved(mu) - shift[:, None], _LEAST))
 
 
-def _positive(mu: FloatArray) -> FloatArray:
-    return np.maximum(mu, 1e-30)
+def _resolved(mu: FloatArray) -> FloatArray:
+    """Of falling mu (rows, modes): what rounding leaves of a motion without mass is none."""
+    return np.maximum(mu, _ROUNDING * mu[:, :1])

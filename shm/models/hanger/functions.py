@@ -17,6 +17,8 @@ import numpy as np
 from shm.values import FloatArray
 
 DECK_DEFLECTION, DECK_SLOPE, ARCH_DEFLECTION, ARCH_SLOPE = range(4)
+DEFLECTIONS = (DECK_DEFLECTION, ARCH_DEFLECTION)
+SLOPES = (DECK_SLOPE, ARCH_SLOPE)
 HERMITE = 4
 """The end functions come first."""
 SHEAR_ENDS = 2

@@ -9,9 +9,11 @@ import numpy as np
 from shm.models.hanger.breaks import stiffness_ratio
 from shm.models.hanger.eigen import Spectrum, spectrum
 from shm.models.hanger.families import families
+from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import PhysicalHanger
 from shm.models.hanger.springs import are_coupled, rotational_n_m_rad
-from shm.models.hanger.system import DEFLECTIONS, SLOPES, System
+from shm.models.hanger.swings import Swing
+from shm.models.hanger.system import System
 from shm.values import BoolArray, FloatArray, IntArray
 
 _FREE_SHIFT = 1.0
@@ -20,8 +22,8 @@ _SEARCHED = 4
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """`omega_rad_s` (n, planes, modes); `vectors` (n, planes, axes, unknowns, modes) of unit modal
-    mass m L^3, None unless asked for. With coupled planes a mode moves along both axes."""
+    """`omega_rad_s` (n, planes, modes); `vectors` (n, planes, axes, functions kept, modes) of unit
+    modal mass m L^3, None unless asked for. With coupled planes a mode moves along both axes."""
 
     omega_rad_s: FloatArray
     vectors: FloatArray | None
@@ -34,17 +36,16 @@ def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bo
     rows, planes, unknowns = parts.stiffness.shape[:3]
     mass = np.broadcast_to(parts.mass, parts.stiffness.shape).reshape(-1, unknowns, unknowns)
     stiffness = parts.stiffness.reshape(mass.shape)
-    supported = bool(np.any(parts.support_share))
+    supported = any(np.any(swing.mass) for swing in parts.swings)
     found = spectrum(stiffness, mass, _shift(physical).ravel(), with_vectors or supported)
     axes = None if found.vectors is None else found.vectors[:, None]
-    support = parts.support_share.transpose(0, 2, 1).reshape(rows * planes, 2, 1)
     whole = _motions_as_a_whole(physical).ravel()
-    found = _without_supports(found, axes, parts, support, whole).first(modes)
+    found = _without_supports(found, axes, parts.swings, whole).first(modes)
     omega = np.sqrt(found.omega_squared).reshape(rows, planes, modes) * _unit(physical)[..., None]
     if not with_vectors or found.vectors is None:
         return Motion(omega, None)
-    own = found.vectors.reshape(rows, planes, unknowns, modes)
-    vectors = np.zeros((rows, planes, planes, unknowns, modes))
+    own = found.vectors.reshape(rows, planes, unknowns, modes)[:, :, : len(parts.kept)]
+    vectors = np.zeros((rows, planes, *own.shape[1:]))
     for plane in range(planes):
         vectors[:, plane, plane] = own[:, plane]
     return Motion(omega, vectors)
@@ -72,13 +73,13 @@ def _coupled(physical: PhysicalHanger, parts: System, modes: int) -> Motion:
     assert found.vectors is not None
     axes = found.vectors.reshape(rows, 2, unknowns, -1)
     whole = _motions_as_a_whole(physical).sum(axis=1)
-    found = _without_supports(found, axes, parts, parts.support_share, whole)
+    found = _without_supports(found, axes, parts.swings, whole)
     found = found.first(_SEARCHED * modes)
     axes = _axes(found, unknowns)
     share = np.einsum("num,nuv,nvm->nm", axes[:, 0], parts_mass[:, 0], axes[:, 0], optimize=True)
     mine = [found.taken(order) for order in families(share, modes)]
     omega = np.stack([np.sqrt(each.omega_squared) for each in mine], axis=1)
-    vectors = np.stack([_axes(each, unknowns) for each in mine], axis=1)
+    vectors = np.stack([_axes(each, unknowns)[:, :, : len(parts.kept)] for each in mine], axis=1)
     return Motion(omega * _unit(physical)[:, :1, None], vectors)
 
 
@@ -117,19 +118,17 @@ def _shift(physical: PhysicalHanger) -> FloatArray:
 
 
 def _without_supports(
-    found: Spectrum, axes: FloatArray | None, parts: System, support: FloatArray, whole: IntArray
+    found: Spectrum, axes: FloatArray | None, swings: tuple[Swing, ...], whole: IntArray
 ) -> Spectrum:
     """Without the `whole` (rows,) motions of a free bar as a whole and the supports' own modes.
 
-    `axes` (rows, axes, unknowns, modes) are the vectors, `support` (rows, ends, axes).
+    `axes` (rows, axes, unknowns, modes) are the vectors.
     """
     out = np.arange(found.omega_squared.shape[1]) < whole[:, None]
     if axes is not None:
-        for end, deflection in enumerate(DEFLECTIONS):
-            at = parts.unknown(deflection)
-            if at is not None:
-                share = support[:, end, :, None] * axes[:, :, at] ** 2
-                out = _largest_out(out, share)
+        for swing in swings:
+            mass = swing.mass.reshape(*axes.shape[:2], 1)
+            out = _largest_out(out, mass * swing.deflection(axes) ** 2)
     return found.without(out) if out.any() else found
 
 

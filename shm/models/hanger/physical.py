@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.values import FloatArray, Hanger
+from shm.values import BoolArray, FloatArray, Hanger
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,20 @@ class LateralSpring:
 
 
 @dataclass(frozen=True, eq=False)
+class SupportMode:
+    """One more mode of what holds the ends: a mass on a spring; fields are (n, ends, planes).
+
+    A structure deflects where a hanger is fixed to it by the sum of its modes: its compliance there
+    is the sum of 1/(m (w_own^2 - w^2)) over them, each with its modal mass for a deflection of 1
+    (Clough and Penzien 1993, Dynamics of Structures, chapter 12). `compliance_m_n` is
+    1/(m w_own^2), 0 for none. Without mass it is the flexibility that modes far above leave.
+    """
+
+    compliance_m_n: FloatArray
+    mass_kg: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class PhysicalHanger:
     """`n` hangers in one test. Ends are deck 0, arch 1; planes transverse 0, longitudinal 1.
 
@@ -51,7 +65,8 @@ class PhysicalHanger:
     along which all places are given. `bending_stiffness_n_m2` is (n, planes),
     `rotational_compliance_rad_n_m` (n, ends, planes, planes), symmetric, 0 for clamped,
     `translational_compliance_m_n` (n, ends, planes), 0 for held, infinite for free;
-    `support_mass_kg` (n, ends, planes) moves with an end that is not held.
+    `support_mass_kg` (n, ends, planes) moves with an end that is not held: together they are a
+    support's first mode. The deflections of its `support_modes` add to it.
     `shear_compliance_1_n` (n,) is 1/(kappa G A), 0 for a bar that does not shear;
     `rotary_inertia_kg_m` (n,) is rho I. `sag_parameter` (n, planes) is Irvine's lambda squared.
     `joint_loss_factor` (n, ends) is that of the end springs. `clock_factor` (n,) multiplies the
@@ -76,6 +91,7 @@ class PhysicalHanger:
     zones: tuple[Zone, ...] = ()
     masses: tuple[PointMass, ...] = ()
     springs: tuple[LateralSpring, ...] = ()
+    support_modes: tuple[SupportMode, ...] = ()
 
     @classmethod
     def clamped(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:
@@ -128,6 +144,13 @@ class PhysicalHanger:
         springs = np.stack(springs_n_m_rad, axis=1)
         compliance = (1 / springs)[..., None] * np.eye(2)
         return replace(self, rotational_compliance_rad_n_m=compliance)
+
+    @property
+    def gives_way(self) -> BoolArray:
+        """Which ends (ends,) are not held in all the hangers and planes."""
+        compliances = [each.compliance_m_n for each in self.support_modes]
+        moving = [np.any(c, axis=(0, 2)) for c in (self.translational_compliance_m_n, *compliances)]
+        return np.asarray(np.any(moving, axis=0))
 
     @property
     def length_m(self) -> FloatArray:

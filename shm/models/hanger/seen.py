@@ -6,10 +6,11 @@ import numpy as np
 
 from shm.models.hanger.bar import Bar
 from shm.models.hanger.breaks import along
+from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.motion import Motion
 from shm.models.hanger.physical import PhysicalHanger
 from shm.models.hanger.springs import rotational_n_m_rad
-from shm.models.hanger.system import SLOPES, System
+from shm.models.hanger.system import System
 from shm.values import FloatArray
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.models.hanger.breaks import bar_of, by_plane
 from shm.models.hanger.motion import Motion, motion
-from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger
+from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
 from shm.models.hanger.seen import damping_ratios, has_losses
 from shm.models.hanger.seen import shapes as shapes_seen
 from shm.models.hanger.springs import are_coupled
@@ -25,14 +25,14 @@ def solve(
 
     With `shapes` false the shapes are empty, (n, 2, modes, 0, 2), and the damping that loss factors
     add is not found (NaN): the frequencies alone cost half as much. Motions of a free bar as a
-    whole are no modes, nor is a support's own: the one with the largest share of its kinetic energy
-    in the support's mass. Joints lose energy by their rotation. A bar that buckles gets a first
-    frequency next to nothing. Frequencies are right to 1e-6 for L sqrt(T/EI) up to 150; with
-    the heaviest masses and deepest changes of section of the catalogue to 3e-5 up to 15, to 1e-4
-    beyond.
+    whole are no modes, nor are a support's own: for each of its masses the one with the largest
+    share of the kinetic energy there. Joints lose energy by their rotation. A bar that buckles gets
+    a first frequency next to nothing. Frequencies are right to 1e-6 for L sqrt(T/EI) up to 150;
+    with the heaviest masses and deepest changes of section of the catalogue to 3e-5 up to 15, to
+    1e-4 beyond.
     """
     asked = one_plane(physical) if planes_alike(physical) else physical
-    extra = _PLANES if np.any(asked.translational_compliance_m_n) else 0
+    extra = _PLANES if asked.gives_way.any() else 0
     bar = bar_of(asked, modes + extra)
     parts = system(asked, bar)
     found = motion(asked, parts, modes, shapes)
@@ -77,6 +77,11 @@ def planes_alike(physical: PhysicalHanger) -> bool:
         physical.support_mass_kg,
         physical.sag_parameter,
         *(spring.stiffness_n_m for spring in physical.springs),
+        *(
+            field
+            for mode in physical.support_modes
+            for field in (mode.compliance_m_n, mode.mass_kg)
+        ),
         *(by_plane(zone) for zone in physical.zones),
     ]
     alike = all(np.array_equal(pair[..., 0], pair[..., -1]) for pair in pairs)
@@ -98,5 +103,9 @@ def one_plane(physical: PhysicalHanger) -> PhysicalHanger:
         springs=tuple(
             LateralSpring(each.x_m, each.stiffness_n_m[:, :1], each.loss_factor)
             for each in physical.springs
+        ),
+        support_modes=tuple(
+            SupportMode(each.compliance_m_n[..., :1], each.mass_kg[..., :1])
+            for each in physical.support_modes
         ),
     )

@@ -40,7 +40,7 @@ def rotational_n_m_rad(physical: PhysicalHanger) -> FloatArray:
     return np.asarray(matrix.reshape(compliance.shape))
 
 
-def translational_n_m(physical: PhysicalHanger) -> FloatArray:
-    """Of the supports (n, ends, planes); 0 for a free end."""
+def translational_n_m(physical: PhysicalHanger, compliance_m_n: FloatArray) -> FloatArray:
+    """Of supports of a compliance (n, ends, planes); 0 for a free end."""
     least = _HELD / bending_unit(physical, 3)[:, None]
-    return np.asarray(1 / np.maximum(physical.translational_compliance_m_n, least))
+    return np.asarray(1 / np.maximum(compliance_m_n, least))

@@ -12,33 +12,26 @@ import numpy as np
 
 from shm.models.hanger.bar import Bar
 from shm.models.hanger.breaks import along, stiffness_ratio
-from shm.models.hanger.functions import (
-    ARCH_DEFLECTION,
-    ARCH_SLOPE,
-    DECK_DEFLECTION,
-    DECK_SLOPE,
-    HERMITE,
-)
+from shm.models.hanger.functions import DEFLECTIONS, HERMITE, SLOPES
 from shm.models.hanger.physical import PhysicalHanger
-from shm.models.hanger.springs import bending_unit, rotational_n_m_rad, translational_n_m
+from shm.models.hanger.springs import bending_unit, rotational_n_m_rad
+from shm.models.hanger.swings import Swing, on_swings, swings
 from shm.values import FloatArray, IntArray
 
-DEFLECTIONS = (DECK_DEFLECTION, ARCH_DEFLECTION)
-SLOPES = (DECK_SLOPE, ARCH_SLOPE)
 _RIGID_IN_SHEAR = 1e12
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Stiffness and mass (n, planes, unknowns, unknowns) of the functions `kept` (unknowns,).
+    """Stiffness and mass (n, planes, unknowns, unknowns).
 
-    `support_share` (n, ends, planes) is a support's mass as a share of m L.
+    The first unknowns are the functions `kept` of the bar, the others `swings`' own.
     """
 
     stiffness: FloatArray
     mass: FloatArray
     kept: IntArray
-    support_share: FloatArray
+    swings: tuple[Swing, ...]
 
     def unknown(self, function: int) -> int | None:
         """Which unknown a function is; None where nothing lets it move."""
@@ -49,23 +42,16 @@ class System:
 def system(physical: PhysicalHanger, bar: Bar) -> System:
     """Each plane by itself."""
     stiffness, mass = _stiffness(physical, bar), _mass(physical, bar)
-    moving = physical.translational_compliance_m_n > 0
-    bar_kg = physical.mass_per_length_kg_m * physical.length_m
-    support = np.where(moving, physical.support_mass_kg, 0.0) / bar_kg[:, None, None]
     turning = np.einsum("nepp->nep", rotational_n_m_rad(physical))
     turning = turning / bending_unit(physical, 1)[:, None]
-    held = translational_n_m(physical) / bending_unit(physical, 3)[:, None]
     for end in range(2):
         stiffness[:, :, SLOPES[end], SLOPES[end]] += turning[:, end]
-        stiffness[:, :, DEFLECTIONS[end], DEFLECTIONS[end]] += held[:, end]
-    if np.any(support):
-        mass = np.broadcast_to(mass, stiffness.shape).copy()
-        for end in range(2):
-            mass[:, :, DEFLECTIONS[end], DEFLECTIONS[end]] += support[:, end]
     if bar.hats:
         stiffness, mass = _condensed(stiffness, mass, bar.hats)
     first, kept = _kept(physical, stiffness.shape[-1])
-    return System(_window(stiffness, first, kept), _window(mass, first, kept), kept, support)
+    stiffness, mass = _window(stiffness, first, kept), _window(mass, first, kept)
+    found = swings(physical, kept)
+    return System(*on_swings(stiffness, mass, found), kept, found)
 
 
 def _condensed(
@@ -96,8 +82,7 @@ def _window(matrix: FloatArray, first: int, kept: IntArray) -> FloatArray:
 def _kept(physical: PhysicalHanger, functions: int) -> tuple[int, IntArray]:
     """All functions but those of ends that nothing lets move, and the least of them."""
     turning = np.any(physical.rotational_compliance_rad_n_m, axis=(0, 2, 3))
-    moving = np.any(physical.translational_compliance_m_n, axis=(0, 2))
-    ends = [*np.array(SLOPES)[turning], *np.array(DEFLECTIONS)[moving]]
+    ends = [*np.array(SLOPES)[turning], *np.array(DEFLECTIONS)[physical.gives_way]]
     kept = np.array(sorted([*ends, *range(HERMITE, functions)]), dtype=np.int64)
     return int(kept[0]), kept
 

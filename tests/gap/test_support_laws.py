@@ -1,0 +1,49 @@
+"""A support with more than one mode is still a support that swings along."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.fit import baseline_fit, fitted
+from shm.gap.laws import EXACT, by_its_laws
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate.reality import Reality
+from tests.helpers.hangers import HANGER_3
+
+AT = "deck end, transverse"
+DECK = PlantedEffect(
+    "support_motion", AT, {"support_mass_kg": 8000.0, "support_frequency_hz": 16.0}
+)
+TENSION_N = 711e3
+
+
+def _gain(own_laws: bool) -> tuple[float, Fit, Fit]:
+    """What the other laws gain a fit of the support, the fit then and before."""
+    plan = CampaignPlan(
+        modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
+    )
+    tests = campaign(HANGER_3, HangerState(TENSION_N), [DECK], plan, np.random.default_rng(3))
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    rng = np.random.default_rng(1)
+    effect = EFFECTS["support_motion"]
+    (at,) = [e for e in effect.variants(HANGER_3, problem.design.survey) if e.at == AT]
+    baseline = baseline_fit(problem, rng)
+    before = fitted(problem, Hypothesis((("support_motion", at),)), rng)
+    gain, after = by_its_laws(problem, baseline, before, rng)
+    return gain, after, before
+
+
+def test_a_deck_with_a_second_mode_is_forgiven_and_fitted() -> None:
+    gain, after, before = _gain(own_laws=True)
+    assert gain > 10
+    assert after.log_fit > before.log_fit + 10
+
+
+def test_a_deck_with_one_mode_pays_little_for_the_allowance() -> None:
+    gain, after, before = _gain(own_laws=False)
+    assert np.log(EXACT) <= gain < 1.0
+    assert after is before
