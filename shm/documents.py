@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from shm.values import (
 )
 
 MODES_SCHEMA = "shm.modes/1"
+_LARGEST = 1e300
+_LONGEST_ID = 200
+_LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold when read
 
 
 def dump(document: object) -> str:
@@ -93,14 +96,27 @@ def test_document(test: ModalTest) -> dict[str, Any]:
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
     """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy."""
     try:
+        _refuse_large(path)
         document = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise BadInput(
             f"not JSON: {error.msg}.", file=path, line=error.lineno, remedy="Write it anew."
         ) from error
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise BadInput(f"cannot be read: {error}.", file=path, remedy="Check the path.") from error
+    except (ValueError, RecursionError) as error:
+        # No text, a number of thousands of digits, or nested without end.
+        raise BadInput(f"cannot be read: {error}.", file=path, remedy="Write it anew.") from error
     return parse_modes(document, path)
+
+
+def _refuse_large(path: Path) -> None:
+    if path.stat().st_size > _LARGEST_DOCUMENT_BYTES:
+        raise BadInput(
+            f"a document of more than {_LARGEST_DOCUMENT_BYTES >> 20} MB is not read.",
+            file=path,
+            remedy="Give its tests in several documents.",
+        )
 
 
 def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
@@ -112,7 +128,7 @@ def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
             remedy="Make one with `shm identify FILE --json`.",
         )
     hanger = document.get("hanger")
-    if hanger is not None and (not isinstance(hanger, int) or isinstance(hanger, bool)):
+    if hanger is not None and not _is_whole(hanger, 0):
         raise BadInput(
             f"hanger = {hanger!r} is not a whole number.", file=file, remedy="Give its number."
         )
@@ -140,7 +156,7 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
                 f"{label}: {plane} mode {order} is given twice.", file=file, remedy="Keep one."
             )
     return ModalTest(
-        id=str(test.get("id", f"t{index + 1}")),
+        id=_id(test.get("id", f"t{index + 1}"), label, file),
         modes=modes,
         hanger=hanger,
         time=_time(test.get("time"), label, file),
@@ -149,6 +165,17 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
         added_mass=_added_mass(test.get("added_mass"), label, file),
         **_tension_read(test, label, file),
     )
+
+
+def _id(value: Any, label: str, file: str | Path) -> str:
+    text = str(value) if isinstance(value, str | int) else ""
+    if not 0 < len(text) <= _LONGEST_ID or not text.isprintable():
+        raise BadInput(
+            f"{label}: id is not a text of 1 to {_LONGEST_ID} printable characters.",
+            file=file,
+            remedy="Give a short one, or leave it out.",
+        )
+    return text
 
 
 def _tension_read(test: Mapping[str, Any], label: str, file: str | Path) -> dict[str, float]:
@@ -171,7 +198,7 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
             f"{label}: plane must be one of {', '.join(PLANES)}.", file=file, remedy="Correct it."
         )
     order = mode.get("order")
-    if not isinstance(order, int) or isinstance(order, bool) or order < 1:
+    if not _is_whole(order, 1):
         raise BadInput(f"{label}: order must be 1, 2, 3, ...", file=file, remedy="Correct it.")
     frequency = _number(mode, "frequency_hz", label, file)
     if not frequency > 0:
@@ -231,7 +258,7 @@ def _number(table: Mapping[str, Any], key: str, label: str, file: str | Path) ->
     value = table.get(key)
     if value is None:
         return NAN
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGEST:
         return float(value)
     raise BadInput(
         f"{label}: {key} = {value!r} is not a number.",
@@ -240,12 +267,17 @@ def _number(table: Mapping[str, Any], key: str, label: str, file: str | Path) ->
     )
 
 
+def _is_whole(value: Any, least: int) -> TypeGuard[int]:
+    """Whether a value is a whole number from `least` that any database holds."""
+    return type(value) is int and least <= value < 2**31
+
+
 def _time(text: Any, label: str, file: str | Path) -> datetime | None:
     if text is None:
         return None
     try:
         return parse_time(text)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInput(
             f"{label}: time = {text!r} is not an ISO 8601 time.",
             file=file,

@@ -23,6 +23,11 @@ def default_config() -> Path:
     return _locate("config/default.toml")
 
 
+def service_unit() -> Path:
+    """The systemd unit of the daemon."""
+    return _locate("config/shm.service")
+
+
 def one_thread_a_process() -> None:
     """Keeps the linear algebra of this process and its children to one thread, unless told else.
 

@@ -78,10 +78,19 @@ def _choice(help_text: str, *choices: str) -> Any:
     return field(default=choices[0], metadata={"unit": "", "help": help_text, "choices": choices})
 
 
+_OTHER_LEVELS = ("debug", "warning", "error")
+
+
 @dataclass(frozen=True)
 class Settings:
     """The values in force; each field is a row of `TABLE`: default, unit, help, low, high."""
 
+    # Its URL may hold a password.
+    store: str = field(
+        default="",
+        repr=False,
+        metadata={"unit": "", "help": "URL of a PostgreSQL database; empty: `shm.db`"},
+    )
     spool_scan_seconds: float = _row(2.0, "s", "how often the spool is scanned", 0.05, 3600)
     spool_stable_seconds: float = _row(
         2.0, "s", "a file is whole once unchanged for so long", 0, 3600
@@ -90,6 +99,15 @@ class Settings:
         3600.0, "s", "how far ahead of the clock a test may claim to be", 0, None
     )
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
+    max_channels: int = _row(16, "", "accelerations that one file may hold", 1, 1000)
+    max_samples: int = _row(10_000_000, "", "samples that a channel may hold", 16, None)
+    max_header_bytes: int = _row(
+        1_000_000, "bytes", "what a file or its sidecar may say before the numbers", 1000, None
+    )
+    parse_seconds: float = _row(10.0, "s", "processor time for reading one file", 0.1, 3600)
+    parse_memory_bytes: int = _row(
+        2**30, "bytes", "memory for reading one file; a quarter is read at once", 2**26, None
+    )
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
     identifier: str = _choice("how modes are found", "ssi", "ssi-input", "frf")
@@ -108,6 +126,9 @@ class Settings:
     samples: int = _row(1000, "", "posterior samples kept a test and class", 100, 1_000_000)
     seed: int = _row(1, "", "seed of the random numbers", 0, None)
     workers: int = _row(1, "", "processes that identify and update", 1, 64)
+    scheduler: str = _row(
+        "", "", "Dask scheduler whose workers identify and update, as tcp://host:8786", None, None
+    )
     baseline_tests: int = _row(1, "", "how many first tests form the baseline", 1, 1000)
     false_call_years: float = _row(
         100.0, "years", "mean time until a hanger that has not changed is called changed", 0.1, 1e6
@@ -116,6 +137,30 @@ class Settings:
     hook_attempts: int = _row(16, "", "deliveries of one alert to one hook at most", 1, 1000)
     hook_backoff_seconds: float = _row(
         5.0, "s", "wait after a failed delivery, doubled each time", 0, 86400
+    )
+
+    web_hosts: str = _row(
+        "", "", "names, parted by commas, by which the web interface may be called", None, None
+    )
+    mqtt_url: str = _row(
+        "", "", "broker to take recordings from, as mqtts://user@host:8883", None, None
+    )
+    mqtt_max_bytes: int = _row(50_000_000, "bytes", "larger messages are refused", 1, 268_435_455)
+
+    log_format: str = _choice("of what the daemon tells", "text", "json")
+    log_level: str = _choice("the least of what the daemon tells", "info", *_OTHER_LEVELS)
+    log_file_bytes: int = _row(
+        10_000_000, "bytes", "a log file that has grown so large is put aside", 10_000, None
+    )
+    log_files: int = _row(5, "", "log files put aside that are kept", 1, 1000)
+    min_free_bytes: int = _row(
+        2_000_000_000, "bytes", "`shm doctor` warns where a disk has less room", 0, None
+    )
+    backup_days: float = _row(
+        7.0, "days", "`shm doctor` warns where the last backup is older", 0.01, 36500
+    )
+    quiet_days: float = _row(
+        400.0, "days", "`shm doctor` warns of hangers without a test for so long", 0.01, 36500
     )
 
     @property

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.helpers.postgres import Databases, postgresql_server
+
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
@@ -18,3 +20,10 @@ def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
         del os.environ["SHM_CACHE"]
     else:
         os.environ["SHM_CACHE"] = before
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[Databases]:
+    """A PostgreSQL server of this process's own, begun at first need."""
+    with postgresql_server() as databases:
+        yield databases

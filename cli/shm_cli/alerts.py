@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import textwrap
 import time
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import rich_click as click
 from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
+from shm.report.table import WIDTH
 from shm.values import Alert
 from shm_cli.acknowledge import acknowledge, acknowledgement_row, acknowledgement_words
 from shm_cli.common import (
@@ -117,7 +119,7 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     if not alerts:
         click.echo("No alert has been raised.")
         return
-    made = table("alerts", "number", "hanger", "test of", "what", "hooks", "acknowledged")
+    made = table("alerts", "number", "hanger", "test of", "kind", "hooks", "acknowledged")
     for stored, row in zip(alerts, rows, strict=True):
         states = ", ".join(f"{each['hook']}: {each['state']}" for each in row["deliveries"])
         alert = stored.alert
@@ -125,11 +127,13 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
             str(stored.id),
             str(alert.hanger),
             f"{alert.time:%Y-%m-%d}",
-            alert.message,
+            ", ".join(alert.kinds),
             states or "none",
             acknowledgement_words(stored),
         )
     show_table(made)
+    for stored in alerts:
+        click.echo(f"\n{textwrap.fill(f'{stored.id}. {stored.alert.message}', WIDTH)}")
 
 
 def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any]:

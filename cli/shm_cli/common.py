@@ -56,6 +56,13 @@ method_option = click.option(
     help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
 )
 
+log_file_option = click.option(
+    "--log-file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the log there, not on stderr; it is put aside as it grows (log_files of them).",
+)
+
 
 def hanger_option(required: bool = False) -> Callable[[F], F]:
     """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""

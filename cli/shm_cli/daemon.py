@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
-import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
 
 import rich_click as click
 
-from shm_cli.common import open_workspace
+from shm_cli.common import log_file_option, open_workspace
 from shm_daemon import run
+from shm_daemon.logs import begin_logging
+from shm_daemon.unit import unit_text
+from shm_daemon.web.address import Address
+from shm_daemon.web.beside import web_beside
 
 
 @click.command()
 @click.option("--once", is_flag=True, help="End when nothing is left to do.")
+@click.option(
+    "--standby", is_flag=True, help="Wait while another serves the store; take over when it ends."
+)
+@click.option("--web", is_flag=True, help="Serve the web interface too: see `shm web`.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Where --web listens.")
+@click.option(
+    "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="Its port."
+)
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
+@log_file_option
+@click.option(
+    "--print-unit",
+    is_flag=True,
+    help="Only print a systemd unit that begins it with the other options given here.",
+)
 @click.pass_context
-def command(ctx: click.Context, once: bool, workers: int | None) -> None:
+def command(
+    ctx: click.Context,
+    once: bool,
+    standby: bool,
+    web: bool,
+    host: str,
+    port: int,
+    workers: int | None,
+    log_file: Path | None,
+    print_unit: bool,
+) -> None:
     """Watch the spool and do the whole job, unattended.
 
     A file dropped into spool/ is archived, identified, updated and watched; alerts go to the hooks
@@ -23,7 +53,20 @@ def command(ctx: click.Context, once: bool, workers: int | None) -> None:
     \b
     Example: shm --workspace arch daemon
     """
-    logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s", force=True
-    )
-    run(open_workspace(ctx, workers=workers), once=once)
+    workspace = open_workspace(ctx, workers=workers)
+    if print_unit:
+        options = _options(standby, web, host, port, workers)
+        click.echo(unit_text(workspace.folder, Path(sys.prefix), options), nl=False)
+        return
+    begin_logging(workspace.settings, log_file)
+    with web_beside(workspace, Address(host, port) if web else None):
+        run(workspace, once=once, standby=standby)
+
+
+def _options(standby: bool, web: bool, host: str, port: int, workers: int | None) -> Sequence[str]:
+    """The options as they are typed."""
+    return [
+        *(["--standby"] if standby else []),
+        *(["--web", "--host", host, "--port", str(port)] if web else []),
+        *(["--workers", str(workers)] if workers is not None else []),
+    ]

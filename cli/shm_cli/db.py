@@ -1,16 +1,34 @@
-"""`shm db`: upgrades or checks the store."""
+"""`shm db`: the store's schema, its soundness, backups of it, and copies into another store."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+
 import rich_click as click
 
-from shm.store import Store
-from shm_cli.common import open_workspace
+from shm.errors import StoreError
+from shm.store import Archive, Store, Workspace
+from shm.store.archive_copies import CopiedArchive, copy_archive
+from shm.store.backups import back_up, copy_store, restore
+from shm.store.checking import CheckedArchive, archived_names, check_archive, check_store
+from shm.store.copying import TableContent
+from shm_cli.common import json_option, open_workspace, progress_bar, show, show_table, table
+
+_copies_option = click.option(
+    "--archive",
+    "copies",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="A folder for copies of the raw files.",
+)
 
 
 @click.group()
 def command() -> None:
-    """Upgrade or check the store.
+    """Upgrade, check, back up, restore or copy the store.
 
     \b
     Example: shm db upgrade
@@ -20,25 +38,179 @@ def command() -> None:
 @command.command()
 @click.pass_context
 def upgrade(ctx: click.Context) -> None:
-    """Bring the store to the schema of this version.
+    """Bring the store to the schema of this version; make its tables where a server has none.
 
     \b
     Example: shm --workspace arch db upgrade
     """
     workspace = open_workspace(ctx)
     with workspace.lock():
-        Store.upgrade(workspace.database)
+        Store.upgrade(workspace.location)
     click.echo("The store has the present schema.")
 
 
 @command.command()
+@click.option("--archive", "with_archive", is_flag=True, help="Read the raw files too.")
+@json_option
 @click.pass_context
-def check(ctx: click.Context) -> None:
-    """Say whether the store can be used; exit code 5 where it cannot.
+def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
+    """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
+
+    With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
+    with the same rows and checksums hold the same.
 
     \b
-    Example: shm db check
+    Example: shm db check --archive
     """
-    with open_workspace(ctx).store() as store:
-        held = sum(store.stage_counts().values())
-    click.echo(f"The store has the present schema and holds {held} recordings.")
+    workspace = open_workspace(ctx)
+    with workspace.store() as store, progress_bar("checking") as tell:
+        checked, location = check_store(store, tell), store.location
+        archive = check_archive(store, workspace.archive, tell) if with_archive else None
+    troubles = (*checked.troubles, *(archive.troubles if archive else ()))
+    if as_json:
+        document = {
+            "store": location,
+            "tables": [asdict(each) for each in checked.tables],
+            "archive": asdict(archive) if archive else None,
+            "troubles": list(troubles),
+        }
+        show(document)
+    else:
+        _show_tables(checked.tables)
+        held = next(each.rows for each in checked.tables if each.table == "recordings")
+        click.echo(f"The store has the present schema and holds {held} recordings.")
+        if archive is not None:
+            click.echo(_archive_said(archive))
+    _raise_troubles(troubles, "Restore the store, or its raw files, from a backup.")
+
+
+@command.command()
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@_copies_option
+@json_option
+@click.pass_context
+def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -> None:
+    """Write what the store holds into a new file, while the daemon goes on.
+
+    The file is a SQLite store, of a store in PostgreSQL too. With --archive the raw files that are
+    not in DIR yet are copied there, and the store notes which recordings have a copy: only their
+    raw files may ever be deleted here.
+
+    \b
+    Example: shm db backup /backup/arch-2026-05-01.db --archive /backup/archive
+    """
+    workspace = open_workspace(ctx)
+    copied, noted = None, 0
+    with workspace.store() as store, progress_bar("backup") as tell:
+        tables = back_up(store, file, tell)
+        if copies is not None:
+            target, removed = Archive(copies), store.removed_names(workspace.archive)
+            names = [name for name in archived_names(store) if name not in removed]
+            copied = copy_archive(workspace.archive, target, names, tell)
+            noted = store.note_copies(target, datetime.now(UTC))
+        store.note_backup(file.resolve(), datetime.now(UTC))
+    if as_json:
+        show({"file": str(file), **_document(tables, copied), "newly_noted": noted})
+    else:
+        _show_tables(tables)
+        click.echo(f"Wrote {file}.")
+        _say_copied(copied)
+    _raise_troubles(copied.troubles if copied else (), "Run `shm db check --archive`.")
+
+
+@command.command("restore")
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option(
+    "--replace", is_flag=True, help="Even where the store holds something; that is kept beside."
+)
+@_copies_option
+@json_option
+@click.pass_context
+def restore_command(
+    ctx: click.Context, file: Path, replace: bool, copies: Path | None, as_json: bool
+) -> None:
+    """Put a backup into the store, which must be empty or is kept as a file with --replace.
+
+    No daemon may be active. A backup of an older schema is brought to the present one. With
+    --archive the raw files that are missing here are copied back from DIR.
+
+    \b
+    Example: shm db restore /backup/arch-2026-05-01.db --replace
+    """
+    workspace = open_workspace(ctx)
+    keep_as = workspace.folder / f"shm-before-restore-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.db"
+    with workspace.lock(), progress_bar("restore") as tell:
+        restored = restore(workspace.location, file, keep_as, tell, replace=replace)
+        copied = _fetch(workspace, copies)
+    if as_json:
+        kept = str(restored.kept) if restored.kept else None
+        show({"kept": kept, **_document(restored.tables, copied)})
+    else:
+        _show_tables(restored.tables)
+        kept_said = f" What it held before is in {restored.kept}." if restored.kept else ""
+        click.echo(f"The store holds what {file} holds.{kept_said}")
+        _say_copied(copied)
+    _raise_troubles(copied.troubles if copied else (), "Fetch them from another copy.")
+
+
+@command.command()
+@click.option("--to", "target", required=True, metavar="URL", help="A PostgreSQL URL, or a file.")
+@json_option
+@click.pass_context
+def copy(ctx: click.Context, target: str, as_json: bool) -> None:
+    """Copy the store into an empty one of either kind, and compare rows and checksums.
+
+    Then name that one in SHM_STORE and put shm.db away. A password is better given by PGPASSWORD or
+    ~/.pgpass than in the URL.
+
+    \b
+    Example: shm db copy --to postgresql://shm@db.example.org/arch
+    """
+    workspace = open_workspace(ctx)
+    place = target if "://" in target else Path(target).resolve()
+    with workspace.lock(), workspace.store() as store, progress_bar("copy") as tell:
+        tables = copy_store(store, place, tell)
+    if as_json:
+        show(_document(tables, None))
+    else:
+        _show_tables(tables)
+        click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
+
+
+def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:
+    if copies is None:
+        return None
+    with workspace.store() as store, progress_bar("restore") as tell:
+        return copy_archive(Archive(copies), workspace.archive, archived_names(store), tell)
+
+
+def _document(tables: Sequence[TableContent], copied: CopiedArchive | None) -> dict[str, object]:
+    return {
+        "tables": [asdict(each) for each in tables],
+        "archive": asdict(copied) if copied else None,
+    }
+
+
+def _show_tables(tables: Sequence[TableContent]) -> None:
+    made = table("store", "table", "rows", "checksum")
+    for each in tables:
+        made.add_row(each.table, str(each.rows), each.checksum[:16])
+    show_table(made)
+
+
+def _say_copied(copied: CopiedArchive | None) -> None:
+    if copied is not None:
+        click.echo(f"Raw files: {copied.copied} copied, {copied.present} were there already.")
+
+
+def _archive_said(archive: CheckedArchive) -> str:
+    return (
+        f"Raw files: {archive.whole} whole, {len(archive.missing)} missing, "
+        f"{len(archive.damaged)} damaged, {len(archive.unreferenced)} of no recording, "
+        f"{archive.removed} removed by `shm archive prune`."
+    )
+
+
+def _raise_troubles(troubles: Sequence[str], remedy: str) -> None:
+    if troubles:
+        raise StoreError(f"{'; '.join(troubles)}.", remedy=remedy)

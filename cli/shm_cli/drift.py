@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import rich_click as click
 
 from shm.documents import drift_document
 from shm.errors import NothingThere
+from shm.pipeline.bridge_reporting import latest_drifts
+from shm.pipeline.reporting import hanger_states
+from shm.report.shifts import shift_cells
+from shm.report.states import NOTHING_WATCHED
+from shm.report.table import laid_out
+from shm.report.temperatures import temperature_documents, temperature_table
 from shm.values import Drift
 from shm_cli.bridge_pattern import command as bridge
 from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
 from shm_cli.rebaseline import rebaseline
+
+if TYPE_CHECKING:
+    from shm.store import Baseline, Store
 
 
 @click.group(invoke_without_command=True)
@@ -20,53 +32,69 @@ from shm_cli.rebaseline import rebaseline
 def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json: bool) -> None:
     """How far tension and stiffness have moved.
 
-    The shift of the latest test of each hanger from its baseline: tension as a fraction, end
-    stiffness in decades, with the probability that it lies beyond the threshold.
+    The shift of the latest test of each hanger from its baseline, if there is one at all: the
+    tension in percent, an end stiffness as how many times what it was, with the probability that it
+    lies beyond the threshold. With --hanger also how each quantity goes with the temperature. In
+    JSON shifts are fractions of the tension and decades (powers of ten) of a stiffness.
 
     \b
     Example: shm drift --hanger 3 --all
     """
     if ctx.invoked_subcommand is not None:
         return
+    states, hangers = NOTHING_WATCHED, []
     with opened_store(ctx) as (workspace, store):
+        hangers = [each.id for each in workspace.bridge.hangers]
         if hanger_id is not None:
-            workspace.bridge.hanger(hanger_id)
-        drifts = store.drifts(hanger_id)
-    if not drifts:
+            hanger = workspace.bridge.hanger(hanger_id)
+            hangers = [hanger_id]
+            states = hanger_states(workspace, store, hanger, store.baseline(hanger_id))
+        shown = (
+            store.drifts(hanger_id)
+            if all_tests
+            else [drift for each in hangers for drift in latest_drifts(store, each)]
+        )
+        anew = [] if all_tests else _without_a_test(store, hangers)
+    if not shown and not anew:
         raise NothingThere(
             "no test has been compared with a baseline yet.",
             remedy="Take in more tests: the first ones of a hanger form its baseline.",
         )
-    shown = drifts if all_tests else _latest(drifts)
     if as_json:
-        show({"drifts": [drift_document(drift) for drift in shown]})
+        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
+        if hanger_id is not None:
+            document["temperature_coefficients"] = temperature_documents(states)
+        show(document)
         return
-    made = table(
-        "shift from the baseline", "hanger", "time", "quantity", "shift", "sd", "threshold",
-        "probability beyond",
-    )  # fmt: skip
-    for drift in shown:
-        made.add_row(
-            str(drift.hanger),
-            f"{drift.time:%Y-%m-%d %H:%M}",
-            drift.quantity.replace("_", " "),
-            *(_shift(drift, value) for value in (drift.shift_mean, drift.shift_sd)),
-            _shift(drift, drift.threshold),
-            f"{drift.probability:.3f}",
+    if shown:
+        _show(shown)
+    for each in anew:
+        click.echo(
+            f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has come "
+            "in after that baseline was set."
         )
-    show_table(made)
+    if states.temperature_coefficients:
+        click.echo(f"\n{laid_out(temperature_table(states)).rstrip()}")
 
 
 command.add_command(rebaseline)
 command.add_command(bridge)
 
 
-def _latest(drifts: tuple[Drift, ...]) -> list[Drift]:
-    """Of each hanger's latest test: an earlier one may have been watched in another class."""
-    newest = {drift.hanger: drift.test for drift in drifts}
-    latest = [drift for drift in drifts if newest[drift.hanger] == drift.test]
-    return sorted(latest, key=lambda drift: drift.hanger)
+def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
+    """The baselines that were set by a person and with which no test has been compared yet."""
+    baselines = [store.baseline(hanger) for hanger in hangers]
+    return [
+        each for each in baselines if each and each.since and not latest_drifts(store, each.hanger)
+    ]
 
 
-def _shift(drift: Drift, value: float) -> str:
-    return f"{value:.2%}" if drift.quantity == "tension" else f"{value:.2f} decades"
+def _show(drifts: Sequence[Drift]) -> None:
+    made = table(
+        "shift from the baseline, if there is one", "hanger", "test of", "quantity", "shift",
+        "90 % interval", "threshold", "probability beyond",
+    )  # fmt: skip
+    for drift in drifts:
+        quantity, *cells = shift_cells(drift)
+        made.add_row(str(drift.hanger), f"{drift.time:%Y-%m-%d}", quantity, *cells)
+    show_table(made)

@@ -13,7 +13,7 @@ import rich_click as click
 from shm.documents import dump, modes_document
 from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
-from shm.read import read_test
+from shm.read.apart import read_test
 from shm.report import TestSheet, test_figures, test_page, test_text
 from shm.settings import Settings
 from shm.values import Hanger

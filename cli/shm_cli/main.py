@@ -31,20 +31,29 @@ class Verb:
 VERBS: dict[str, Verb] = {
     "init": Verb("shm_cli.init", "Make a workspace for a bridge."),
     "demo": Verb("shm_cli.demo", "See the whole job on a simulated bridge of 20 hangers."),
-    "ingest": Verb("shm_cli.ingest", "Take recordings in, or look into them with --peek."),
+    "ingest": Verb(
+        "shm_cli.ingest",
+        "Take recordings in, look into them with --peek, or do one again with --again.",
+    ),
     "daemon": Verb("shm_cli.daemon", "Watch the spool and do the whole job, unattended."),
+    "web": Verb("shm_cli.web", "Upload, states, alerts, health and metrics over HTTP."),
+    "token": Verb("shm_cli.token", "Who may read and write over the network."),
     "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
     "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
     "select": Verb("shm_cli.select", "Compare model classes by their evidence."),
     "gap": Verb("shm_cli.gap", "Why model and measurement differ, and what that does to tension."),
-    "report": Verb("shm_cli.report", "What an engineer files about a hanger."),
+    "report": Verb("shm_cli.report", "What an engineer files about a hanger, or the bridge."),
     "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
     "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
     "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),
     "validate": Verb("shm_cli.validate", "Our figures beside the thesis's, with a gate."),
     "export": Verb("shm_cli.export", "Posterior samples for other programs."),
-    "db": Verb("shm_cli.db", "Upgrade or check the store."),
+    "db": Verb("shm_cli.db", "Upgrade, check, back up, restore or copy the store."),
+    "archive": Verb(
+        "shm_cli.archive", "Keep the archive and the quarantine from growing for ever."
+    ),
+    "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
 }
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import rich_click as click
 from rich.table import Table
 
-from shm.documents import load_modes
 from shm.errors import BadInput
-from shm.read import Peek, PeekChannel, peek_test
+from shm.read import Peek, PeekChannel
+from shm.read.apart import load_modes, peek_test
 from shm_cli.common import show, show_table, table
 
 _MODES_SUFFIX = ".modes.json"

@@ -47,6 +47,7 @@ def rebaseline(
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
+        alerts = [each.id for each in store.alerts(hanger_id) if each.acknowledgement is None]
     if as_json:
         show(_document(made))
         return
@@ -57,6 +58,9 @@ def rebaseline(
         f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
         f"{tension.mean():.4g} kN (sd {tension.std(ddof=1):.2g} kN)."
     )
+    if alerts:
+        numbers = ", ".join(str(each) for each in alerts)
+        click.echo(f"Still open of it: alert {numbers}. Take note of them by `shm alerts ack ID`.")
 
 
 def _document(made: Baseline) -> dict[str, object]:

@@ -2,54 +2,87 @@
 
 from __future__ import annotations
 
+import shutil
+from collections import Counter
 from collections.abc import Mapping
+from datetime import timedelta
 from typing import Any
 
 import rich_click as click
 
 from shm.models import applicable
+from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.words import model_class
-from shm.store import DeliveryState, Store, Workspace
+from shm.store import DeliveryState, Stage, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
+from shm_cli.stages import show_stages
+from shm_daemon.doctor.contract import told
+from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.spool import scan
 
 
 @click.command()
+@click.option(
+    "--of", "which", metavar="ID", help="The stages of one recording (by number) or test (by name)."
+)
 @json_option
 @click.pass_context
-def command(ctx: click.Context, as_json: bool) -> None:
+def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     """What the workspace holds and what waits.
 
     \b
     Example: shm --workspace arch status
+    Example: shm --workspace arch status --of t7
     """
+    if which is not None:
+        show_stages(ctx, which, as_json)
+        return
     with opened_store(ctx) as (workspace, store):
         document = _status(workspace, store)
     if as_json:
         show(document)
         return
-    recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
-    click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
-    click.echo(f"in the spool: {document['spool']}, in quarantine: {document['quarantine']}")
-    click.echo(
-        f"alerts: {document['alerts']}, deliveries waiting: {document['waiting_deliveries']}"
-    )
-    made = table("hangers", "hanger", "tests", "latest", "model class", "baseline since")
+    _show(document)
+    for said, hangers in _competitions(document["hangers"]).items():
+        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
     for row in document["hangers"]:
-        latest, since = row["latest_test"], row["baseline_set_at"]
+        if row["gap"] is not None:
+            click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+
+
+def _show(document: dict[str, Any]) -> None:
+    recordings = ", ".join(f"{n} {stage}" for stage, n in document["recordings"].items() if n)
+    daemon, deliveries, now = document["daemon"], document["deliveries"], utc_now()
+    ago = (
+        f", last seen {told(now - daemon['seen_at'])} ago" if daemon["seen_at"] else ", never seen"
+    )
+    oldest = document["oldest_waiting_at"]
+    since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
+    owed = ", ".join(f"{n} {state}" for state, n in deliveries.items() if n)
+    click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
+    click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
+    click.echo(f"waiting: {document['spool']} in the spool, {document['under_way']} stored{since}")
+    click.echo(f"in quarantine: {document['quarantine']}")
+    click.echo(
+        f"alerts: {document['alerts']}, {document['open_alerts']} open; "
+        f"deliveries: {owed or 'none'}"
+    )
+    click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
+    made = table(
+        "hangers", "hanger", "tests", "latest", "model class", "baseline since", "open alerts"
+    )
+    for row in document["hangers"]:
+        latest, since = row["latest_test"], row["baseline_since"]
         made.add_row(
             str(row["hanger"]),
             str(row["tests"]),
             f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
             model_class(row["model"]) if row["model"] else "none yet",
             f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
+            str(row["open_alerts"] or ""),
         )
     show_table(made)
-    for said, hangers in _competitions(document["hangers"]).items():
-        click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
-    for row in document["hangers"]:
-        if row["gap"] is not None:
-            click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
 
 
 def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
@@ -84,31 +117,53 @@ def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
-    models = store.selected_models()
-    hangers = []
+    alerts, deliveries = store.alerts(), store.delivery_counts()
+    open_at = Counter(each.alert.hanger for each in alerts if each.acknowledgement is None)
+    counts = store.stage_counts()
+    ended = counts[Stage.DONE] + counts[Stage.REFUSED]
+    return {
+        "bridge": workspace.bridge.name,
+        "daemon": _daemon(workspace),
+        "recordings": {stage.value: n for stage, n in counts.items()},
+        "under_way": sum(counts.values()) - ended,
+        "oldest_waiting_at": store.oldest_waiting(),
+        "spool": len(scan(workspace.spool)),
+        "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
+        "alerts": len(alerts),
+        "open_alerts": open_at.total(),
+        "deliveries": {state.value: n for state, n in deliveries.items()},
+        "waiting_deliveries": deliveries[DeliveryState.WAITING],
+        "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
+        "hangers": _hangers(workspace, store, open_at),
+    }
+
+
+def _daemon(workspace: Workspace) -> dict[str, Any]:
+    seen_s = seconds_since_beat(workspace)
+    seen_at = None if seen_s is None else utc_now() - timedelta(seconds=seen_s)
+    return {"active": workspace.holder(), "seen_at": seen_at}
+
+
+def _hangers(
+    workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
+) -> list[dict[str, Any]]:
+    models, latest, rows = store.selected_models(), store.latest_tests(), []
     for hanger in workspace.bridge.hangers:
-        tests, baseline = store.tests(hanger.id), store.baseline(hanger.id)
+        found, baseline = latest.get(hanger.id), store.baseline(hanger.id)
         adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
-        hangers.append(
+        rows.append(
             {
                 "hanger": hanger.id,
-                "tests": len(tests),
-                "latest_test": tests[-1].time if tests else None,
+                "tests": found.tests if found else 0,
+                "latest_test": found.time if found else None,
                 "model": models.get(hanger.id),
                 "competing": list(names),
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
+                "baseline_since": (baseline.since or baseline.set_at) if baseline else None,
+                "open_alerts": open_alerts[hanger.id],
                 "gap": _gap(gap_watch(store, hanger.id)),
             }
         )
-    quarantined = workspace.quarantine.folder.glob("*.reason.json")
-    return {
-        "bridge": workspace.bridge.name,
-        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
-        "spool": sum(path.is_file() for path in workspace.spool.rglob("*")),
-        "quarantine": sum(1 for _ in quarantined),
-        "alerts": len(store.alerts()),
-        "waiting_deliveries": len(store.deliveries(DeliveryState.WAITING)),
-        "hangers": hangers,
-    }
+    return rows

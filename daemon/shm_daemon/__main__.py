@@ -7,18 +7,19 @@ import sys
 
 from shm.errors import ShmError, UsageError
 from shm.store import Workspace
+from shm_daemon.logs import begin_logging
 from shm_daemon.loop import run
 
 
 def main(arguments: list[str]) -> int:
     """Serves the workspace named by the only argument; the exit code."""
-    logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s"
-    )
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
     try:
         if len(arguments) != 1:
             raise UsageError("one workspace is expected.", remedy="python -m shm_daemon WORKSPACE")
-        run(Workspace.open(arguments[0]))
+        workspace = Workspace.open(arguments[0])
+        begin_logging(workspace.settings)
+        run(workspace)
     except ShmError as error:
         logging.getLogger("shm").error("%s", error)
         return error.exit_code

@@ -1,4 +1,4 @@
-"""Where steps run: a pool of processes that a crash of one step cannot take along."""
+"""Where steps run: a pool of processes that a crash of one step cannot take along, or a cluster."""
 
 from __future__ import annotations
 
@@ -7,12 +7,32 @@ import os
 import signal
 import threading
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
 from multiprocessing.connection import wait
 
+from shm.errors import ShmError
 from shm.resources import one_thread_a_process
+from shm.settings import Settings
+
+
+def executor_of(settings: Settings) -> Executor:
+    """The workers of the scheduler in the settings or, where there is none, processes of our own.
+
+    Raises ShmError where the extra for a scheduler is not installed.
+    """
+    one_thread_a_process()
+    if not settings.scheduler:
+        return process_pool(settings.workers)
+    try:
+        from shm_daemon.cluster import Cluster
+    except ImportError as error:
+        raise ShmError(
+            f"the setting scheduler needs what is not installed: {error}.",
+            remedy="`pip install shm[distributed]`, or leave the setting empty.",
+        ) from error
+    return Cluster(settings.scheduler)
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:

@@ -5,22 +5,28 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from shm.errors import ShmError, StoreError
+from shm.errors import ShmError, StoreBusy, StoreError
 from shm.pipeline import Clock, Flow, Notifier, utc_now
+from shm.settings import Settings
 from shm.store import Workspace
+from shm.store.active import ActiveLock
 from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
-from shm_daemon.execution import children_ended, process_pool
+from shm_daemon.execution import children_ended, executor_of
+from shm_daemon.heartbeat import beat, longest_wait_s, tell_systemd
 from shm_daemon.hooks import HookNotifier
+from shm_daemon.hooks.contract import one_line
+from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
 
 _RECEIVING_S = 1.0
 _HINT_DELAY_S = 0.1
 _UNREADABLE_S = 60.0
+_STANDING_BY_S = 1.0
 
 log = logging.getLogger(__name__)
 
@@ -31,63 +37,125 @@ def run(
     clock: Clock = utc_now,
     bell: Bell | None = None,
     once: bool = False,
-    make_executor: Callable[[int], Executor] = process_pool,
+    standby: bool = False,
+    make_executor: Callable[[Settings], Executor] = executor_of,
     notifier: Notifier | None = None,
 ) -> None:
     """Serves a workspace until SIGTERM, SIGINT or `bell.stop()`; with `once` until all is done.
 
-    Raises StoreBusy where another process serves it, SchemaOutdated and other errors of the store
-    that waiting cannot mend.
+    With `standby` it waits while another process serves the store and takes over when that one has
+    ended; else that raises StoreBusy. Raises SchemaOutdated and other errors of the store that
+    waiting cannot mend.
     """
     bell = bell or Bell()
+    patience = Patience(bell, standby)
+    with stopped_by_signals(bell), last_words():
+        while not bell.stopped:
+            try:
+                with workspace.lock(patience) as lock, ExitStack() as stack:
+                    daemon = _begin(stack, workspace, lock, bell, clock, make_executor, notifier)
+                    if daemon.serve(once):
+                        return
+            except StoreError as error:
+                if not bell.stopped and (error.retry_after_s is None or not patience(error)):
+                    raise
+
+
+@contextmanager
+def last_words() -> Iterator[None]:
+    """Tells systemd at the end of the context that the service is ending."""
+    try:
+        yield
+    finally:
+        tell_systemd("STOPPING=1", "STATUS=ending")
+
+
+class Patience:
+    """Waits for a store that is another's, or whose server does not answer, and says so once."""
+
+    def __init__(self, bell: Bell, standby: bool):
+        self._bell, self._standby, self._said = bell, standby, ""
+
+    def __call__(self, error: StoreError) -> bool:
+        """Whether to try again, after a while: not where it is another's and we do not stand by."""
+        if isinstance(error, StoreBusy) and not self._standby:
+            return False
+        if self._said != error.message:
+            self._said = error.message
+            log.info("standing by: %s", error.message)
+        tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=standing by: {one_line(error.message)}")
+        self._bell.wait(_STANDING_BY_S)
+        return not self._bell.stopped
+
+
+def _begin(
+    stack: ExitStack,
+    workspace: Workspace,
+    lock: ActiveLock,
+    bell: Bell,
+    clock: Clock,
+    make_executor: Callable[[Settings], Executor],
+    notifier: Notifier | None,
+) -> Daemon:
+    """A daemon at work, all of which ends with the stack."""
     settings = workspace.settings
-    with ExitStack() as stack:
-        stack.enter_context(stopped_by_signals(bell))
-        stack.enter_context(workspace.lock())
-        store = stack.enter_context(workspace.store())
-        stack.enter_context(children_ended())
-        if notifier is None:
-            timeout_s = settings.hook_timeout_seconds
-            notifier = HookNotifier(workspace.folder, timeout_s, os.environ)
-            stack.callback(notifier.close)
-        executor = make_executor(settings.workers)
-        flow = Flow(
-            workspace,
-            store,
-            executor,
-            notifier=notifier,
-            clock=clock,
-            lanes=settings.workers + 1,
-            wake=bell.ring,
-        )
-        stack.callback(flow.close)
-        stack.enter_context(rung_by_changes(bell, workspace.spool))
-        daemon = Daemon(flow, bell, lambda: make_executor(settings.workers))
-        stack.callback(daemon.close)
-        log.info("watching %s", workspace.spool)
-        daemon.serve(once)
-        log.info("ended")
+    store = stack.enter_context(workspace.store())
+    stack.enter_context(children_ended())
+    if notifier is None:
+        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        stack.callback(notifier.close)
+    executor = make_executor(settings)
+    flow = Flow(
+        workspace,
+        store,
+        executor,
+        notifier=notifier,
+        clock=clock,
+        lanes=settings.workers + 1,
+        wake=bell.ring,
+    )
+    stack.callback(flow.close)
+    stack.enter_context(rung_by_changes(bell, workspace.spool))
+    stack.enter_context(messages(workspace))
+    daemon = Daemon(flow, bell, lock, lambda: make_executor(settings))
+    stack.callback(daemon.close)
+    log.info("watching %s", workspace.spool)
+    return daemon
 
 
 class Daemon:
     """One turn after the other: take whole files in, advance the flow, wait for a ring."""
 
-    def __init__(self, flow: Flow, bell: Bell, make_executor: Callable[[], Executor]):
-        self._flow, self._bell, self._make_executor = flow, bell, make_executor
+    def __init__(
+        self, flow: Flow, bell: Bell, lock: ActiveLock, make_executor: Callable[[], Executor]
+    ):
+        self._flow, self._bell, self._lock = flow, bell, lock
+        self._make_executor = make_executor
         settings = flow.workspace.settings
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
+        self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
         self._described_at = _modified_ns(flow.workspace)
 
-    def serve(self, once: bool) -> None:
-        """Takes turns until the bell is stopped or, with `once`, until nothing is left to do."""
+    def serve(self, once: bool) -> bool:
+        """Takes turns until the bell is stopped or, with `once`, until nothing is left to do.
+
+        False where the store is no longer ours: another may have begun what we had under way.
+        """
         while not self._bell.stopped:
+            if not self._lock.held():
+                log.warning("the right to the store was lost; it is asked for again")
+                return False
+            beat(self._flow.workspace)
             busy = self._turn()
             if once and not busy and not self._tracker.watching:
-                return
-            heard = self._bell.wait(max(0.0, self._scan_at - time.monotonic()))
+                break
+            pause_s = max(0.0, self._scan_at - time.monotonic())
+            heard = self._bell.wait(min(pause_s, self._longest_wait_s))
             if SPOOL in heard:
                 self._scan_at = min(self._scan_at, time.monotonic() + _HINT_DELAY_S)
+        log.info("ended")
+        return True
 
     def close(self) -> None:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)

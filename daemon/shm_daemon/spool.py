@@ -37,6 +37,18 @@ def scan(spool: Path) -> dict[Path, Look]:
     return {path: look for path, look in looks if look is not None}
 
 
+def left_alone(spool: Path) -> list[Path]:
+    """Uploads that are not finished, and sidecars whose file is not there."""
+    files = [path for path in spool.rglob("*") if path.is_file() and not path.is_symlink()]
+    awaited = {sidecar_path(path) for path in files if not path.name.lower().endswith(_SIDECAR)}
+    return [
+        path
+        for path in files
+        if path.name.lower().endswith(_UNDER_WAY)
+        or (path.name.lower().endswith(_SIDECAR) and path not in awaited)
+    ]
+
+
 def _candidates(spool: Path) -> Iterator[Path]:
     for folder, subfolders, names in os.walk(spool):
         subfolders[:] = [name for name in subfolders if not name.startswith(".")]

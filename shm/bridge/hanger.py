@@ -21,6 +21,7 @@ _OPTIONAL = (
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
 _LEAST_FACTOR = 1e-6
+_FALSE_CALL_YEARS = (0.1, 1e6)
 
 
 def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
@@ -93,6 +94,8 @@ def _thresholds(table: Table | None) -> Thresholds:
     values = {key: table.positive(key) for key in table.values}
     if values.get("alert_probability", 0.5) >= 1:
         raise table.refusal("alert_probability must lie below 1", "Give 0.95, say.")
+    if "false_call_years" in table:
+        table.fraction("false_call_years", NAN, *_FALSE_CALL_YEARS)
     return Thresholds(**values)
 
 

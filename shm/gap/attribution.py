@@ -90,16 +90,20 @@ def attributed(
     options: GapOptions,
     rng: np.random.Generator,
     progress: Progress = silent,
+    *,
+    thorough: bool = False,
 ) -> Attribution:
     """The causes of the gap between the baseline and the measurements, with probabilities.
 
-    Sizes that these data cannot show are cut from the priors (`problem.smallest`). Raises
-    UsageError for an unknown effect in `options.without`.
+    `thorough` where something unknown led without it: pairs of many more effects are fitted. Sizes
+    that these data cannot show are cut from the priors (`problem.smallest`). Raises UsageError for
+    an unknown effect in `options.without`.
     """
     search = Search(problem, options, rng, progress)
     tried = search.with_unknown(search.singles())
     if search.calls_for_pairs(tried):
         tried = search.with_pairs(tried)
+        tried = search.with_many_pairs(tried) if thorough else tried
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])

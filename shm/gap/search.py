@@ -84,21 +84,21 @@ class Search:
         return any(fit is not None and fit.log_evidence > level for fit in fits)
 
     def with_pairs(self, tried: list[Tried]) -> list[Tried]:
-        """Adds the pairs of a leading effect with another one that may be as likely, fitted.
-
-        Where something unknown leads all the same, pairs of all kinds are fitted, for where the gap
-        is large the scans, which add up what each effect does alone, say little.
-        """
+        """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
         single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
         scans, rough = self._pairs(tried, LEADERS)
         chosen = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
-        some = self._with_fitted_pairs(tried, scans, chosen)
-        if not families(self.with_laws(some), self.variants)[0].flexible:
-            return some
-        scans, rough = self._pairs(some, MANY_LEADERS)
-        return self._with_fitted_pairs(some, scans, varied(rough, ALIKE, MANY_PAIRS))
+        return self._with_fitted_pairs(tried, scans, chosen)
+
+    def with_many_pairs(self, tried: list[Tried]) -> list[Tried]:
+        """Adds pairs of all kinds, fitted.
+
+        Where the gap is large, the scans, which add up what each effect does alone, say little.
+        """
+        scans, rough = self._pairs(tried, MANY_LEADERS)
+        return self._with_fitted_pairs(tried, scans, varied(rough, ALIKE, MANY_PAIRS))
 
     def _pairs(
         self, tried: Sequence[Tried], leaders: int

@@ -47,7 +47,9 @@ def cleared(
 ) -> Cleared:
     """Attributed, and where that leaves gross errors, attributed anew without them.
 
-    Where the last attribution expects one of them as it was measured, the first one stands.
+    Where the last attribution expects one of them as it was measured, the first one stands. Where
+    something unknown leads, it is searched thoroughly: only then, for among many pairs there always
+    is one that takes a gross error for its own.
     """
     every = np.arange(whole.design.frequencies)
     first = found = Cleared(whole, whole, every, attributed(whole, options, rng, progress))
@@ -62,7 +64,13 @@ def cleared(
         part = whole.part(rows)
         again = attributed(part, options, rng, lambda label, _: progress(label, 1.0))
         found = Cleared(whole, part, rows, again, (*found.aside, *sure))
-    return found if all(_stands(found, each) for each in found.aside) else first
+    found = found if all(_stands(found, each) for each in found.aside) else first
+    if found.attribution.leads != "unexplained":
+        return found
+    last = attributed(
+        found.problem, options, rng, lambda label, _: progress(label, 1.0), thorough=True
+    )
+    return replace(found, attribution=last)
 
 
 def _stands(found: Cleared, error: GrossError) -> bool:

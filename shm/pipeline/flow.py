@@ -29,6 +29,7 @@ from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Not
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
 from shm.store import Delivery, Receipt, Store, StoredAlert, Workspace
+from shm.values import Alert
 
 _CRASHES = 2
 _LONGEST_S = 86400.0
@@ -96,7 +97,9 @@ class Flow:
     def receive(self, path: Path) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
         receipt = receive(path, self.workspace, self.store, self.clock())
-        log.info("%s: %s", receipt.recording.file.file_name, receipt.outcome)
+        recording = receipt.recording
+        about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
+        log.info("%s: %s", recording.file.file_name, receipt.outcome, extra=about)
         return receipt
 
     def drain(self, after_each: Callable[[], object] = lambda: None) -> None:
@@ -158,7 +161,7 @@ class Flow:
         elif isinstance(error, ShmError) and error.retry_after_s is not None:
             until = self.clock() + timedelta(seconds=error.retry_after_s)
             self._postponed.update(dict.fromkeys(job.recordings, until))
-            log.warning("%s %s is tried again: %s", *job.key, error)
+            log.warning("%s %s is tried again: %s", *job.key, error, extra=_about(job))
         else:
             self._refuse(job, error)
 
@@ -166,8 +169,13 @@ class Flow:
         try:
             kept = running.step.keep(running.future.result())
             if isinstance(kept, StoredAlert):
-                log.warning("alert %s: %s", kept.alert.key, kept.alert.message)
-            log.info("%s %d: done", *running.job.key)
+                log.warning(
+                    "alert %s: %s",
+                    kept.alert.key,
+                    kept.alert.message,
+                    extra=_about_alert(kept.alert),
+                )
+            log.info("%s %d: done", *running.job.key, extra=_about(running.job))
         except StoreError as error:
             if error.retry_after_s is not None:
                 raise
@@ -183,7 +191,7 @@ class Flow:
     def _note_crash(self, job: Job, error: BaseException) -> None:
         """A worker died: perhaps because of this job, perhaps because of one beside it."""
         self._crashes.update(job.recordings)
-        log.warning("%s %s: the process that worked on it died", *job.key)
+        log.warning("%s %s: the process that worked on it died", *job.key, extra=_about(job))
         if any(self._crashes[recording_id] >= _CRASHES for recording_id in job.recordings):
             self._refuse(job, error)
 
@@ -191,7 +199,7 @@ class Flow:
         """Lays the files of a failed step in the quarantine, then marks them refused."""
         self._forget(job)
         if not isinstance(error, ShmError):
-            log.error("%s %s failed", *job.key, exc_info=error)
+            log.error("%s %s failed", *job.key, exc_info=error, extra=_about(job))
         for recording_id in job.recordings:
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
@@ -200,7 +208,9 @@ class Flow:
                 with archive.opened(recording.file) as path:
                     self.workspace.quarantine.put(path, name, reason, sidecar_path(path))
             self.store.refuse(recording_id, reason, now, job.tests)
-            log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"])
+            about = {**_about(job), "recording": recording_id, "file": name}
+            why = (reason["message"], reason["remedy"])
+            log.warning("%s is refused: %s %s", name, *why, extra=about)
 
     def _put_off(self, delivery: Delivery, error: BaseException) -> None:
         """A delivery that failed is tried again, ever later, until it has failed too often.
@@ -213,4 +223,21 @@ class Flow:
         again = not refused and delivery.attempts + 1 < settings.hook_attempts
         next_attempt_at = now + timedelta(seconds=min(wait_s, _LONGEST_S)) if again else None
         self.store.delivery_failed(delivery, str(error), now, next_attempt_at)
-        log.warning("hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error)
+        about = {**_about_alert(delivery.alert), "hook": delivery.hook}
+        log.warning(
+            "hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error, extra=about
+        )
+
+
+def _about(job: Job) -> dict[str, object]:
+    """What a job is about, for those who look for it in the log."""
+    if job.delivery is not None:
+        about = _about_alert(job.delivery.alert)
+        return {**about, "hook": job.delivery.hook, "stage": job.key[0]}
+    named = {"recording": job.recordings, "hanger": (job.hanger,), "test": job.names}
+    single = {key: ids[0] for key, ids in named.items() if len(ids) == 1 and ids[0] is not None}
+    return {**single, "stage": job.key[0]}
+
+
+def _about_alert(alert: Alert) -> dict[str, object]:
+    return {"alert": alert.key, "hanger": alert.hanger, "test": alert.test}

@@ -25,7 +25,7 @@ def receive(path: Path, workspace: Workspace, store: Store, at: datetime) -> Rec
     name = path.relative_to(workspace.spool) if spooled else Path(path.name)
     arrival = _arrival(path) if spooled else uuid.uuid4().hex
     sidecar, archive = sidecar_path(path), workspace.archive
-    sidecar_as = archive.keep(sidecar).archived_as if sidecar.is_file() else None
+    sidecar_as = archive.keep(sidecar).archived_as if _is_plain(sidecar) else None
     kept = archive.keep(path)
     file = ReceivedFile(
         kept.sha256, safe_name(name), kept.size_bytes, arrival, kept.archived_as, sidecar_as
@@ -44,9 +44,14 @@ def _arrival(path: Path) -> str:
 
 def _remove(path: Path, sidecar: Path) -> None:
     """Empties the spool of a received file; its sidecar first, lest that be left alone."""
-    if sidecar.is_file() and not _shared(sidecar, path):
+    if _is_plain(sidecar) and not _shared(sidecar, path):
         sidecar.unlink(missing_ok=True)
     path.unlink(missing_ok=True)
+
+
+def _is_plain(sidecar: Path) -> bool:
+    """A link may point to any file of this machine, which is nobody's to send in."""
+    return sidecar.is_file() and not sidecar.is_symlink()
 
 
 def _shared(sidecar: Path, path: Path) -> bool:

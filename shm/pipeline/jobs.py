@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from importlib import import_module
@@ -13,18 +13,21 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
+from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import identify_lineage, update_terms
-from shm.pipeline.watching import dated_tests
+from shm.pipeline.watching import to_watch
 from shm.store import (
     Delivery,
     IdentifiedTest,
+    KeptWatch,
     Stage,
     Store,
     StoredRecording,
+    StoredTest,
     WaitingTest,
     Workspace,
 )
-from shm.values import Alert, Hanger
+from shm.values import Alert, Hanger, Posterior, WatchedTest
 
 DELIVERIES = 16
 _DELIVERIES_A_HOOK = 4
@@ -52,13 +55,18 @@ class Step:
 
 @dataclass(frozen=True)
 class Job:
-    """A step that waits: its name, the recordings and tests it is for, how to begin it."""
+    """A step that waits: its name, the recordings and tests it is for, how to begin it.
+
+    `hanger` and the `names` of the tests are for the log.
+    """
 
     key: tuple[str, int]
     prepare: Callable[[], Step]
     recordings: tuple[int, ...] = ()
     tests: tuple[int, ...] = ()
     delivery: Delivery | None = None
+    hanger: int | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,8 @@ class Jobs:
         """Steps in the order in which to take them, leaving out the recordings `held`.
 
         A hanger's first selection waits until every received file is identified, so that the
-        earliest of its tests make the baseline.
+        earliest of its tests make the baseline; a watch waits for the files that came in before its
+        test, so that what it says does not depend on which step was the faster.
         """
         received = self.store.waiting_recordings(limit, excluding=held)
         for recording in received:
@@ -81,10 +90,13 @@ class Jobs:
                 ("identify", recording.id), partial(self._identify, recording), (recording.id,)
             )
         selected = self.store.selected_models()
-        waiting = self._waiting_tests(held)
+        waiting = self._waiting_tests(limit, held)
+        oldest = min((recording.id for recording in received), default=None)
         for hanger in self.workspace.bridge.hangers:
             if hanger.id in selected:
-                yield from self._later_tests(hanger, selected[hanger.id], waiting[hanger.id])
+                yield from self._later_tests(
+                    hanger, selected[hanger.id], waiting[hanger.id], oldest
+                )
             elif not received:
                 yield from self._first_tests(hanger, waiting[hanger.id])
 
@@ -103,11 +115,13 @@ class Jobs:
                 prepare = partial(self._deliver, notifier, delivery)
                 yield Job(("deliver", delivery.id), prepare, delivery=delivery)
 
-    def _waiting_tests(self, held: Collection[int]) -> defaultdict[int, list[WaitingTest]]:
+    def _waiting_tests(
+        self, limit: int, held: Collection[int]
+    ) -> defaultdict[int, list[WaitingTest]]:
         waiting: defaultdict[int, list[WaitingTest]] = defaultdict(list)
-        for test in self.store.waiting_tests():
-            if test.recording_id not in held:
-                waiting[test.hanger].append(test)
+        most = max(limit, self.workspace.settings.baseline_tests)
+        for test in self.store.waiting_tests(most, excluding=held):
+            waiting[test.hanger].append(test)
         return waiting
 
     def _first_tests(self, hanger: Hanger, tests: Sequence[WaitingTest]) -> Iterator[Job]:
@@ -117,28 +131,24 @@ class Jobs:
             yield _job("select", hanger.id, partial(self._select, hanger, first), first)
 
     def _later_tests(
-        self, hanger: Hanger, model: str, tests: Sequence[WaitingTest]
+        self, hanger: Hanger, model: str, tests: Sequence[WaitingTest], oldest: int | None
     ) -> Iterator[Job]:
         for test in tests:
             if test.stage is Stage.IDENTIFIED:
                 yield _job("update", test.id, partial(self._update, hanger, model, test), [test])
         # Watched in the order of their times, so that an alert names the first test that shows it.
         for test in tests[:1]:
-            if test.stage is Stage.UPDATED:
+            if test.stage is Stage.UPDATED and (oldest is None or test.recording_id < oldest):
                 yield _job("watch", test.id, partial(self._watch, hanger, test), [test])
 
     def _identify(self, recording: StoredRecording) -> Step:
-        workspace, settings = self.workspace, self.workspace.settings
-        selected = self.store.selected_models()
-        run = partial(
-            run_step,
-            "identify_file",
-            recording,
-            workspace.archive,
-            workspace.bridge,
-            settings,
-            selected,
-        )
+        workspace, selected = self.workspace, self.store.selected_models()
+        settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
+        archive: Opens = workspace.archive
+        if settings.scheduler:  # workers elsewhere need not see our folders
+            archive = Parcel.of(workspace.archive, recording.file, settings.max_file_bytes)
+        step = partial(run_step, "identify_file", recording, archive)
+        run = partial(step, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))
 
     def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> None:
@@ -163,7 +173,18 @@ class Jobs:
         settings = self.workspace.settings
         samples, seed, lineage = update_terms(hanger, [model], [test], settings, known)
         run = partial(run_step, "update_test", test.test, hanger, model, known, samples, seed)
-        return Step(run, lambda found: self.store.updated(test, found, lineage, self.clock()))
+        makes_baseline = self._makes_baseline(test, model)
+
+        def keep(found: Posterior) -> None:
+            now, to_watch = self.clock(), not makes_baseline
+            self.store.updated(test, found, lineage, now, to_watch=to_watch)
+
+        return Step(run, keep)
+
+    def _makes_baseline(self, test: StoredTest, model: str) -> bool:
+        """Whether a test, done again, would be compared with what it has made itself."""
+        baseline = self.store.baseline(test.hanger, model, test.time)
+        return baseline is not None and test.test.id in baseline.posterior.tests
 
     def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
         test = self.store.test(waiting.id)
@@ -174,14 +195,19 @@ class Jobs:
             raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
         limit_years = self.workspace.settings.false_call_years
-        tests = dated_tests(self.store, baseline, test)
-        run = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
-        return Step(
-            run,
-            lambda found: self.store.watched(
-                test, baseline, found[0], found[1], hooks, self.clock()
-            ),
-        )
+        needed = to_watch(self.store, baseline, test)
+        tests = (needed.baseline_tests, needed.later)
+        step = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
+
+        def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
+            if found is None:  # the test still waits, to be watched from the baseline on
+                self.store.forget_watch(baseline)
+                return None
+            watched, alert, content = found
+            state = KeptWatch(needed.key, test.time, content)
+            return self.store.watched(test, baseline, watched, alert, hooks, self.clock(), state)
+
+        return Step(partial(step, needed.kept), keep)
 
     def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}
@@ -191,7 +217,14 @@ class Jobs:
 
 def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[WaitingTest]) -> Job:
     recordings = tuple(dict.fromkeys(test.recording_id for test in tests))
-    return Job((kind, number), prepare, recordings, tuple(test.id for test in tests))
+    return Job(
+        (kind, number),
+        prepare,
+        recordings,
+        tuple(test.id for test in tests),
+        hanger=tests[0].hanger,
+        names=tuple(test.name for test in tests),
+    )
 
 
 def _notify(notifier: Notifier, hook: Hook | None, delivery: Delivery) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 
@@ -9,27 +10,24 @@ import shm
 from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
+from shm.pipeline.bridge_reporting import stored_pattern
 from shm.pipeline.steps import identify_options
-from shm.pipeline.terms import identify_lineage
+from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
-from shm.read import read_test
+from shm.read.apart import read_test
 from shm.report import HangerReport, TestSheet, trend_row
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredTest, Workspace
-from shm.values import Hanger, WatchedTest
+from shm.store import Baseline, Store, StoredAlert, StoredTest, Workspace
+from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
+from shm.watch.neighbours import BridgePattern
 from shm.watch.wording import watch_words
 
 
 def hanger_report(
-    workspace: Workspace,
-    store: Store,
-    hanger_id: int,
-    generated_at: datetime,
-    *,
-    with_states: bool = False,
+    workspace: Workspace, store: Store, hanger_id: int, generated_at: datetime
 ) -> HangerReport:
-    """All that the store knows of a hanger, for its report; its states over time take seconds.
+    """All that the store knows of a hanger, for its report; its states over time take a second.
 
     Raises BadInput for an unknown hanger, NothingThere before its first test is through.
     """
@@ -43,6 +41,9 @@ def hanger_report(
     latest, posterior = history[-1]
     selection, baseline = store.selection(hanger_id), store.baseline(hanger_id, posterior.model)
     diagnosis, watch = store.latest_diagnosis(hanger_id), gap_watch(store, hanger_id)
+    watched = _watched_against(store, baseline)
+    is_called = any(each.change.called for each in watched)
+    alerts = store.alerts(hanger_id)
     return HangerReport(
         bridge=workspace.bridge.name,
         hanger=hanger,
@@ -53,20 +54,36 @@ def hanger_report(
         trend=tuple(trend_row(each, stored.test, hanger) for stored, each in history),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
-        drifts=store.drifts(hanger_id, latest.test.id),
-        alerts=tuple(stored.alert for stored in store.alerts(hanger_id)),
+        drifts=_drifts(watched, latest.test.id),
+        alerts=tuple(stored.alert for stored in alerts),
+        acknowledged=_acknowledged(alerts),
         frequency_response=store.frequency_response(latest),
         quality=latest.quality,
         diagnosis=diagnosis.diagnosis if diagnosis else None,
         gap_watch=str(watch) if watch else "",
-        drift_watch=watch_words(_watched_against(store, baseline)),
-        states=_states(workspace, store, hanger, baseline) if with_states else NOTHING_WATCHED,
+        drift_watch=watch_words(watched),
+        states=hanger_states(workspace, store, hanger, baseline),
+        is_called=is_called,
+        neighbours=_neighbours(workspace, store) if is_called else None,
         lineage={
             "input_sha256": latest.lineage.input_sha256,
             "settings_sha256": latest.lineage.settings_sha256,
             "version": latest.lineage.version,
         },
     )
+
+
+def _drifts(watched: Sequence[WatchedTest], test: str) -> tuple[Drift, ...]:
+    """The shifts of a test from the baseline in force; none where it was compared with another."""
+    return next((each.drifts for each in watched if each.test == test), ())
+
+
+def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
+    """Who took note of an alert, when and why, by its key."""
+    noted = {each.alert.key: each.acknowledgement for each in alerts}
+    return {
+        key: f"{note.who}, {note.at:%Y-%m-%d}: {note.why}" for key, note in noted.items() if note
+    }
 
 
 def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
@@ -76,9 +93,18 @@ def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTe
     return tuple(each.watched for each in found)
 
 
-def _states(
+def _neighbours(workspace: Workspace, store: Store) -> BridgePattern | None:
+    """What moved over the bridge; None where fewer than three hangers can be compared."""
+    try:
+        return stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
+    except NothingThere:
+        return None
+
+
+def hanger_states(
     workspace: Workspace, store: Store, hanger: Hanger, baseline: Baseline | None
 ) -> StatesOverTime:
+    """The states over time of a hanger since its baseline; empty where it has none."""
     if baseline is None:
         return NOTHING_WATCHED
     since_baseline, later = dated_tests(store, baseline)
@@ -101,7 +127,7 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
             remedy="Ask for a test that was identified here.",
         )
     with workspace.archive.opened(recording.file) as path:
-        records = read_test(path)
+        records = read_test(path, read_limits(workspace.settings))
     options = identify_options(workspace.settings, workspace.bridge)
     found = identify(records, options, test_id=name, hanger=hanger)
     if identify_lineage(recording, hanger_id, workspace) != stored.lineage:

@@ -9,23 +9,24 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from shm.bridge import Bridge
-from shm.documents import format_time, load_modes
+from shm.documents import format_time
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
 from shm.models import build
-from shm.pipeline.terms import competing, identify_settings
-from shm.read import read_test
+from shm.pipeline.parcel import Opens
+from shm.pipeline.terms import competing, identify_settings, read_limits
+from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
-from shm.store import Archive, Baseline, IdentifiedTest, StoredRecording
+from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
 from shm.update import UpdateOptions, refresh, select, update
 from shm.values import Alert, Hanger, ModalTest, Posterior, Selection, WatchedTest
-from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_hanger
+from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
 def identify_file(
     recording: StoredRecording,
-    archive: Archive,
+    archive: Opens,
     bridge: Bridge,
     settings: Settings,
     selected: Mapping[int, str],
@@ -39,7 +40,7 @@ def identify_file(
     latest = recording.received_at + timedelta(seconds=settings.future_tolerance_seconds)
     with archive.opened(recording.file) as path:
         if path.name.lower().endswith(MODES_SUFFIX):
-            found = _tests_in(path)
+            found = _tests_in(path, read_limits(settings))
         else:
             found = (_test_in(path, bridge, settings, latest),)
     for item in found:
@@ -60,8 +61,8 @@ def _refuse_size(size_bytes: int, limit_bytes: int) -> None:
         )
 
 
-def _tests_in(path: Path) -> tuple[IdentifiedTest, ...]:
-    tests = load_modes(path)
+def _tests_in(path: Path, limits: Limits) -> tuple[IdentifiedTest, ...]:
+    tests = load_modes(path, limits)
     for name, times in Counter(test.id for test in tests).items():
         if times > 1:
             raise BadInput(f"test id {name} is given {times} times.", remedy="Give each its own.")
@@ -69,7 +70,7 @@ def _tests_in(path: Path) -> tuple[IdentifiedTest, ...]:
 
 
 def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -> IdentifiedTest:
-    records = read_test(path)
+    records = read_test(path, read_limits(settings))
     hanger = _hanger(records[0].hanger, bridge)
     for record in records:
         _refuse_future(record.time, latest, "the recording")
@@ -132,16 +133,26 @@ def watch_test(
     current: Posterior,
     hanger: Hanger,
     limit_years: float,
-) -> tuple[WatchedTest, Alert | None]:
-    """What the watch says after a test, and the alert that it calls for.
+    kept: bytes | None = None,
+) -> tuple[WatchedTest, Alert | None, bytes] | None:
+    """What the watch says after a test, the alert that it calls for, and what to keep of it.
 
-    `tests` are those of the baseline and those since, the last of which is the one in question.
+    `tests` are those of the baseline and those since, the last of which is the one in question; or
+    that one alone, with what was `kept` before it: None where nothing can go on from that.
     """
     since_baseline, later = tests
     options = WatchOptions(limit_years=limit_years)
-    watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
+    try:
+        found = watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept)
+    except BadInput:
+        if kept is None:
+            raise
+        found = None  # what was kept may be damaged, and the watch can do without it
+    if found is None:
+        return None
     test, time = later[-1]
     gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
-    alert = joined(watched.alert(hanger), gap)
+    alert = joined(found.alert, gap)
     # A new baseline makes a standing condition a new one.
-    return watched.latest, alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")
+    alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")
+    return found.test, alert, found.kept

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
+from shm.read import Limits
 from shm.settings import Settings
 from shm.store import Lineage, StoredRecording, StoredTest, Workspace
 from shm.values import Hanger, Posterior
@@ -43,6 +44,11 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
 def identify_settings(settings: Settings) -> dict[str, Any]:
     """The settings that decide what an identification gives, by name."""
     return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
+
+
+def read_limits(settings: Settings) -> Limits:
+    """What one file may hold and what reading it may cost."""
+    return Limits(**{each.name: getattr(settings, each.name) for each in fields(Limits)})
 
 
 def identify_lineage(
@@ -79,7 +85,7 @@ def update_terms(
     terms = {"models": list(models), "samples": samples, "seed": seed}
     inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
     if known is not None:
-        inputs.append(known.samples.tolist())
+        inputs.append(hashlib.sha256(known.samples.tobytes()).hexdigest())
     return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
 
 

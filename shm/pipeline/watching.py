@@ -1,44 +1,59 @@
-"""Which tests of a hanger the watch goes over.
+"""Which tests of a hanger the watch goes over, and from where it goes on.
 
 Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from shm.store import Baseline, Stage, Store, StoredTest
+import shm
+from shm.store import Baseline, Store, StoredTest, WatchedName
 
 if TYPE_CHECKING:
     from shm.watch import DatedTest
 
-MOST_TESTS = 500
-"""So many of the latest tests are gone over beside those of the baseline."""
+
+@dataclass(frozen=True)
+class ToWatch:
+    """What a watch needs: the tests of the baseline and those to go over, the newest last.
+
+    With something `kept` the newest goes alone. `key` tells what is kept after it from what was
+    kept after other tests, or by another shm.
+    """
+
+    baseline_tests: Sequence[DatedTest]
+    later: Sequence[DatedTest]
+    kept: bytes | None
+    key: str
+
+
+def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
+    """What the watch of a test needs; how many tests there were before costs next to nothing."""
+    before, kept = store.watched_since(baseline, newest), store.kept_watch(baseline)
+    key = _key([*before, WatchedName(newest.id, newest.test.id, newest.time)])
+    if kept is None or kept.key != _key(before):
+        return ToWatch(*dated_tests(store, baseline, newest), None, key)
+    return ToWatch(_dated(store.tests_of(baseline)), _dated([newest]), kept.content, key)
 
 
 def dated_tests(
-    store: Store, baseline: Baseline, last: StoredTest | None = None
+    store: Store, baseline: Baseline, newest: StoredTest | None = None
 ) -> tuple[list[DatedTest], list[DatedTest]]:
-    """The tests of a baseline, and those since that were watched, up to and with `last`; by time.
-
-    Tests that were watched against an earlier baseline count, but for those before a day since
-    which the hanger is compared anew.
-    """
-    of_baseline, later = [], []
-    for each in store.tests(baseline.hanger):
-        if each.test.id in baseline.posterior.tests:
-            of_baseline.append(each)
-        elif _counts(each, baseline, last):
-            later.append(each)
-    return _dated(of_baseline), _dated([*later, *([last] if last else [])][-MOST_TESTS:])
-
-
-def _counts(test: StoredTest, baseline: Baseline, last: StoredTest | None) -> bool:
-    if test.stage is not Stage.WATCHED or (baseline.since and test.time < baseline.since):
-        return False
-    return last is None or (test.time, test.id) < (last.time, last.id)
+    """The tests of a baseline, and those since that were watched, up to and with `newest`."""
+    watched = {each.id for each in store.watched_since(baseline, newest)}
+    later = [each for each in store.tests(baseline.hanger) if each.id in watched]
+    return _dated(store.tests_of(baseline)), _dated([*later, *([newest] if newest else [])])
 
 
 def _dated(tests: Sequence[StoredTest]) -> list[DatedTest]:
     return [(each.test, each.time) for each in tests]
+
+
+def _key(tests: Sequence[WatchedName]) -> str:
+    """Of these tests in this order: one that came late, or is done again, makes another."""
+    told = "\n".join(f"{each.id} {each.name} {each.time.isoformat()}" for each in tests)
+    return f"{shm.__version__} {hashlib.sha256(told.encode()).hexdigest()}"

@@ -4,10 +4,14 @@ A format is one file and one line of `FORMATS`. Beside a file NAME.csv (or .uff,
 sidecar NAME.toml may say what the file does not: hanger, time, temperature, and each channel's
 unit, calibration, place and plane. What the sidecar says goes before what the file says. A .zip
 holds the files of one test.
+
+These verbs work in the caller's process, for a person's own files; whatever comes by itself is read
+through `shm.read.apart`.
 """
 
 from shm.read.base import Format, Peek, PeekChannel
 from shm.read.bundles import bundle, holds_test
+from shm.read.limits import Limits
 from shm.read.registry import FORMATS, peek, read, write
 from shm.read.sidecar import sidecar_path
 from shm.read.whole_test import peek_test, read_test
@@ -15,6 +19,7 @@ from shm.read.whole_test import peek_test, read_test
 __all__ = [
     "FORMATS",
     "Format",
+    "Limits",
     "Peek",
     "PeekChannel",
     "bundle",

@@ -17,7 +17,7 @@ from shm.read.arrays import Arrays, Variable, arranged
 from shm.read.base import Peek
 from shm.read.guard import guarded
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header
-from shm.read.limits import MOST_VALUES, refuse_large
+from shm.read.limits import limits, refuse_large, refuse_many_samples
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.timebase import REMEDY, evened, rate_of
 from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Recording
@@ -155,7 +155,9 @@ def _refuse_none(chosen: _Chosen) -> None:
 
 
 def _same_length(variables: Sequence[Variable], path: Path) -> int:
-    """The number of values that all have; raises BadInput where they differ."""
+    """The number of values that all have; raises BadInput where they differ or are too many."""
+    if variables:
+        refuse_many_samples(variables[0].size, path)
     for variable in variables[1:]:
         if variable.size != variables[0].size:
             raise BadInput(
@@ -224,7 +226,7 @@ def _coherence(chosen: _Chosen, header: Header, lines: int) -> FloatArray | None
 
 
 def _real(variables: Sequence[Variable], path: Path) -> FloatArray:
-    if sum(variable.size for variable in variables) > MOST_VALUES:
+    if sum(variable.size for variable in variables) > limits().values_at_once:
         refuse_large((len(variables), variables[0].size), 8, "", path)
     return np.array([_loaded(v, path) for v in variables], dtype=np.float64)
 

@@ -12,7 +12,7 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import Header
-from shm.read.limits import MOST_ACCELERATIONS
+from shm.read.limits import limits, refuse_many_samples
 from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
 
 LEAST_SAMPLES = 16
@@ -34,6 +34,7 @@ def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: floa
     """
     rate = checked_rate(header, file_rate_hz, path)
     _refuse_short(values.shape[1], path)
+    refuse_many_samples(values.shape[1], path)
     channels = tuple(
         _channel(header, name, row, path)
         for name, row in zip(header.channels, values, strict=True)
@@ -90,6 +91,7 @@ def peeked(
     attempt(lambda: refuse_quantities(measured, path), None, found)
     if channels:
         attempt(lambda: _refuse_short(samples, path), None, found)
+        attempt(lambda: refuse_many_samples(samples, path), None, found)
     return Peek(
         source=str(path),
         format=file_format,
@@ -106,13 +108,13 @@ def peeked(
 
 
 def refuse_quantities(quantities: Sequence[Quantity], path: Path) -> None:
-    """Raises BadInput for anything but 1 to 16 accelerations and at most one force."""
+    """Raises BadInput for too many or no accelerations, and for more than one force."""
     forces, accelerations = quantities.count("force"), quantities.count("acceleration")
     if accelerations == 0:
         raise BadInput("no channel holds an acceleration.", file=path, remedy=_NAME_THEM)
-    if accelerations > MOST_ACCELERATIONS:
+    if accelerations > limits().max_channels:
         raise BadInput(
-            f"{accelerations} accelerations; at most {MOST_ACCELERATIONS} are read.",
+            f"{accelerations} accelerations; at most {limits().max_channels} are read.",
             file=path,
             remedy=_LEAVE_OUT,
         )

@@ -17,7 +17,7 @@ from shm.read.arrays import natural
 from shm.read.atomic import replace_file
 from shm.read.guard import guarded
 from shm.read.header import CHANNEL_KEYS, Header
-from shm.read.limits import LARGEST_BYTES
+from shm.read.limits import limits
 from shm.read.packed import MOST_MEMBERS, checked_members, refusal, unpack
 from shm.read.sidecar import document_beside, sidecar_path, with_sidecar
 
@@ -110,7 +110,7 @@ def _unpack_all(
 ) -> list[Path]:
     """All members in one folder; raises BadInput where two have one name or all are too large."""
     files: list[Path] = []
-    left = LARGEST_BYTES
+    left = limits().bytes_at_once
     for member in members:
         target = folder / PurePosixPath(member.filename.replace("\\", "/")).name
         if target in files:

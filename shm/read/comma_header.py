@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from shm.errors import BadInput
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, spread
+from shm.read.limits import refuse_long_header
 
 _TIME = re.compile(r"t|time([ _]?[\[(]?s[\])]?)?", re.IGNORECASE)
 _SAMPLE = "a line of names such as force,acc_1,acc_2"
@@ -42,6 +44,7 @@ def parse_heading(text: str, path: Path) -> Heading:
         raise BadInput(
             "there are no columns in it.", file=path, remedy=f"Begin with {_SAMPLE}, then numbers."
         )
+    refuse_long_heading(lines[: at + 1], path)
     delimiter = mark_between(lines[at])
     columns = tuple(cells_of(lines[at], delimiter))
     _refuse_columns(columns, at + 1, path)
@@ -59,6 +62,11 @@ def header_of(
         if ":" in line and _is_remark(line)
     ]
     return _header(remarks, columns, delimiter, path)
+
+
+def refuse_long_heading(lines: Sequence[str], path: Path) -> None:
+    """Raises BadInput where the lines up to the names of the columns are too long."""
+    refuse_long_header(sum(map(len, lines)), path)
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -88,8 +96,9 @@ def _refuse_columns(columns: tuple[str, ...], line: int, path: Path) -> None:
             line=line,
             remedy=f"Put {_SAMPLE} before the numbers.",
         )
+    often = Counter(columns)
     for name in columns:
-        if not name or columns.count(name) > 1:
+        if not name or often[name] > 1:
             what = f"the column name {name!r} stands twice." if name else "a column has no name."
             raise BadInput(
                 what, file=path, channel=name, line=line, remedy="Give each column its own name."

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from shm.errors import BadInput
 from shm.read.base import Format
-from shm.read.limits import LARGEST_BYTES, too_large
+from shm.read.limits import limits, too_large
 
 _HEAD_BYTES = 4096
 _MAGIC: tuple[tuple[bytes, str], ...] = (
@@ -96,8 +96,9 @@ def text_of(path: Path) -> str:
 
 def bytes_of(path: Path) -> bytes:
     """A whole file, unpacked where it is gzipped; raises BadInput where it cannot be read."""
-    content = _bytes(path, LARGEST_BYTES + 1)
-    if len(content) > LARGEST_BYTES:
+    most = limits().bytes_at_once
+    content = _bytes(path, most + 1)
+    if len(content) > most:
         raise too_large(path)
     return content
 

@@ -22,7 +22,14 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read import responses
 from shm.read.base import Peek
-from shm.read.comma_header import LINE_BREAK, Heading, cells_of, header_of, mark_between
+from shm.read.comma_header import (
+    LINE_BREAK,
+    Heading,
+    cells_of,
+    header_of,
+    mark_between,
+    refuse_long_heading,
+)
 from shm.read.header import Entry, Header
 from shm.read.sidecar import with_sidecar
 from shm.read.table import parse_table
@@ -53,6 +60,7 @@ def parse(text: str, path: Path) -> ResponseTable | None:
     if at is None:
         return None
     lines = LINE_BREAK.split(text)
+    refuse_long_heading(lines[: at + 1], path)
     mark = mark_between(lines[at])
     columns = [cell for cell in cells_of(lines[at], mark) if cell]
     places = _places(columns, at + 1, path)

@@ -21,6 +21,12 @@ def guarded(path: Path, what: str = "the file") -> Iterator[None]:
             yield
     except ShmError:
         raise
+    except MemoryError as error:
+        raise BadInput(
+            f"{what} needs more memory than is given to one file.",
+            file=path,
+            remedy="Export a small file again; split a long one, or raise parse_memory_bytes.",
+        ) from error
     except Exception as error:
         raise BadInput(
             f"{what} cannot be read: its structure is damaged or of an unknown kind.",

@@ -3,33 +3,99 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 
 from shm.errors import BadInput
+from shm.settings import Settings
 
-LARGEST_BYTES = 256 * 2**20
-MOST_VALUES = LARGEST_BYTES // 8  # an hour of 17 channels at 500 Hz
-MOST_ACCELERATIONS = 16
 _SPLIT = "Split the record, or leave out what is not needed."
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one file may hold and what reading it may cost; each is a setting of that name.
+
+    `max_channels` are accelerations, `max_samples` those of one channel (or lines of a frequency
+    response), `max_header_bytes` what a text file says before its numbers, and a sidecar.
+    """
+
+    max_channels: int = Settings.max_channels
+    max_samples: int = Settings.max_samples
+    max_header_bytes: int = Settings.max_header_bytes
+    parse_seconds: float = Settings.parse_seconds
+    parse_memory_bytes: int = Settings.parse_memory_bytes
+
+    @property
+    def bytes_at_once(self) -> int:
+        """The largest file, unpacked content and array: readers hold up to four copies."""
+        return self.parse_memory_bytes // 4
+
+    @property
+    def values_at_once(self) -> int:
+        """How many numbers of double precision that is."""
+        return self.bytes_at_once // 8
+
+
+_in_force: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039 - frozen
+
+
+def limits() -> Limits:
+    """The limits in force for what is read now."""
+    return _in_force.get()
+
+
+@contextmanager
+def limited(to: Limits) -> Iterator[None]:
+    """Puts limits in force for the context."""
+    before = _in_force.set(to)
+    try:
+        yield
+    finally:
+        _in_force.reset(before)
 
 
 def refuse_large(shape: Sequence[int], item_bytes: int, what: str, path: Path) -> None:
     """Raises BadInput where an array of this shape would outgrow the memory set aside for it."""
-    if any(length < 0 for length in shape) or math.prod(shape) * item_bytes > LARGEST_BYTES:
-        size = "x".join(str(length) for length in shape)
+    most = limits().bytes_at_once
+    if any(length < 0 for length in shape) or math.prod(shape) * item_bytes > most:
+        size = "x".join(str(length) for length in shape)[:80]
         raise BadInput(
-            f"holds {size} values, beyond the {LARGEST_BYTES >> 20} MB that are read at once.",
+            f"holds {size} values, beyond the {most >> 20} MB that are read at once.",
             file=path,
             channel=what,
             remedy=_SPLIT,
         )
 
 
+def refuse_many_samples(samples: int, path: Path) -> None:
+    """Raises BadInput for a record longer than the setting max_samples."""
+    if samples > limits().max_samples:
+        raise BadInput(
+            f"{samples} samples are more than the {limits().max_samples} of setting max_samples.",
+            file=path,
+            remedy="Split the record, or raise the setting.",
+        )
+
+
+def refuse_long_header(size_bytes: int, path: Path) -> None:
+    """Raises BadInput for a heading or sidecar beyond the setting max_header_bytes."""
+    if size_bytes > limits().max_header_bytes:
+        raise BadInput(
+            f"{size_bytes} bytes say what the numbers are, more than the"
+            f" {limits().max_header_bytes} of setting max_header_bytes.",
+            file=path,
+            remedy="Shorten the header: a line of names, then a row a line; or raise the setting.",
+        )
+
+
 def too_large(path: Path) -> BadInput:
     """The refusal of a file that is, or unpacks to, more than may be read at once."""
     return BadInput(
-        f"holds more than the {LARGEST_BYTES >> 20} MB that are read at once.",
+        f"holds more than the {limits().bytes_at_once >> 20} MB that are read at once.",
         file=path,
         remedy=_SPLIT,
     )

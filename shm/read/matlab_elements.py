@@ -13,7 +13,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from shm.read.limits import LARGEST_BYTES
+from shm.read.limits import limits
 
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -46,7 +46,7 @@ class Element:
             yield struct.pack(f"{self.byte_order}II", self.kind, len(self.packed)) + self.packed
             return
         stream, size, packed = zlib.decompressobj(), 0, self.packed
-        while packed and size <= LARGEST_BYTES:
+        while packed and size <= limits().bytes_at_once:
             piece = stream.decompress(packed, _CHUNK)
             packed = stream.unconsumed_tail
             size += len(piece)
@@ -55,7 +55,7 @@ class Element:
     def refuse_damaged(self, shape: tuple[int, ...], is_text: bool) -> None:
         """Raises ValueError where the values are not what the shape says, or far too many."""
         content = b"".join(self.pieces())
-        if len(content) > LARGEST_BYTES:
+        if len(content) > limits().bytes_at_once:
             raise ValueError("a variable unpacks to more than is read at once")
         values = list(self._parts(content))[3:]
         if len(values) != 1 + self.is_complex:

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from shm.errors import BadInput
 from shm.read.guard import guarded
-from shm.read.limits import LARGEST_BYTES, too_large
+from shm.read.limits import limits, too_large
 
 MOST_MEMBERS = 200
 _MOST_RATIO = 200
@@ -24,7 +24,7 @@ def checked_members(path: Path) -> list[zipfile.ZipInfo]:
     Refused: too many members, paths that lead outside, links, encryption, archives in the archive,
     two members of one name.
     """
-    if path.stat().st_size > LARGEST_BYTES:
+    if path.stat().st_size > limits().bytes_at_once:
         raise too_large(path)
     with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
         found = [member for member in archive.infolist() if not member.is_dir()]

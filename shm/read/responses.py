@@ -11,7 +11,7 @@ from shm.errors import BadInput
 from shm.read import assemble
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import Header
-from shm.read.limits import MOST_VALUES
+from shm.read.limits import limits, refuse_many_samples
 from shm.read.units import ACCELERANCE
 from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
 
@@ -54,9 +54,10 @@ def grid(listed_hz: FloatArray, path: Path) -> tuple[int, FloatArray]:
         raise _uneven(path)
     step = float(listed_hz[-1] - listed_hz[0]) / (len(listed_hz) - 1)
     first = listed_hz[0] / step if step > 0 else NAN
-    if not 0 <= first + _OFF_GRID < MOST_VALUES:
+    if not 0 <= first + _OFF_GRID < limits().values_at_once:
         raise _uneven(path)
     skipped = round(float(first))
+    refuse_many_samples(skipped + len(listed_hz), path)
     step = float(listed_hz[-1]) / (skipped + len(listed_hz) - 1)
     frequency = step * np.arange(skipped + len(listed_hz), dtype=float)
     if not np.abs(listed_hz - frequency[skipped:]).max() < _OFF_GRID * step:

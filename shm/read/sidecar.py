@@ -32,6 +32,7 @@ from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
 from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
+from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
@@ -84,14 +85,24 @@ def document_beside(path: Path) -> dict[str, Any]:
 
 
 def _document(sidecar: Path) -> dict[str, Any]:
+    _refuse_link_outside(sidecar)
     try:
+        refuse_long_header(sidecar.stat().st_size, sidecar)
         return tomllib.loads(sidecar.read_text(encoding="utf-8"))
     except OSError as error:
         raise unreadable(sidecar, error) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise BadInput(
             f"not a readable TOML file: {error}.", file=sidecar, remedy="Correct the sidecar."
         ) from error
+
+
+def _refuse_link_outside(sidecar: Path) -> None:
+    """Raises BadInput for a link to another folder, whose text a refusal would show."""
+    if sidecar.resolve().parent != sidecar.parent.resolve():
+        raise BadInput(
+            "is a link out of its folder.", file=sidecar, remedy="Lay the sidecar itself there."
+        )
 
 
 def _listed(key: str, value: Any, names: Sequence[str], sidecar: Path) -> dict[str, Entry]:

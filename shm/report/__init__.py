@@ -7,6 +7,10 @@ out. Only this room opens matplotlib and jinja2.
 
 from __future__ import annotations
 
+from shm.report.bridge.content import BridgeReport
+from shm.report.bridge.document import bridge_json, pattern_json
+from shm.report.bridge.page import bridge_page
+from shm.report.bridge.text import bridge_text
 from shm.report.content import HangerReport, Interval, TrendRow, trend_row
 from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.document import diagnosis_json
@@ -31,6 +35,7 @@ from shm.report.trial.page import trial_page
 from shm.report.trial.text import trial_text
 
 __all__ = [
+    "BridgeReport",
     "DiagnosisSheet",
     "HangerReport",
     "Illustration",
@@ -40,6 +45,9 @@ __all__ = [
     "TestSheet",
     "TrendRow",
     "advice",
+    "bridge_json",
+    "bridge_page",
+    "bridge_text",
     "diagnosis_figures",
     "diagnosis_json",
     "diagnosis_page",
@@ -47,6 +55,7 @@ __all__ = [
     "html",
     "illustrations",
     "json",
+    "pattern_json",
     "quality_table",
     "status",
     "summary",

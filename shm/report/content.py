@@ -25,6 +25,7 @@ from shm.values import (
     Selection,
 )
 from shm.watch import end_stiffness
+from shm.watch.neighbours import BridgePattern
 
 NORMAL_90 = 1.6448536269514722
 """Half width of the central 90 % of a normal distribution, in standard deviations."""
@@ -94,12 +95,14 @@ class HangerReport:
     """All that a report of one hanger says.
 
     `posterior` and `frequency_response` are those of the latest test, the last of `tests`, which
-    stand oldest first like `trend`. `drifts` are those of the latest test, `alerts` all of the
-    hanger. `lineage` names where the numbers come from: checksums, settings, files. `quality` is
-    that of the latest test, empty where it was not checked; `diagnosis` the latest of its gap.
-    `gap_watch` says in a sentence how the gap has gone since an effect was adopted, `drift_watch`
-    what the sequential test has called since the baseline. `states` are empty where no figure of
-    them is wanted.
+    stand oldest first like `trend`. `drifts` are those of the latest test from the baseline in
+    force, `alerts` all of the hanger; `acknowledged` says by an alert's key who took note of it.
+    `lineage` names where the numbers come from: checksums, settings, files. `quality` is that of
+    the latest test, empty where it was not checked; `diagnosis` the latest of its gap. `gap_watch`
+    says in a sentence how the gap has gone since an effect was adopted, `drift_watch` what the
+    sequential test has called since the baseline, `is_called` whether it has. `states` are empty
+    where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
+    nothing is called.
     """
 
     bridge: str
@@ -113,6 +116,7 @@ class HangerReport:
     selection: Selection | None = None
     drifts: tuple[Drift, ...] = ()
     alerts: tuple[Alert, ...] = ()
+    acknowledged: Mapping[str, str] = field(default_factory=dict)
     frequency_response: FrequencyResponse | None = None
     lineage: Mapping[str, str] = field(default_factory=dict)
     quality: tuple[QualityCheck, ...] = ()
@@ -120,6 +124,8 @@ class HangerReport:
     gap_watch: str = ""
     drift_watch: str = ""
     states: StatesOverTime = NOTHING_WATCHED
+    is_called: bool = False
+    neighbours: BridgePattern | None = None
 
     @property
     def latest(self) -> ModalTest:

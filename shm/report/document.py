@@ -6,10 +6,12 @@ from dataclasses import asdict
 from typing import Any
 
 from shm import documents
+from shm.report.bridge.document import pattern_json
 from shm.report.content import HangerReport
 from shm.report.diagnosis.document import diagnosis_json
 from shm.report.diagnosis.part import diagnosed
 from shm.report.summary import advice, status, summary
+from shm.report.temperatures import temperature_documents
 from shm.values import FrequencyResponse
 
 REPORT_SCHEMA = "shm.report/1"
@@ -31,11 +33,14 @@ def json(data: HangerReport) -> dict[str, Any]:
         "trend": [asdict(row) for row in data.trend],
         "drifts": [documents.drift_document(drift) for drift in data.drifts],
         "alerts": [documents.alert_document(alert) for alert in data.alerts],
+        "acknowledged": dict(data.acknowledged),
         "frequency_response": _response(data.frequency_response),
         "quality": [asdict(check) for check in data.quality],
         "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
+        "temperature_coefficients": temperature_documents(data.states),
+        "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
         "lineage": dict(data.lineage),
         "version": data.version,
         "generated_at": data.generated_at,

@@ -20,7 +20,7 @@ from shm.values import (
 from shm.watch import Watched
 from shm.watch.history import Band, StateHistory
 from shm.watch.state import StateOptions, set_free, states
-from shm.watch.wording import quantity_words
+from shm.watch.wording import group_words, quantity_words, suspected_groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +115,20 @@ def _over_time(
 
 
 def _called(change: Change) -> CalledChange:
-    first = change.moved[0]
+    return CalledChange(change.began_after, change.began_by, called_words(change))
+
+
+def called_words(change: Change) -> str:
+    """`sudden: tension -6.3 %`; of a stiffness how many times what it was."""
     kind = "sudden" if change.sudden > 0.5 else "slow"
-    what = first.quantity.replace("_", " ")
+    groups = suspected_groups(change)
+    if not groups:
+        return f"{kind}: not known what"
+    first = groups[0][0]
     size = (
         f"{100 * first.shift_mean:+.1f} %"
         if first.quantity == TENSION
-        else f"{first.shift_mean:+.2f} decades"
+        else f"{10**first.shift_mean:.2f} times"
     )
-    return CalledChange(change.began_after, change.began_by, f"{kind}: {what} {size}")
+    doubt = " (or else)" if len(groups) > 1 else ""
+    return f"{kind}: {group_words(groups[0])} {size}{doubt}"

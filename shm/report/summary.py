@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from enum import Enum
 
 import numpy as np
 
 from shm.report import words
 from shm.report.content import HangerReport, Interval
-from shm.values import Drift, PredictedFrequency
+from shm.report.shifts import shift_cells, threshold_cell
+from shm.values import TENSION, Drift, Hanger, PredictedFrequency
 
 _CONVERGED_R_HAT = 1.1
 _WATCH_PROBABILITY = 0.5
@@ -25,13 +27,25 @@ class Status(Enum):
 
 
 def status(data: HangerReport) -> Status:
-    """The state that the drifts of the latest test give."""
-    highest = max((drift.probability for drift in data.drifts), default=math.nan)
-    if highest >= data.hanger.thresholds.alert_probability:
+    """The state that the watch gives."""
+    return status_of(
+        data.drifts,
+        data.hanger,
+        is_first=data.baseline_tension_n is None,
+        is_called=data.is_called,
+    )
+
+
+def status_of(
+    drifts: Sequence[Drift], hanger: Hanger, *, is_first: bool, is_called: bool
+) -> Status:
+    """The state that the drifts of the latest test give, and whether a change was called."""
+    highest = max((drift.probability for drift in drifts), default=math.nan)
+    if highest >= hanger.thresholds.alert_probability:
         return Status.ALERT
-    if highest >= _WATCH_PROBABILITY:
+    if highest >= _WATCH_PROBABILITY or is_called:
         return Status.WATCH
-    return Status.FIRST if data.baseline_tension_n is None else Status.STEADY
+    return Status.FIRST if is_first else Status.STEADY
 
 
 def summary(data: HangerReport) -> str:
@@ -41,6 +55,7 @@ def summary(data: HangerReport) -> str:
         _against_nominal(data),
         _against_baseline(data),
         _change(data),
+        _over_the_bridge(data),
         _model(data),
         *advice(data),
     )
@@ -122,25 +137,22 @@ def _change(data: HangerReport) -> str:
     return (
         f"No quantity has surely moved beyond its threshold: the likeliest is "
         f"{words.quantity(top.quantity)}, with probability {words.probability(top.probability)} "
-        f"of a shift beyond {threshold(top)}."
+        f"of a shift beyond {threshold_cell(top)}."
     )
+
+
+def _over_the_bridge(data: HangerReport) -> str:
+    return f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else ""
 
 
 def _shift(drift: Drift) -> str:
     verb = "risen" if drift.shift_mean > 0 else "fallen"
-    amount = Interval.normal(abs(drift.shift_mean), drift.shift_sd)
-    size = "" if drift.quantity == "tension" else f" by {words.with_interval(amount, 'decades')}"
+    _, shift, span, threshold, _ = shift_cells(drift)
+    size = "" if drift.quantity == TENSION else f" to {shift} what it was (90 % interval {span})"
     return (
         f"The {words.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
-        f"beyond its threshold of {threshold(drift)} is {words.probability(drift.probability)}."
+        f"beyond its threshold of {threshold} is {words.probability(drift.probability)}."
     )
-
-
-def threshold(drift: Drift) -> str:
-    """The threshold with its unit."""
-    if drift.quantity == "tension":
-        return f"{100 * drift.threshold:.3g} %"
-    return f"{drift.threshold:.3g} decades"
 
 
 def _model(data: HangerReport) -> str:
@@ -176,6 +188,12 @@ def _urgent(data: HangerReport) -> str:
             return (
                 "Repeat the hammer test within days; if the shift stays, inspect both ends of "
                 "the hanger and test its neighbours."
+            )
+        case Status.WATCH if data.is_called:
+            return (
+                "A change was called, though none is surely beyond its threshold: look after what "
+                "may have moved, and set a new baseline once it is explained (`shm drift "
+                "rebaseline`)."
             )
         case Status.WATCH:
             return "Test this hanger again soon: a shift is likelier than not."

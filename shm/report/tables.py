@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from shm.report import words
+from shm.report.bridge.tables import shift_table
 from shm.report.content import HangerReport, Interval, TrendRow
 from shm.report.quality import quality_table
-from shm.report.summary import tension_change, threshold
+from shm.report.shifts import shift_cells
+from shm.report.summary import tension_change
 from shm.report.table import Table
-from shm.values import Alert, Drift, Mode, Posterior, PredictedFrequency
+from shm.report.temperatures import temperature_table
+from shm.values import Alert, Mode, Posterior, PredictedFrequency
 
 
 def tables(data: HangerReport) -> tuple[Table, ...]:
@@ -40,31 +44,34 @@ def _tension_row(label: str, tension_n: Interval, nominal_n: float) -> tuple[str
     return (label, words.mean(kilonewtons), words.span(kilonewtons), f"{share:.1f}")
 
 
-_UNMOVED = 0.01
-
-
 def drift(data: HangerReport) -> Table:
     return Table(
         "Shift since the baseline",
         ("quantity", "shift", "90 % interval", "threshold", "probability beyond it"),
-        tuple(_drift_row(row) for row in data.drifts),
-        note="Tension in percent of the baseline, stiffness in decades (factors of ten), the swing "
-        f"with the temperature taken out. {data.drift_watch}".strip(),
+        tuple(shift_cells(row) for row in data.drifts),
+        note="If there is a shift at all: tension in percent, stiffness as how many times what it "
+        f"was, the swing with the temperature taken out. {data.drift_watch}".strip(),
     )
 
 
-def _drift_row(row: Drift) -> tuple[str, ...]:
-    scale, unit = (100.0, "%") if row.quantity == "tension" else (1.0, "decades")
-    shift = Interval.normal(row.shift_mean, row.shift_sd).scaled(scale)
-    # Nearly all of the probability is that nothing has changed: a spread about 0 has no width.
-    unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
-    return (
-        words.quantity(row.quantity),
-        "no change seen" if unmoved else f"{words.mean(shift, True)} {unit}",
-        "" if unmoved else f"{words.span(shift, True)} {unit}",
-        threshold(row),
-        words.probability(row.probability),
-    )
+def temperatures(data: HangerReport) -> Table:
+    return temperature_table(data.states)
+
+
+_BESIDE = 2
+
+
+def neighbours(data: HangerReport) -> Table:
+    """The hanger and two to either side; empty where nothing is called."""
+    title, pattern = "The hangers beside it", data.neighbours
+    rows = pattern.rows if pattern else ()
+    place = next((row.place for row in rows if row.hanger == data.hanger.id), None)
+    if pattern is None or place is None:
+        return Table(title, (), ())
+    near = tuple(row for row in rows if abs(row.place - place) <= _BESIDE)
+    made = shift_table(replace(pattern, rows=near, not_compared=()))
+    told = " ".join((pattern.sentence, *pattern.remarks))
+    return replace(made, title=title, note=f"{told} The whole bridge: shm report --bridge.")
 
 
 def frequencies(data: HangerReport) -> Table:
@@ -168,13 +175,13 @@ def _history_row(row: TrendRow) -> tuple[str, ...]:
 def alerts(data: HangerReport) -> Table:
     return Table(
         "Alerts, latest first",
-        ("time", "test", "message"),
-        tuple(_alert_row(row) for row in reversed(data.alerts)),
+        ("time", "test", "message", "acknowledged"),
+        tuple(_alert_row(row, data.acknowledged) for row in reversed(data.alerts)),
     )
 
 
-def _alert_row(row: Alert) -> tuple[str, ...]:
-    return (words.moment(row.time), row.test, row.message)
+def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
+    return (words.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
 
 
 def origin(data: HangerReport) -> Table:
@@ -209,6 +216,8 @@ _TABLES: tuple[Callable[[HangerReport], Table], ...] = (
     tension,
     drift,
     alerts,
+    neighbours,
+    temperatures,
     frequencies,
     quality,
     models,

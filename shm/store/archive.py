@@ -95,7 +95,8 @@ class Archive:
         """The file under the name it came with, its sidecar beside it, while the context lasts."""
         if file.archived_as is None or not self.holds(file):
             raise StoreError(
-                f"{file.file_name} is not in the archive.", remedy="Drop the file again."
+                f"{file.file_name} is not in the archive.",
+                remedy="Fetch a copy with `shm archive fetch`, or drop the file again.",
             )
         views = self.folder / ".open"
         views.mkdir(exist_ok=True)

@@ -190,7 +190,8 @@ def _change(entry: Mapping[str, Any]) -> Change:
 
 def _moved(entry: Mapping[str, Any]) -> Moved:
     numbers = {name: _number(entry[name]) for name in _MOVED_NUMBERS}
-    return Moved(**{**entry, **numbers, "alike": tuple(entry["alike"])})
+    others = {name: tuple(entry[name]) for name in ("alike", "together") if name in entry}
+    return Moved(**{**entry, **numbers, **others})
 
 
 def _drift(entry: Mapping[str, Any]) -> Drift:

@@ -1,60 +1,70 @@
-"""The engine, its transactions, and what its errors mean."""
+"""The engine, its transactions, and how the two kinds of database keep the same promises."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
-from shm.errors import StoreBusy, StoreError
+from shm.errors import StoreError
+from shm.store.faults import translated
+from shm.store.location import shown, url_of
 
 BUSY_SECONDS = 10.0
 
+# First keys of PostgreSQL's advisory locks; the second is the schema the tables are in.
+WRITING_LOCK = 0x73686D01
+ACTIVE_LOCK = 0x73686D02
 
-@dataclass(frozen=True)
-class Fault:
-    """A fragment of a database's message, what it means, and when trying again may help."""
+_READING: Mapping[str, Mapping[str, Any]] = {
+    "sqlite": {"shm_reading": True},
+    "postgresql": {
+        "shm_reading": True,
+        "isolation_level": "REPEATABLE READ",
+        "postgresql_readonly": True,
+    },
+}
+# A machine that vanished is noticed within some 11 s, by us and (see below) by the server.
+_CONNECTING: Mapping[str, Any] = {
+    "application_name": "shm",
+    "connect_timeout": 10,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    "tcp_user_timeout": 11_000,
+}
+_NOTICING = """
+    SET tcp_keepalives_idle = 5; SET tcp_keepalives_interval = 2; SET tcp_keepalives_count = 3;
+    SET tcp_user_timeout = 11000; SET client_min_messages = warning
+"""
 
-    fragment: str
-    message: str
-    remedy: str
-    retry_after_s: float | None
-    error: type[StoreError] = StoreError
 
-
-FAULTS = (
-    Fault("is locked", "is held by another process", "Try again.", 1.0, StoreBusy),
-    Fault("disk is full", "cannot grow: the disk is full", "Free some space.", 60.0),
-    Fault("readonly", "cannot be written", "Give this user write access to it.", 60.0),
-    Fault("disk i/o", "cannot be read or written", "Check the disk.", 60.0),
-    Fault("unable to open", "cannot be opened", "Check its path and permissions.", None),
-    Fault("not a database", "is not a database", "Restore it from a backup.", None),
-    Fault("malformed", "is damaged", "Restore it from a backup.", None),
-)
-
-
-def make_engine(location: str | Path) -> Engine:
-    """The engine of a database file or URL; SQLite in the manner the daemon needs it.
-
-    Raises StoreError where no driver for the URL is installed.
-    """
-    url = str(location) if "://" in str(location) else f"sqlite:///{location}"
+def make_engine(location: str | Path, **options: Any) -> Engine:
+    """The engine of a database file or URL; raises StoreError where its driver is missing."""
+    url = url_of(location)
     try:
-        engine = sa.create_engine(url)
-    except (ImportError, sa.exc.ArgumentError) as error:
-        scheme = url.partition("://")[0]
+        engine = sa.create_engine(url, **_options(url), **options)
+    except ImportError as error:
         raise StoreError(
-            f"no driver for a store of kind {scheme}: {error}.", remedy="Use a file name."
+            "a store in PostgreSQL needs psycopg, which is not installed.",
+            remedy="Install it with `pip install shm[postgres]`.",
         ) from error
-    if engine.dialect.name == "sqlite":
-        sa.event.listen(engine, "connect", _configure_sqlite)
-        sa.event.listen(engine, "begin", _begin_sqlite)
+    configure, begin = _EVENTS[engine.dialect.name]
+    sa.event.listen(engine, "connect", configure)
+    sa.event.listen(engine, "begin", begin)
     return engine
+
+
+def _options(url: sa.URL) -> dict[str, Any]:
+    if url.get_backend_name() != "postgresql":
+        return {}
+    given = {name: value for name, value in _CONNECTING.items() if name not in url.query}
+    # Statements prepared by a server break when tables change, and behind connection poolers.
+    return {"pool_pre_ping": True, "connect_args": {**given, "prepare_threshold": None}}
 
 
 def _configure_sqlite(connection: Any, _record: Any) -> None:
@@ -67,29 +77,50 @@ def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.execute("PRAGMA synchronous = FULL")
 
 
+def _configure_postgresql(connection: Any, _record: Any) -> None:
+    connection.autocommit = True
+    connection.execute(_NOTICING)
+    connection.autocommit = False
+
+
+def _is_reading(connection: Connection) -> bool:
+    return bool(connection.get_execution_options().get("shm_reading", False))
+
+
 def _begin_sqlite(connection: Connection) -> None:
     # A deferred transaction that turns to writing fails at once under contention.
-    reading = connection.get_execution_options().get("shm_reading", False)
-    connection.exec_driver_sql("BEGIN" if reading else "BEGIN IMMEDIATE")
+    connection.exec_driver_sql("BEGIN" if _is_reading(connection) else "BEGIN IMMEDIATE")
+
+
+def _begin_postgresql(connection: Connection) -> None:
+    # Writers look before they write, so they come one after the other, as in SQLite; each statement
+    # then sees what the writer before has committed (READ COMMITTED, the server's default).
+    if not _is_reading(connection):
+        connection.exec_driver_sql(
+            f"SET LOCAL lock_timeout = {BUSY_SECONDS * 1000:.0f}; "
+            f"SELECT pg_advisory_xact_lock({WRITING_LOCK}, hashtext(current_schema()))",
+            execution_options={"no_parameters": True},
+        )
+
+
+_EVENTS = {
+    "sqlite": (_configure_sqlite, _begin_sqlite),
+    "postgresql": (_configure_postgresql, _begin_postgresql),
+}
 
 
 @contextmanager
-def translated(location: str) -> Iterator[None]:
-    """Turns the database's own errors into ours, with remedy and time to wait."""
-    try:
-        yield
-    except sa.exc.SQLAlchemyError as error:
-        cause = str(getattr(error, "orig", None) or error)
-        fault = next((f for f in FAULTS if f.fragment in cause.lower()), None)
-        if fault is None:
-            raise StoreError(
-                f"the store {location} refused a step: {cause}", remedy="Run `shm doctor`."
-            ) from error
-        raise fault.error(
-            f"the store {location} {fault.message} ({cause}).",
-            remedy=fault.remedy,
-            retry_after_s=fault.retry_after_s,
-        ) from error
+def writing(engine: Engine) -> Iterator[Connection]:
+    """One transaction, all or nothing, one writer at a time; raises StoreBusy or StoreError."""
+    with translated(shown(engine.url)), engine.begin() as connection:
+        yield connection
+
+
+@contextmanager
+def reading(engine: Engine) -> Iterator[Connection]:
+    """One consistent view that holds up nobody; raises StoreError."""
+    with translated(shown(engine.url)), engine.connect() as connection:
+        yield connection.execution_options(**_READING[engine.dialect.name])
 
 
 def insert(connection: Connection, table: sa.Table, values: Mapping[str, Any]) -> int:
@@ -103,7 +134,7 @@ class Database:
 
     def __init__(self, engine: Engine):
         self.engine = engine
-        self.location = engine.url.render_as_string(hide_password=True)
+        self.location = shown(engine.url)
 
     def close(self) -> None:
         self.engine.dispose()
@@ -111,11 +142,11 @@ class Database:
     @contextmanager
     def writing(self) -> Iterator[Connection]:
         """One transaction, all or nothing; raises StoreBusy or StoreError."""
-        with translated(self.location), self.engine.begin() as connection:
+        with writing(self.engine) as connection:
             yield connection
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
         """One consistent view that holds up nobody; raises StoreError."""
-        with translated(self.location), self.engine.connect() as connection:
-            yield connection.execution_options(shm_reading=True)
+        with reading(self.engine) as connection:
+            yield connection

@@ -12,6 +12,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere
 from shm.store.database import Database, insert
 from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
+from shm.store.stepping import ARCHIVED, write_step
 from shm.store.tables import events, recordings, tests
 
 
@@ -28,7 +29,7 @@ class Files(Database):
             else:
                 row_id = known.id
                 _notice(connection, known, file, outcome, at)
-            return Receipt(outcome, _recording(_by_id(connection, row_id)))
+            return Receipt(outcome, recording_from(_by_id(connection, row_id)))
 
     def refuse(
         self,
@@ -48,19 +49,21 @@ class Files(Database):
             connection.execute(
                 sa.update(tests).where(tests.c.id.in_(test_ids)).values(stage=Stage.REFUSED)
             )
+            for test_id in (None, *test_ids):
+                write_step(connection, recording_id, Stage.REFUSED, at, test_id)
             message = str(reason.get("message", ""))
-            _write_event(connection, at, "refused", row.id, row.file_name, message)
+            write_event(connection, at, "refused", row.id, row.file_name, message)
 
     def recording(self, recording_id: int) -> StoredRecording:
         """Raises NothingThere."""
         with self.reading() as connection:
-            return _recording(_by_id(connection, recording_id))
+            return recording_from(_by_id(connection, recording_id))
 
     def recording_of(self, sha256: str) -> StoredRecording | None:
         """The recording with these bytes, if it was received."""
         with self.reading() as connection:
             row = _by_checksum(connection, sha256)
-        return None if row is None else _recording(row)
+        return None if row is None else recording_from(row)
 
     def recordings(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
         """All recordings, or those at one stage, as they came in."""
@@ -85,7 +88,7 @@ class Files(Database):
         return {stage: counted.get(stage, 0) for stage in Stage}
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
-        """What was noticed on the way, oldest first; `kind` is duplicate, reopened or refused."""
+        """What was noticed on the way, oldest first; `kind` as duplicate or refused."""
         query = sa.select(events).order_by(events.c.id)
         if kind is not None:
             query = query.where(events.c.kind == kind)
@@ -95,7 +98,7 @@ class Files(Database):
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
         with self.reading() as connection:
-            return tuple(_recording(row) for row in connection.execute(query))
+            return tuple(recording_from(row) for row in connection.execute(query))
 
 
 def _by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
@@ -111,7 +114,7 @@ def _by_id(connection: Connection, recording_id: int) -> Row[Any]:
     return row
 
 
-def _recording(row: Row[Any]) -> StoredRecording:
+def recording_from(row: Row[Any]) -> StoredRecording:
     file = ReceivedFile(
         row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
     )
@@ -128,7 +131,10 @@ def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:
 
 def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
     values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
-    return insert(connection, recordings, values)
+    row_id = insert(connection, recordings, values)
+    write_step(connection, row_id, ARCHIVED, at)
+    write_step(connection, row_id, Stage.RECEIVED, at)
+    return row_id
 
 
 def _notice(
@@ -138,26 +144,37 @@ def _notice(
         return
     message = "dropped again after its refusal; tried again."
     if outcome is Outcome.REOPENED:
-        _reopen(connection, known.id, file)
+        _reopen(connection, known.id, file, at)
     else:
         message = f"the same file as {known.file_name}; not stored twice."
         if file.sidecar_as not in (None, known.sidecar_as):
             message += " Its sidecar differs: the first one holds."
-    _write_event(connection, at, outcome, known.id, file.file_name, message)
+    write_event(connection, at, outcome, known.id, file.file_name, message)
 
 
-def _reopen(connection: Connection, recording_id: int, file: ReceivedFile) -> None:
-    """A refused file starts anew; results it had before the refusal stay."""
+def _reopen(connection: Connection, recording_id: int, file: ReceivedFile, at: datetime) -> None:
+    """A refused file starts anew; results it had before the refusal stay in force."""
     refused = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.REFUSED)
-    connection.execute(sa.delete(tests).where(refused))
+    connection.execute(sa.update(tests).where(refused, in_force(tests)).values(superseded_at=at))
     connection.execute(
-        sa.update(recordings)
-        .where(recordings.c.id == recording_id)
-        .values({**vars(file), "stage": Stage.RECEIVED, "reason": None})
+        sa.update(recordings).where(recordings.c.id == recording_id).values(**vars(file))
     )
+    begin_again(connection, recording_id, at)
 
 
-def _write_event(
+def begin_again(connection: Connection, recording_id: int, at: datetime) -> None:
+    """A recording waits to be identified as if it had just come in."""
+    by_id = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(by_id.values(stage=Stage.RECEIVED, reason=None))
+    write_step(connection, recording_id, Stage.RECEIVED, at)
+
+
+def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
+    """What no later run has replaced."""
+    return table.c.superseded_at.is_(None)
+
+
+def write_event(
     connection: Connection,
     at: datetime,
     kind: str,

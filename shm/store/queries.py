@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -18,6 +19,7 @@ from shm.store.blobs import (
     unpack_response,
 )
 from shm.store.database import Database
+from shm.store.files import in_force
 from shm.store.rows import (
     Baseline,
     Lineage,
@@ -61,19 +63,67 @@ class WaitingTest:
     recording_id: int
     hanger: int
     stage: Stage
+    name: str
+
+
+@dataclass(frozen=True)
+class WatchedName:
+    """A watched test, without its contents."""
+
+    id: int
+    name: str
+    time: datetime
 
 
 class Queries(Database):
     """The part of the store that answers."""
 
-    def waiting_tests(self) -> tuple[WaitingTest, ...]:
-        """Tests identified or updated, not yet watched: by hanger, then by time."""
-        columns = (tests.c.id, tests.c.recording_id, tests.c.hanger, tests.c.stage)
-        query = sa.select(*columns).where(tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]))
-        ordered = query.order_by(tests.c.hanger, tests.c.time, tests.c.id)
+    def waiting_tests(
+        self, limit: int | None = None, excluding: Collection[int] = ()
+    ) -> tuple[WaitingTest, ...]:
+        """Tests identified or updated, not yet watched: by hanger, then by time.
+
+        With a `limit` no more than the first so many of each hanger and stage; those of the
+        recordings `excluding` are left out.
+        """
+        names = ("id", "recording_id", "hanger", "stage", "name", "time")
+        groups, by_time = (tests.c.hanger, tests.c.stage), (tests.c.time, tests.c.id)
+        place = sa.func.row_number().over(partition_by=groups, order_by=by_time).label("place")
+        on_the_way = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED])
+        query = sa.select(*(tests.c[name] for name in names)).add_columns(place)
+        query = query.where(on_the_way, in_force(tests), tests.c.recording_id.not_in(excluding))
+        found = query.subquery()
+        chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
+        if limit is not None:
+            chosen = chosen.where(found.c.place <= limit)
         with self.reading() as connection:
-            rows = connection.execute(ordered).all()
-        return tuple(WaitingTest(r.id, r.recording_id, r.hanger, Stage(r.stage)) for r in rows)
+            rows = connection.execute(chosen).all()
+        return tuple(
+            WaitingTest(r.id, r.recording_id, r.hanger, Stage(r.stage), r.name) for r in rows
+        )
+
+    def watched_since(
+        self, baseline: Baseline, before: StoredTest | None = None
+    ) -> tuple[WatchedName, ...]:
+        """The tests that were watched since a baseline, or those of them `before` a test, by time.
+
+        Tests that were watched against an earlier baseline count, but for those before a day since
+        which the hanger is compared anew.
+        """
+        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(
+            tests.c.hanger == baseline.hanger,
+            tests.c.stage == Stage.WATCHED,
+            tests.c.name.not_in(baseline.posterior.tests),
+            in_force(tests),
+        )
+        if baseline.since is not None:
+            query = query.where(tests.c.time >= baseline.since)
+        if before is not None:
+            at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
+            query = query.where((tests.c.time < before.time) | at_once)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(tests.c.time, tests.c.id)).all()
+        return tuple(WatchedName(row.id, row.name, row.time) for row in rows)
 
     def test(self, test_id: int) -> StoredTest:
         """One test by its row number; raises NothingThere."""
@@ -84,10 +134,19 @@ class Queries(Database):
 
     def tests(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
         """The tests of a hanger, or of all, by time; those refused are left out."""
-        query = _tests.where(tests.c.stage != Stage.REFUSED)
+        query = _tests.where(tests.c.stage != Stage.REFUSED, in_force(tests))
         if hanger is not None:
             query = query.where(tests.c.hanger == hanger)
         return self._tests(query.order_by(tests.c.time, tests.c.id))
+
+    def tests_of(self, baseline: Baseline) -> tuple[StoredTest, ...]:
+        """The tests from which a baseline was made, as they were then, by time."""
+        made = (
+            sa.select(posterior_tests.c.test_id)
+            .join(baselines, baselines.c.posterior_id == posterior_tests.c.posterior_id)
+            .where(baselines.c.id == baseline.id)
+        )
+        return self._tests(_tests.where(tests.c.id.in_(made)).order_by(tests.c.time, tests.c.id))
 
     def frequency_response(self, test: StoredTest) -> FrequencyResponse | None:
         """What the modes of a test were identified from; None where a file gave the modes."""
@@ -102,20 +161,16 @@ class Queries(Database):
 
     def posteriors(self, hanger: int) -> tuple[StoredPosterior, ...]:
         """The posteriors of a hanger in its selected class, by time."""
-        query = sa.select(posteriors).where(
-            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden)
-        )
+        query = _shown(hanger)
         with self.reading() as connection:
             rows = connection.execute(query.order_by(posteriors.c.time, posteriors.c.id)).all()
         return tuple(_stored_posterior(row) for row in rows)
 
     def posterior(self, hanger: int, test: str | None = None) -> Posterior:
         """The latest posterior of a hanger, or that of one test; raises NothingThere."""
-        query = sa.select(posteriors).where(
-            posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden)
-        )
+        query = _shown(hanger)
         if test is not None:
-            query = query.where(posteriors.c.id.in_(_of_test(test)))
+            query = query.where(posteriors.c.id.in_(_of_test(hanger, test)))
         latest = query.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
         with self.reading() as connection:
             row = connection.execute(latest).one_or_none()
@@ -132,7 +187,8 @@ class Queries(Database):
         """Each test of a hanger that has a posterior, with it, by time."""
         newest = (
             sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
-            .where(posterior_tests.c.posterior_id.not_in(_hidden))
+            .join(posteriors)
+            .where(posteriors.c.id.not_in(_hidden), in_force(posteriors))
             .group_by(posterior_tests.c.test_id)
         )
         stored = {row.id: row.posterior for row in self.posteriors(hanger)}
@@ -154,7 +210,9 @@ class Queries(Database):
                 sa.select(posteriors, selection_entries.c.probability)
                 .join(selection_entries)
                 .where(selection_entries.c.selection_id == row.id)
-                .order_by(selection_entries.c.probability.desc(), selection_entries.c.rank)
+                .order_by(
+                    selection_entries.c.probability.desc().nulls_last(), selection_entries.c.rank
+                )
             )
             ranked = connection.execute(entries).all()
         selection = Selection(
@@ -224,12 +282,19 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
     return query.where(_in_force(hanger)).order_by(baselines.c.id.desc()).limit(1)
 
 
-def _of_test(name: str) -> sa.Select[Any]:
+def _shown(hanger: int) -> sa.Select[Any]:
+    return sa.select(posteriors).where(
+        posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden), in_force(posteriors)
+    )
+
+
+def _of_test(hanger: int, name: str) -> sa.Select[Any]:
     joined = posterior_tests.join(tests)
-    return sa.select(posterior_tests.c.posterior_id).select_from(joined).where(tests.c.name == name)
+    query = sa.select(posterior_tests.c.posterior_id).select_from(joined)
+    return query.where(tests.c.hanger == hanger, tests.c.name == name, in_force(tests))
 
 
-def _lineage(row: Row[Any]) -> Lineage:
+def lineage_from(row: Row[Any]) -> Lineage:
     return Lineage(row.input_sha256, row.settings_sha256, row.version)
 
 
@@ -243,7 +308,7 @@ def _test(row: Row[Any]) -> StoredTest:
         stage=Stage(row.stage),
         test=test_from_document(row.document, row.hanger),
         notes=tuple(row.notes),
-        lineage=_lineage(row),
+        lineage=lineage_from(row),
         quality=tuple(quality_from(entry) for entry in row.quality or ()),
         set_aside=tuple(foreign_from(entry) for entry in row.set_aside or ()),
     )
@@ -254,4 +319,4 @@ def _posterior(row: Row[Any]) -> Posterior:
 
 
 def _stored_posterior(row: Row[Any]) -> StoredPosterior:
-    return StoredPosterior(row.id, _posterior(row), row.time, _lineage(row))
+    return StoredPosterior(row.id, _posterior(row), row.time, lineage_from(row))

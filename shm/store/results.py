@@ -8,12 +8,14 @@ from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection
+from sqlalchemy.engine import Connection, Row
 
 from shm.documents import posterior_document, test_document
 from shm.store.blobs import pack_response, pack_samples
 from shm.store.database import Database, insert
+from shm.store.files import in_force
 from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredTest
+from shm.store.stepping import write_step
 from shm.store.tables import (
     baselines,
     posterior_tests,
@@ -46,13 +48,13 @@ class Results(Database):
                 return
             kept = _positions(connection, recording_id)
             for item in (item for item in found if item.position not in kept):
-                values = _test_values(connection, item, recording.sha256, recording.received_at)
-                row = {**values, **vars(lineage), "recording_id": recording_id}
-                insert(connection, tests, {**row, "identified_at": at})
+                values = {**_test_values(connection, item, recording), **vars(lineage)}
+                test_id = insert(connection, tests, {**values, "identified_at": at})
+                write_step(connection, recording_id, Stage.IDENTIFIED, at, test_id)
             hanger = found[0].test.hanger
             by_id = recordings.c.id == recording_id
             connection.execute(sa.update(recordings).where(by_id).values(hanger=hanger))
-            _advance_recordings(connection, [recording_id])
+            advance_recordings(connection, [recording_id], at)
 
     def selected(
         self,
@@ -74,58 +76,71 @@ class Results(Database):
             insert_selection(connection, hanger, selection.selected.model, probable, at)
             why = f"the first {len(chosen)} test(s)"
             insert_baseline(connection, hanger, ids[0], "shm", why, at)
-            move(connection, chosen, Stage.WATCHED)
+            move(connection, chosen, Stage.WATCHED, at)
 
     def updated(
-        self, test: StoredTest, posterior: Posterior, lineage: Lineage, at: datetime
+        self,
+        test: StoredTest,
+        posterior: Posterior,
+        lineage: Lineage,
+        at: datetime,
+        *,
+        to_watch: bool = True,
     ) -> None:
-        """Keeps the posterior of one test; does nothing where another process was first."""
+        """Keeps the posterior of one test; does nothing where another process was first.
+
+        `to_watch` is false of a test from which the baseline itself was made.
+        """
         with self.writing() as connection:
             if all_at(connection, [test], Stage.IDENTIFIED):
                 insert_posterior(connection, test.hanger, posterior, [test], lineage, at)
-                move(connection, [test], Stage.UPDATED)
+                move(connection, [test], Stage.UPDATED if to_watch else Stage.WATCHED, at)
 
 
-def move(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> None:
+def move(connection: Connection, chosen: Iterable[StoredTest], stage: Stage, at: datetime) -> None:
     """Brings tests to a stage, and their recordings along."""
     chosen = list(chosen)
     ids = [test.id for test in chosen]
     connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=stage))
-    _advance_recordings(connection, {test.recording_id for test in chosen})
+    for test in chosen:
+        write_step(connection, test.recording_id, stage, at, test.id)
+    advance_recordings(connection, {test.recording_id for test in chosen}, at)
 
 
-def _advance_recordings(connection: Connection, ids: Collection[int]) -> None:
+def advance_recordings(connection: Connection, ids: Collection[int], at: datetime) -> None:
     """A recording stands where the least advanced of its tests stands."""
     for recording_id in ids:
-        query = sa.select(tests.c.stage).where(tests.c.recording_id == recording_id)
-        least = min(
-            _PROGRESS.index(Stage(stage))
-            for stage in connection.scalars(query)
-            if stage != Stage.REFUSED
+        query = sa.select(tests.c.stage).where(
+            tests.c.recording_id == recording_id, in_force(tests), tests.c.stage != Stage.REFUSED
         )
+        least = min(_PROGRESS.index(Stage(stage)) for stage in connection.scalars(query))
         stage = Stage.DONE if _PROGRESS[least] is Stage.WATCHED else _PROGRESS[least]
-        connection.execute(
+        moved = connection.execute(
             sa.update(recordings)
-            .where(recordings.c.id == recording_id, recordings.c.stage != Stage.REFUSED)
+            .where(recordings.c.id == recording_id)
+            .where(recordings.c.stage.not_in([Stage.REFUSED, stage]))
             .values(stage=stage)
         )
+        if moved.rowcount:
+            write_step(connection, recording_id, stage, at)
 
 
 def _positions(connection: Connection, recording_id: int) -> set[int]:
-    query = sa.select(tests.c.position).where(tests.c.recording_id == recording_id)
+    query = sa.select(tests.c.position).where(tests.c.recording_id == recording_id, in_force(tests))
     return set(connection.scalars(query))
 
 
 def _test_values(
-    connection: Connection, item: IdentifiedTest, sha256: str, received_at: datetime
+    connection: Connection, item: IdentifiedTest, recording: Row[Any]
 ) -> dict[str, Any]:
-    name = _free_name(connection, item, sha256)
+    name = _free_name(connection, item, recording)
     response = item.frequency_response
     return {
+        "recording_id": recording.id,
         "position": item.position,
         "name": name,
         "hanger": item.test.hanger,
-        "time": item.test.time or received_at,
+        "time": item.test.time or recording.received_at,
         "stage": Stage.IDENTIFIED,
         "document": test_document(replace(item.test, id=name)),
         "frequency_response": None if response is None else pack_response(response),
@@ -135,19 +150,27 @@ def _test_values(
     }
 
 
-def _free_name(connection: Connection, item: IdentifiedTest, sha256: str) -> str:
-    """The test's own name or, where its hanger has one such, that name and its file's checksum."""
-    query = sa.select(tests.c.id).where(
-        tests.c.hanger == item.test.hanger, tests.c.name == item.test.id
-    )
-    taken = connection.execute(query).first() is not None
-    return f"{item.test.id}-{sha256[:8]}-{item.position}" if taken else item.test.id
+def _free_name(connection: Connection, item: IdentifiedTest, recording: Row[Any]) -> str:
+    """The test's own name or, where its hanger has one such, that name and its file's checksum.
+
+    A test identified again keeps the one of these that it had.
+    """
+    own, plain = f"{item.test.id}-{recording.sha256[:8]}-{item.position}", item.test.id
+    query = sa.select(tests.c.name).where(tests.c.hanger == item.test.hanger)
+    here = (tests.c.recording_id == recording.id) & (tests.c.position == item.position)
+    former = connection.scalar(query.where(here).order_by(tests.c.id.desc()).limit(1))
+    taken = query.where(tests.c.name == plain, in_force(tests))
+    free = former != own and connection.execute(taken).first() is None
+    return plain if free else own
 
 
 def all_at(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -> bool:
-    """Whether tests still stand at a stage: another process may have been first."""
-    query = sa.select(tests.c.stage).where(tests.c.id.in_([test.id for test in chosen]))
-    return all(found == stage for found in connection.scalars(query))
+    """Whether tests are in force and still at a stage: another process may have been first."""
+    query = sa.select(tests.c.stage, tests.c.superseded_at).where(
+        tests.c.id.in_([test.id for test in chosen])
+    )
+    rows = connection.execute(query).all()
+    return all(row.stage == stage and row.superseded_at is None for row in rows)
 
 
 def _has(connection: Connection, hanger: int) -> bool:

@@ -235,6 +235,15 @@ class StoredWatch:
 
 
 @dataclass(frozen=True)
+class KeptWatch:
+    """What a watch goes on from: bytes of its own, made with what `key` tells."""
+
+    key: str
+    last_test_time: datetime
+    content: bytes
+
+
+@dataclass(frozen=True)
 class Acknowledgement:
     """Who has taken note of an alert, when, and what they say to it."""
 
@@ -266,6 +275,60 @@ class Delivery:
     next_attempt_at: datetime
     last_error: str = ""
     ended_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage that a recording or, where one is named, a test of it has reached.
+
+    `version` is that of the shm that brought it there; None where it was not noted.
+    """
+
+    stage: str
+    at: datetime
+    version: str | None
+    test_id: int | None = None
+    test: str | None = None
+
+
+@dataclass(frozen=True)
+class FormerPosterior:
+    """A posterior of one test, in force or superseded, without its samples."""
+
+    id: int
+    model: str
+    updated_at: datetime
+    superseded_at: datetime | None
+    lineage: Lineage
+
+
+@dataclass(frozen=True)
+class FormerTest:
+    """One identification of a test, in force or superseded, and the posteriors made from it."""
+
+    id: int
+    recording_id: int
+    name: str
+    stage: Stage
+    identified_at: datetime
+    superseded_at: datetime | None
+    lineage: Lineage
+    posteriors: tuple[FormerPosterior, ...]
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """What was sent back to be done again, and what that has superseded.
+
+    `of_baseline` are those of the tests from which the hanger's baseline was made: they are not
+    watched, and the baseline stays as it was made until it is set anew.
+    """
+
+    recording: StoredRecording
+    tests: tuple[str, ...]
+    posteriors: int
+    watches: int
+    of_baseline: tuple[str, ...]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store.database import translated
+from shm.store.database import reading, writing
+from shm.store.location import shown
 from shm.store.tables import SCHEMA
 
 
@@ -18,8 +19,8 @@ def upgrade(engine: Engine) -> None:
     from alembic.config import Config
     from alembic.util import CommandError
 
-    location = engine.url.render_as_string(hide_password=True)
-    with translated(location), engine.begin() as connection:
+    location = shown(engine.url)
+    with writing(engine) as connection:
         _refuse_newer(_version(connection), location)
         config = Config()
         config.set_main_option("script_location", str(migrations_folder()))
@@ -35,22 +36,27 @@ def upgrade(engine: Engine) -> None:
 
 def check(engine: Engine) -> None:
     """Raises SchemaOutdated unless the database has the present schema."""
-    location = engine.url.render_as_string(hide_password=True)
-    with translated(location), engine.connect() as connection:
-        version = _version(connection.execution_options(shm_reading=True))
-    _refuse_newer(version, location)
-    if version != SCHEMA:
+    location = shown(engine.url)
+    found = version(engine)
+    _refuse_newer(found, location)
+    if found != SCHEMA:
         raise SchemaOutdated(
-            f"the store {location} has schema {version or 'none'}, this shm needs {SCHEMA}.",
+            f"the store {location} has schema {found or 'none'}, this shm needs {SCHEMA}.",
             remedy="Run `shm db upgrade`.",
         )
+
+
+def version(engine: Engine) -> str | None:
+    """The schema of a database; None where it holds no store."""
+    with reading(engine) as connection:
+        return _version(connection)
 
 
 def _version(connection: Connection) -> str | None:
     if not sa.inspect(connection).has_table("alembic_version"):
         return None
-    version: str | None = connection.scalar(sa.text("SELECT version_num FROM alembic_version"))
-    return version
+    found: str | None = connection.scalar(sa.text("SELECT version_num FROM alembic_version"))
+    return found
 
 
 def _refuse_newer(version: str | None, location: str) -> None:

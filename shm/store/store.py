@@ -2,46 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+
+from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
 from shm.store.acknowledging import Acknowledging
 from shm.store.adopting import Adopting
+from shm.store.archive_copies import ArchiveCopies
 from shm.store.database import make_engine
 from shm.store.files import Files
+from shm.store.measuring import Measuring
 from shm.store.queries import Queries
 from shm.store.results import Results
+from shm.store.stepping import Stepping
+from shm.store.superseding import Superseding
+from shm.store.tokens import Tokens
+from shm.store.upkeep import Upkeep
 from shm.store.watching import Watching
 
 
-class Store(Files, Results, Queries, Watching, Acknowledging, Adopting):
+class Store(
+    Files,
+    Results,
+    Queries,
+    Watching,
+    Acknowledging,
+    Adopting,
+    Stepping,
+    Superseding,
+    Measuring,
+    Tokens,
+    ArchiveCopies,
+    Upkeep,
+):
     """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
 
     @classmethod
     def open(cls, location: str | Path) -> Self:
         """An existing store, by file or URL; raises NothingThere, SchemaOutdated or StoreError."""
         _must_exist(location)
-        engine = make_engine(location)
-        schema.check(engine)
-        return cls(engine)
+        return cls(_ready(location, schema.check))
 
     @classmethod
     def create(cls, location: str | Path) -> Self:
         """Makes the tables where there are none, and opens the store."""
-        engine = make_engine(location)
-        schema.upgrade(engine)
-        return cls(engine)
+        return cls(_ready(location, schema.upgrade))
 
     @staticmethod
     def upgrade(location: str | Path) -> None:
         """Brings an existing store to the present schema."""
         _must_exist(location)
-        engine = make_engine(location)
-        schema.upgrade(engine)
-        engine.dispose()
+        _ready(location, schema.upgrade).dispose()
 
     def __enter__(self) -> Self:
         return self
@@ -58,3 +74,14 @@ class Store(Files, Results, Queries, Watching, Acknowledging, Adopting):
 def _must_exist(location: str | Path) -> None:
     if "://" not in str(location) and not Path(location).is_file():
         raise NothingThere(f"there is no store at {location}.", remedy="Make one with `shm init`.")
+
+
+def _ready(location: str | Path, prepare: Callable[[Engine], None]) -> Engine:
+    """The store's engine, once it is prepared; where that fails nothing stays open."""
+    engine = make_engine(location)
+    try:
+        prepare(engine)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine

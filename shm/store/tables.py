@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0004"
+SCHEMA = "0005"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -37,6 +39,17 @@ def _lineage() -> tuple[sa.Column[str], ...]:
 def _model() -> sa.Column[str]:
     # An adopted class is named after its effects, where they act and their ranges.
     return sa.Column("model", sa.String(512), nullable=False)
+
+
+def _superseded_at() -> sa.Column[Any]:
+    # What a later run has replaced stays with its lineage; empty of what is in force.
+    return sa.Column("superseded_at", UtcTime)
+
+
+def _unique_where(condition: str, table: str, *columns: str) -> sa.Index:
+    where = sa.text(f"{condition} IS NULL")
+    name = f"uq_{table}_{'_'.join(columns)}"
+    return sa.Index(name, *columns, unique=True, sqlite_where=where, postgresql_where=where)
 
 
 # A raw file that was received. `arrival` marks the spool entry it came as, so that a receipt cut
@@ -75,7 +88,8 @@ tests = sa.Table(
     sa.Column("set_aside", Document),
     *_lineage(),
     sa.Column("identified_at", UtcTime, nullable=False),
-    sa.UniqueConstraint("hanger", "name"),
+    _superseded_at(),
+    _unique_where("superseded_at", "tests", "hanger", "name"),
     sa.Index(None, "recording_id"),
 )
 
@@ -94,6 +108,7 @@ posteriors = sa.Table(
     sa.Column("seed", sa.BigInteger, nullable=False),
     *_lineage(),
     sa.Column("updated_at", UtcTime, nullable=False),
+    _superseded_at(),
 )
 
 posterior_tests = sa.Table(
@@ -152,7 +167,8 @@ drifts = sa.Table(
         sa.Column(name, Number)
         for name in ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")
     ),
-    sa.UniqueConstraint("test_id", "baseline_id", "quantity"),
+    _superseded_at(),
+    _unique_where("superseded_at", "drifts", "test_id", "baseline_id", "quantity"),
 )
 
 # What the sequential test says after one test; the shifts of the quantities stand in `drifts`.
@@ -165,7 +181,21 @@ watches = sa.Table(
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
-    sa.UniqueConstraint("test_id", "baseline_id"),
+    _superseded_at(),
+    _unique_where("superseded_at", "watches", "test_id", "baseline_id"),
+)
+
+# What the watch has made of all tests up to `last_test_time`, so that the next one is not compared
+# with them all again. `key` tells with what it was made; a kept state may be thrown away at will.
+watch_states = sa.Table(
+    "watch_states",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer, nullable=False, index=True),
+    sa.Column("baseline_id", sa.ForeignKey("baselines.id"), nullable=False, unique=True),
+    sa.Column("key", sa.Text, nullable=False),
+    sa.Column("last_test_time", UtcTime, nullable=False),
+    sa.Column("content", sa.LargeBinary, nullable=False),
 )
 
 alerts = sa.Table(
@@ -255,4 +285,44 @@ events = sa.Table(
     _to("recordings", nullable=True),
     sa.Column("file_name", sa.Text, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
+)
+
+# Each stage that a recording or one of its tests has reached, when, and with which shm (empty where
+# that is not known); written in the same transaction as what brought it there, never changed.
+steps = sa.Table(
+    "steps",
+    metadata,
+    _id(),
+    _to("recordings"),
+    _to("tests", nullable=True),
+    sa.Column("stage", sa.String(16), nullable=False),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("version", sa.String(32)),
+    sa.Index(None, "recording_id"),
+    sa.Index(None, "test_id"),
+)
+
+# Where a second copy of a raw file lies: only such a one may be taken out of the archive.
+archive_copies = sa.Table(
+    "archive_copies",
+    metadata,
+    _id(),
+    _to("recordings"),
+    sa.Column("folder", sa.Text, nullable=False),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.UniqueConstraint("recording_id", "folder"),
+)
+
+# Who may read or write over the network. Only the checksum of a token is kept.
+tokens = sa.Table(
+    "tokens",
+    metadata,
+    _id(),
+    sa.Column("name", sa.String(255), nullable=False),
+    sa.Column("token_sha256", sa.String(64), nullable=False, unique=True),
+    sa.Column("scopes", sa.String(64), nullable=False),
+    sa.Column("created_at", UtcTime, nullable=False),
+    sa.Column("revoked_at", UtcTime),
+    sa.Column("last_used_at", UtcTime),
+    _unique_where("revoked_at", "tokens", "name"),
 )

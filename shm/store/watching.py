@@ -14,18 +14,29 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import alert_document
 from shm.store.blobs import alert_from_document, watch_document, watch_from
 from shm.store.database import Database, insert
+from shm.store.files import in_force
 from shm.store.results import all_at, move
 from shm.store.rows import (
     Acknowledgement,
     Baseline,
     Delivery,
     DeliveryState,
+    KeptWatch,
     Stage,
     StoredAlert,
     StoredTest,
     StoredWatch,
 )
-from shm.store.tables import acknowledgements, alerts, deliveries, drifts, tests, watches
+from shm.store.stepping import NOTIFIED, write_step
+from shm.store.tables import (
+    acknowledgements,
+    alerts,
+    deliveries,
+    drifts,
+    tests,
+    watch_states,
+    watches,
+)
 from shm.values import Alert, Drift, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
@@ -46,10 +57,12 @@ class Watching(Database):
         alert: Alert | None,
         hooks: Sequence[str],
         at: datetime,
+        state: KeptWatch | None = None,
     ) -> StoredAlert | None:
         """Keeps what the watch made of a test; the alert where it is a new one, else None.
 
         An alert whose key was raised before is the same standing condition and is not raised again.
+        `state` is what the watch goes on from at the next test.
         """
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
@@ -57,14 +70,28 @@ class Watching(Database):
             for drift in found.drifts:
                 insert(connection, drifts, _drift_values(drift, test, baseline))
             insert(connection, watches, _watch_values(found, test, baseline))
-            move(connection, [test], Stage.WATCHED)
+            if state is not None:
+                _keep_state(connection, baseline, state)
+            move(connection, [test], Stage.WATCHED, at)
             if alert is None or _is_raised(connection, alert):
                 return None
             return _raise(connection, test, baseline, alert, hooks, at)
 
+    def kept_watch(self, baseline: Baseline) -> KeptWatch | None:
+        """What the watch goes on from at the next test that is compared with a baseline."""
+        query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
+        with self.reading() as connection:
+            row = connection.execute(query).one_or_none()
+        return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
+
+    def forget_watch(self, baseline: Baseline) -> None:
+        """Drops what the watch would go on from: it then begins anew at the next test."""
+        with self.writing() as connection:
+            _drop_state(connection, baseline)
+
     def drifts(self, hanger: int | None = None, test: str | None = None) -> tuple[Drift, ...]:
         """Shifts from the baseline, by time; of one hanger or test where named."""
-        query = sa.select(drifts, tests.c.name.label("test")).join(tests)
+        query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
         if test is not None:
@@ -77,8 +104,9 @@ class Watching(Database):
         self, hanger: int | None = None, baseline_id: int | None = None
     ) -> tuple[StoredWatch, ...]:
         """What the watch said after each test, by time; of one hanger or baseline where named."""
-        query = sa.select(watches, tests.c.name.label("test")).join(tests)
-        shifts = sa.select(drifts, tests.c.name.label("test")).join(tests).order_by(drifts.c.id)
+        name = tests.c.name.label("test")
+        query = sa.select(watches, name).join(tests).where(in_force(watches))
+        shifts = sa.select(drifts, name).join(tests).where(in_force(drifts)).order_by(drifts.c.id)
         if hanger is not None:
             query = query.where(watches.c.hanger == hanger)
             shifts = shifts.where(drifts.c.hanger == hanger)
@@ -126,22 +154,29 @@ class Watching(Database):
         if next_attempt_at is None:
             self._end(delivery, DeliveryState.GIVEN_UP, error, at)
         else:
-            self._note(delivery, {"last_error": error, "next_attempt_at": next_attempt_at})
+            with self.writing() as connection:
+                waits = {"last_error": error, "next_attempt_at": next_attempt_at}
+                _note(connection, delivery, waits)
 
     def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
-        self._note(delivery, {"state": state, "last_error": error, "ended_at": at})
-
-    def _note(self, delivery: Delivery, values: dict[str, Any]) -> None:
         with self.writing() as connection:
-            connection.execute(
-                sa.update(deliveries)
-                .where(deliveries.c.id == delivery.id)
-                .values(attempts=deliveries.c.attempts + 1, **values)
-            )
+            _note(connection, delivery, {"state": state, "last_error": error, "ended_at": at})
+            _note_notified(connection, delivery, at)
 
     def _deliveries(self, query: sa.Select[Any]) -> tuple[Delivery, ...]:
         with self.reading() as connection:
             return tuple(_delivery(row) for row in connection.execute(query))
+
+
+def _keep_state(connection: Connection, baseline: Baseline, state: KeptWatch) -> None:
+    _drop_state(connection, baseline)
+    row = {**vars(state), "hanger": baseline.hanger, "baseline_id": baseline.id}
+    insert(connection, watch_states, row)
+
+
+def _drop_state(connection: Connection, baseline: Baseline) -> None:
+    former = watch_states.c.baseline_id == baseline.id
+    connection.execute(sa.delete(watch_states).where(former))
 
 
 def _is_raised(connection: Connection, alert: Alert) -> bool:
@@ -168,6 +203,24 @@ def _raise(
     for hook in hooks:
         insert(connection, deliveries, _owed(alert_id, hook, at))
     return StoredAlert(alert_id, alert, at)
+
+
+def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> None:
+    changed = sa.update(deliveries).where(deliveries.c.id == delivery.id)
+    connection.execute(changed.values(attempts=deliveries.c.attempts + 1, **values))
+
+
+def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> None:
+    """The test of an alert has come to its end once no hook is owed it any more."""
+    siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery.id)
+    of_alert = deliveries.c.alert_id == siblings.scalar_subquery()
+    waiting = sa.select(deliveries.c.id).where(
+        of_alert, deliveries.c.state == DeliveryState.WAITING
+    )
+    if connection.execute(waiting).first() is None:
+        about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
+        row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+        write_step(connection, row.recording_id, NOTIFIED, at, row.id)
 
 
 def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:

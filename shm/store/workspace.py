@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,14 +10,16 @@ from pathlib import Path
 from typing import Self
 
 from shm.bridge import Bridge, load_bridge
-from shm.errors import StoreBusy, UsageError
+from shm.errors import BadInput, UsageError
 from shm.resources import default_config
 from shm.settings import Settings, load_settings
+from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
+from shm.store.location import has_password
 from shm.store.store import Store
 
 _DATABASE = "shm.db"
-_FOLDERS = ("spool", "archive", "quarantine")
+FOLDERS = ("spool", "archive", "quarantine")
 
 
 @dataclass(frozen=True)
@@ -34,19 +34,24 @@ class Workspace:
     @classmethod
     def open(cls, folder: str | Path, flags: Mapping[str, object] | None = None) -> Self:
         """An existing workspace; raises BadInput where `bridge.toml` is missing or wrong."""
+        workspace = cls.described(folder, flags)
+        for name in FOLDERS:
+            (workspace.folder / name).mkdir(exist_ok=True)
+        return workspace
+
+    @classmethod
+    def described(cls, folder: str | Path, flags: Mapping[str, object] | None = None) -> Self:
+        """The same, but folders that are missing stay missing: for one who only looks."""
         folder = Path(folder).resolve()
         bridge = load_bridge(folder / "bridge.toml")
-        settings = load_settings(bridge.settings_table, flags, source=bridge.source)
-        for name in _FOLDERS:
-            (folder / name).mkdir(exist_ok=True)
-        return cls(folder, bridge, settings, dict(flags or {}))
+        return cls(folder, bridge, _settings(bridge, flags), dict(flags or {}))
 
     @classmethod
     def initialise(cls, folder: str | Path, config: Path | None = None) -> Self:
         """Makes a workspace: folders, store, `bridge.toml` (a commented one, or `config` copied).
 
         Raises UsageError where the folder holds a `bridge.toml` already, BadInput where `config`
-        is wrong.
+        is wrong, StoreError where the store cannot be made.
         """
         folder, config = Path(folder), config or default_config()
         target = folder / "bridge.toml"
@@ -54,9 +59,9 @@ class Workspace:
             raise UsageError(
                 f"{folder} is a workspace already.", remedy="Edit its bridge.toml instead."
             )
-        load_bridge(config)
+        settings = _settings(load_bridge(config), None)
         folder.mkdir(parents=True, exist_ok=True)
-        Store.create(folder / _DATABASE).close()
+        Store.create(_location(folder, settings)).close()
         shutil.copyfile(config, target)
         return cls.open(folder)
 
@@ -66,7 +71,13 @@ class Workspace:
 
     @property
     def database(self) -> Path:
+        """The store's file, where the store is one."""
         return self.folder / _DATABASE
+
+    @property
+    def location(self) -> str | Path:
+        """The store's file or URL; a URL may hold a password."""
+        return _location(self.folder, self.settings)
 
     @property
     def spool(self) -> Path:
@@ -82,26 +93,39 @@ class Workspace:
 
     def store(self) -> Store:
         """Opens the store; raises NothingThere, SchemaOutdated or StoreError."""
-        return Store.open(self.database)
+        return Store.open(self.location)
 
     @contextmanager
-    def lock(self) -> Iterator[None]:
-        """Held by the one process that ingests here; raises StoreBusy while another holds it.
+    def lock(self, wait: Wait | None = None) -> Iterator[ActiveLock]:
+        """Held by the one process that ingests into this store; others may read and stand by.
 
-        The operating system lets go of it when the process dies, however it dies.
+        `wait` is told why it cannot be had yet (StoreBusy: another process has it), waits, and says
+        whether to try again; without it that is raised at once. It is let go of when the process
+        dies, however it dies; where the store is a server it can be lost, so ask `held()`.
         """
-        with (self.folder / "shm.lock").open("a+", encoding="utf-8") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                file.seek(0)
-                holder = file.read().strip() or "unknown"
-                raise StoreBusy(
-                    f"process {holder} already ingests into {self.folder}.",
-                    remedy="Put the files into its spool/ folder, or stop that process.",
-                    retry_after_s=5.0,
-                ) from None
-            file.truncate(0)
-            file.write(str(os.getpid()))
-            file.flush()
-            yield
+        with active(self.location, self._lock_file, wait) as lock:
+            yield lock
+
+    def holder(self) -> str | None:
+        """Who holds the lock now; None where nobody does. Raises StoreError."""
+        return holder(self.location, self._lock_file)
+
+    @property
+    def _lock_file(self) -> Path:
+        return self.folder / "shm.lock"
+
+
+def _settings(bridge: Bridge, flags: Mapping[str, object] | None) -> Settings:
+    in_file = str(bridge.settings_table.get("store", ""))
+    if "://" in in_file and has_password(in_file):
+        raise BadInput(
+            "the store's URL holds a password, which everybody who reads this file would know.",
+            file=bridge.source,
+            remedy="Put the URL into the environment variable SHM_STORE, or leave the password "
+            "to PGPASSWORD or ~/.pgpass.",
+        )
+    return load_settings(bridge.settings_table, flags, source=bridge.source)
+
+
+def _location(folder: Path, settings: Settings) -> str | Path:
+    return settings.store if "://" in settings.store else folder / (settings.store or _DATABASE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
@@ -11,6 +12,7 @@ from shm.values.kinds import NAN, FloatArray, Plane
 End = Literal["deck", "arch"]
 
 TENSION = "tension"
+_INFORMED = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,9 @@ class Reading:
     Its log likelihood at coordinates x (q,) is -(x - mean)' information (x - mean) / 2, of the
     errors that differ from test to test: what all tests share, the model's error above all, cancels
     in every comparison and is left out. `information` (q, q) is singular where a test cannot tell
-    quantities apart; `mean` (q,) is then 0 along what it does not see.
+    quantities apart; `mean` (q,) is then 0 along what it does not see. `per_kelvin` (q,) is
+    what a kelvin of warmth has moved `mean` by, as steel softens, where that was not taken off for
+    want of a temperature; else None.
     """
 
     test: str
@@ -54,6 +58,7 @@ class Reading:
     temperature_c: float
     mean: FloatArray
     information: FloatArray
+    per_kelvin: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,9 @@ class Drift:
     """How far one quantity has moved from its baseline, with the probability that it matters.
 
     `quantity` is `tension` (shift as a fraction of the baseline) or a parameter such as
-    `log10_k1` (shift in decades); `probability` is that of a shift beyond `threshold`, up or down.
+    `log10_k1` (shift in decades), given that it has changed at all: where nothing was called this
+    is no finding. `probability` is that of a shift beyond `threshold`, up or down, that nothing has
+    changed being weighed with the rest.
     `value` is what the state over time says at the test, its swing with the temperature taken out.
     """
 
@@ -79,11 +86,13 @@ class Drift:
 
 @dataclass(frozen=True)
 class Moved:
-    """One quantity as that which has changed, and no other.
+    """One quantity as that which has changed, alone or with others.
 
-    `probability` is that it is this one, given that something has changed; the shift (a fraction of
-    the tension, decades of a stiffness) is that if it is. `alike` are the quantities that the data
-    cannot tell from it: a log Bayes factor below 3.
+    `probability` is that it did, given that something has changed; several may move together, so
+    that these add to more than 1. The shift (a fraction of the tension, decades of a stiffness) is
+    that if it did. `together` are the quantities that move with it in the likeliest change of it:
+    the planes of an end, all ends. `alike` are those of which a change without it explains the data
+    as well: a log Bayes factor below 3.
     """
 
     quantity: str
@@ -93,6 +102,7 @@ class Moved:
     end: End | None = None
     plane: Plane | None = None
     alike: tuple[str, ...] = ()
+    together: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,11 +145,21 @@ class WatchedTest:
 
 @dataclass(frozen=True)
 class TemperatureCoefficient:
-    """How a quantity goes with the temperature: per kelvin, a fraction or decades, with its sd."""
+    """How a quantity goes with the temperature: per kelvin, a fraction or decades, with its sd.
+
+    `prior_sd` is the sd before any test, about 0: as long as `sd` is hardly less, the tests say
+    next to nothing of it.
+    """
 
     quantity: str
     mean: float
     sd: float
+    prior_sd: float = NAN
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the tests, and not what is assumed before them, say what it is."""
+        return math.isfinite(self.mean) and not self.sd > _INFORMED * self.prior_sd
 
 
 AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "test"]

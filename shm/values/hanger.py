@@ -11,11 +11,16 @@ from shm.values.kinds import NAN
 
 @dataclass(frozen=True)
 class Thresholds:
-    """How large a shift of this hanger matters, and how sure one must be to say so."""
+    """How large a shift of this hanger matters, and how sure one must be to say so.
+
+    `false_call_years` is the mean time until the hanger is called changed though it has not; None:
+    the setting of that name.
+    """
 
     tension_shift_fraction: float = 0.05
     stiffness_shift_decades: float = 0.5
     alert_probability: float = 0.95
+    false_call_years: float | None = None
 
 
 @dataclass(frozen=True)

@@ -102,6 +102,7 @@ MarkName = Literal[
     "calibration error by chance",
     "log score",
     "Brier score",
+    "tension error of sound hangers, %",
     "tension error before, %",
     "tension error after, %",
     "tension error after over before",

@@ -5,10 +5,17 @@ from __future__ import annotations
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
 from shm.watch.options import WatchOptions
 from shm.watch.stiffness import end_stiffness
-from shm.watch.watching import DatedTest, Watched, watch_hanger
+from shm.watch.watching import (
+    DatedTest,
+    Newest,
+    Watched,
+    watch_hanger,
+    watch_newest,
+)
 
 __all__ = [
     "DatedTest",
+    "Newest",
     "WatchOptions",
     "Watched",
     "end_stiffness",
@@ -17,4 +24,5 @@ __all__ = [
     "joined",
     "watch_gap",
     "watch_hanger",
+    "watch_newest",
 ]

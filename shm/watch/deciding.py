@@ -13,33 +13,17 @@ All is derived from the sequence of tests, so that the same tests give the same 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import datetime
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from shm.values import Alert, AlertKind, Change, Drift, Hanger, WatchedTest
-from shm.watch.wording import message_of
-
-Way = Literal["up", "down"]
+from shm.watch.told import Told, Way
+from shm.watch.wording import message_of, suspects
 
 _ENDS_BELOW = 0.5
 _LONGEST_TEST = 80
 _DIGITS = 12
 _BEYOND: AlertKind = "beyond threshold"
-
-
-@dataclass(frozen=True)
-class _Told:
-    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
-
-    `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one.
-    """
-
-    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
-    call: datetime | None = None
-    called: tuple[Change, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,35 +40,36 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
     `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
     rules, quantity, way and test: the same whenever it is asked for.
     """
-    told, alert = _Told(), None
+    told, alert = Told(), None
     for test in watched:
-        told, alert = _after(told, test, hanger)
+        told, alert = after(told, test, hanger)
     return alert
 
 
-def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
-    """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
-    told, alerts = _Told(), []
-    for test in watched:
-        told, alert = _after(told, test, hanger)
-        alerts += [alert] if alert else []
-    return tuple(alerts)
-
-
-def _after(told: _Told, test: WatchedTest, hanger: Hanger) -> tuple[_Told, Alert | None]:
+def after(told: Told, test: WatchedTest, hanger: Hanger) -> tuple[Told, Alert | None]:
+    """What stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = _still(told, test, level)
     news = _news(standing, test, level)
     beyond = {(drift.quantity, _way(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
-    after = _Told({**standing.beyond, **beyond}, call, called)
-    change = test.change if news.call else _explaining(news.beyond, after.called, test.change)
+    change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    return after, _alert(news, change, test, hanger, is_further=is_further)
+    stands = Told({**standing.beyond, **beyond}, call, called)
+    return stands, _alert(news, change, test, hanger, is_further=is_further)
 
 
-def _still(told: _Told, test: WatchedTest, level: float) -> _Told:
+def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
+    """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
+    told, alerts = Told(), []
+    for test in watched:
+        told, alert = after(told, test, hanger)
+        alerts += [alert] if alert else []
+    return tuple(alerts)
+
+
+def _still(told: Told, test: WatchedTest, level: float) -> Told:
     """What still stands at a test: unknown probabilities end nothing."""
     ended = {
         (drift.quantity, way)
@@ -94,7 +79,7 @@ def _still(told: _Told, test: WatchedTest, level: float) -> _Told:
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < _ENDS_BELOW * level:
-        return _Told(beyond)
+        return Told(beyond)
     return replace(told, beyond=beyond)
 
 
@@ -103,7 +88,7 @@ def _probability(drift: Drift, way: Way) -> float:
     return drift.probability * (_way(drift.shift_mean) == way)
 
 
-def _news(standing: _Told, test: WatchedTest, level: float) -> _News:
+def _news(standing: Told, test: WatchedTest, level: float) -> _News:
     beyond = tuple(
         drift
         for drift in test.drifts
@@ -113,7 +98,7 @@ def _news(standing: _Told, test: WatchedTest, level: float) -> _News:
     return _News(beyond, test.change.called and not _is_known(standing, test.change))
 
 
-def _is_known(standing: _Told, change: Change) -> bool:
+def _is_known(standing: Told, change: Change) -> bool:
     """Whether a called change began before an alert that stands, and so is what that one told."""
     told = [] if standing.call is None else [standing.call]
     named = _suspects(change)
@@ -122,8 +107,8 @@ def _is_known(standing: _Told, change: Change) -> bool:
 
 
 def _suspects(change: Change) -> tuple[str, ...]:
-    """What may have changed: the likeliest quantity, then those like it."""
-    return tuple(each for moved in change.moved[:1] for each in (moved.quantity, *moved.alike))
+    """What may have changed: the likeliest quantity, those with it, then those like it."""
+    return tuple(each.quantity for each in suspects(change))
 
 
 def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) -> Change | None:

@@ -34,9 +34,10 @@ class StateHistory:
     `filtered_mean` (n, q) and `filtered_covariance` (n, q, q) rest on the tests up to each, the
     smoothed ones on all. Every level holds at `reference_temperature_c`: the swing with the
     temperature is taken out. `coefficient_mean` and `coefficient_sd` (q,) are of the coordinates
-    per kelvin; `level_rate` (q,) is the sd by which a level wanders in a year, `scatter` (q,) the
-    sd from test to test beyond the readings' own errors. Both are the likeliest given the whole
-    history, for the filtered levels too; how little is known of them widens the covariances.
+    per kelvin, `coefficient_prior_sd` is the sd before any test; `level_rate` (q,) is the sd by
+    which a level wanders in a year, `scatter` (q,) the sd from test to test beyond the readings'
+    own errors. Both are the likeliest given the whole history, for the filtered levels too; how
+    little is known of them widens the covariances.
     """
 
     quantities: tuple[WatchedQuantity, ...]
@@ -48,6 +49,7 @@ class StateHistory:
     smoothed_covariance: FloatArray
     coefficient_mean: FloatArray
     coefficient_sd: FloatArray
+    coefficient_prior_sd: FloatArray
     level_rate: FloatArray
     scatter: FloatArray
 
@@ -85,9 +87,15 @@ class StateHistory:
     def temperature_coefficients(self) -> tuple[TemperatureCoefficient, ...]:
         """Per kelvin, at the baseline: a fraction of the tension, decades of a stiffness."""
         return tuple(
-            TemperatureCoefficient(quantity.name, float(slope * mean), float(slope * sd))
-            for quantity, mean, sd in zip(
-                self.quantities, self.coefficient_mean, self.coefficient_sd, strict=True
+            TemperatureCoefficient(
+                quantity.name, float(slope * mean), float(slope * sd), float(slope * prior_sd)
+            )
+            for quantity, mean, sd, prior_sd in zip(
+                self.quantities,
+                self.coefficient_mean,
+                self.coefficient_sd,
+                self.coefficient_prior_sd,
+                strict=True,
             )
             for slope in [_slope_at_baseline(quantity)]
         )

@@ -10,7 +10,8 @@ the data do not; it has no part in the reading's mean and information.
 
 Steel softens as it warms, by 0.03 % of its modulus per kelvin: over the year a stiff hanger's
 frequencies swing by half a percent, as if its tension and its ends moved. What the modulus does is
-known and taken off, too, from the mean temperature of the baseline's tests on.
+known and taken off, too, from the mean temperature of the baseline's tests on. Where a test has no
+temperature, the reading says what a kelvin has done to it.
 
 Springs that frequencies cannot tell apart move together: how unlike two springs are that are nearly
 alike shows in the square of the difference only, and no normal distribution could follow it. One
@@ -170,10 +171,18 @@ class Reader:
         nothing: information 0.
         """
         count = len(self.quantities)
-        mean, information = np.zeros(count), np.zeros((count, count))
-        if _is_described(test, self._model) and len((seen := self._seen(test)).own):
-            mean, information = self._read(self._settled(seen))
-        return Reading(test.id, time, test.temperature_c, mean, information)
+        blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
+        if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
+            return blind
+        linear = self._settled(seen)
+        misfit = linear.residual + linear.slopes @ linear.x
+        softening = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
+        (mean, per_kelvin), information = self._read(linear, np.array([misfit, softening]))
+        left = None if self._is_warmth_known(test) else per_kelvin
+        return replace(blind, mean=mean, information=information, per_kelvin=left)
+
+    def _is_warmth_known(self, test: ModalTest) -> bool:
+        return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
 
     def _own_residual(self, tests: Sequence[_Seen]) -> FloatArray:
         """Measured less predicted log frequency (modes,), the weighted mean over the tests."""
@@ -212,10 +221,9 @@ class Reader:
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
         sd = np.where(sd_hz > 0, sd_hz / frequency_hz, _UNKNOWN_SD)
-        known = math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
         swing = (
             (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[own]
-            if known
+            if self._is_warmth_known(test)
             else 0.0
         )
         return _Seen(
@@ -259,18 +267,20 @@ class Reader:
         residual = seen.log_frequency - predicted[0] - slopes @ (x - inside)
         return _Linear(x, residual / sd, slopes / sd[:, None], self._pull)
 
-    def _read(self, linear: _Linear) -> tuple[FloatArray, FloatArray]:
-        """Mean (q,) and information (q, q) of the likelihood alone, 0 along what is not seen."""
+    def _read(self, linear: _Linear, off: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+
+        And the information (q, q) of the likelihood alone, 0 along what is not seen.
+        """
         slopes = linear.slopes * self._scale
         shares, axes = np.linalg.eigh(slopes.T @ slopes)
         seen = shares > _UNSEEN
-        pushed = slopes.T @ (linear.residual + linear.slopes @ linear.x)
-        steps = (axes.T @ pushed)[seen] / shares[seen]
-        share = _credible_share(linear.residual, len(steps))
+        steps = (off @ slopes @ axes)[:, seen] / shares[seen]
+        share = _credible_share(linear.residual, int(seen.sum()))
         kept = shares[seen] * share > _UNSEEN
         shares, axes = shares[seen][kept] * share, axes[:, seen][:, kept]
         information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
-        return self._scale * (axes @ steps[kept]), np.asarray(information + information.T) / 2
+        return self._scale * (steps[:, kept] @ axes.T), np.asarray(information + information.T) / 2
 
     def _predicted(self, x: FloatArray, seen: _Seen) -> FloatArray:
         """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""

@@ -78,7 +78,7 @@ def states(
     _check(readings, outlier)
     reference_c = _reference(readings, chosen)
     course = _course(readings, quantities, outlier, changes, reference_c, chosen)
-    return _history(*_fitted(course), readings, quantities, reference_c)
+    return _history(*_fitted(course), readings, quantities, reference_c, chosen)
 
 
 def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[datetime, ...]:
@@ -229,6 +229,7 @@ def _history(
     readings: Sequence[Reading],
     quantities: Sequence[WatchedQuantity],
     reference_c: float,
+    options: StateOptions,
 ) -> StateHistory:
     count = len(quantities)
     found = model.course_of_states(z)
@@ -244,6 +245,7 @@ def _history(
         smoothed_covariance=found.smoothed_covariance[:, :count, :count],
         coefficient_mean=found.smoothed_mean[-1, count:],
         coefficient_sd=np.sqrt(np.maximum(last, 0)),
+        coefficient_prior_sd=_coefficient_sd(quantities, options),
         level_rate=rate,
         scatter=scatter,
     )

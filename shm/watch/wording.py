@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, End, Hanger, Moved, Plane, WatchedTest
@@ -12,6 +12,7 @@ _NINETY_PERCENT = 1.645
 _CERTAIN = 0.999
 _LISTED = 3
 _EITHER_LIKELY = 0.8
+_WHICH_END = "which end is not known"
 
 
 def message_of(
@@ -64,7 +65,7 @@ def quantity_words(name: str, end: End | None = None, plane: Plane | None = None
         return "tension"
     if not name.startswith("log10_k"):
         return name.replace("_", " ")
-    at = f"{end} end" if end else "which end not known" if plane else ""
+    at = f"{end} end" if end else _WHICH_END if plane else ""
     where = ", ".join(word for word in (at, plane or "") if word)
     return f"end stiffness {name.removeprefix('log10_')}" + (f" ({where})" if where else "")
 
@@ -119,39 +120,82 @@ def _change(change: Change | None) -> str:
     """What has changed, or what all may have."""
     if change is None:
         return "something has changed."
-    first = change.moved[0]
-    if not first.alike:
-        return f"{_moved(first)}. {_only(first, change)}"
-    suspects = _suspects(change)
+    groups = suspected_groups(change)
+    if len(groups) == 1:
+        return f"{_moved(groups[0])}. {_this(groups[0], change)}"
     told = "; or ".join(
-        f"{_moved(each)}, probability {_probability(each.probability)}"
-        for each in suspects[:_LISTED]
+        f"{_moved(each)}, probability {_probability(each[0].probability)}"
+        for each in groups[:_LISTED]
     )
     return (
         f"something moved, and these tests cannot tell what: {told}"
-        f"{_and_more(len(suspects) - _LISTED)}."
+        f"{_and_more(len(groups) - _LISTED)}."
     )
 
 
-def _moved(moved: Moved) -> str:
-    name = quantity_words(moved.quantity, moved.end, moved.plane)
-    return f"{name} {shift_words(moved.quantity, moved.shift_mean, moved.shift_sd)}"
+def suspects(change: Change) -> list[Moved]:
+    """The likeliest quantity, those that moved with it, and those that may have instead."""
+    return list(dict.fromkeys(each for group in suspected_groups(change) for each in group))
 
 
-def _only(first: Moved, change: Change) -> str:
+def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
+    """What may have moved, each with what moved with it, the likeliest first."""
+    by_name = {each.quantity: each for each in change.moved}
+    groups: dict[frozenset[str], tuple[Moved, ...]] = {}
+    for first in change.moved[:1]:
+        for name in (first.quantity, *(n for n in by_name if n in first.alike)):
+            names = (name, *by_name[name].together)
+            group = tuple(by_name[each] for each in names if each in by_name)
+            groups.setdefault(frozenset(names), group)
+    return list(groups.values())
+
+
+def _moved(group: Sequence[Moved]) -> str:
+    """What moved together and how far; each by itself where they went different ways."""
+    first = group[0]
+    if all(_is_like(each, first) for each in group):
+        size = shift_words(first.quantity, first.shift_mean, first.shift_sd)
+        return f"{group_words(group)} {size}"
+    each_way = (
+        f"{group_words([each])} {shift_words(each.quantity, each.shift_mean, each.shift_sd)}"
+        for each in group
+    )
+    return f"{group_words(group)} moved together: {', and '.join(each_way)}"
+
+
+def _is_like(moved: Moved, first: Moved) -> bool:
+    """Whether two shifts are one size, as far as they are known."""
+    if (moved.quantity == TENSION) != (first.quantity == TENSION):
+        return False
+    apart = abs(moved.shift_mean - first.shift_mean)
+    return apart <= max(moved.shift_sd, first.shift_sd)
+
+
+def group_words(group: Sequence[Moved]) -> str:
+    """`end stiffness in both planes at the deck end`, or the quantities' own names."""
+    ends = {each.end for each in group}
+    planes = {each.plane for each in group}
+    if len(group) == 1 or None in planes:
+        return " and ".join(quantity_words(g.quantity, g.end, g.plane) for g in group)
+    where = f"both planes ({_WHICH_END})" if None in ends else f"both planes at {_ends(ends)}"
+    if len(planes) == 1:
+        where = f"the {group[0].plane} plane at {_ends(ends)}"
+    return f"end stiffness in {where}"
+
+
+def _ends(ends: Set[End | None]) -> str:
+    return "both ends" if len(ends) > 1 else f"the {next(iter(ends))} end"
+
+
+def _this(group: Sequence[Moved], change: Change) -> str:
     """How sure it is that it was this, and what else it might be."""
-    text = f"That it is this and nothing else: probability {_probability(first.probability)}"
-    if first.probability > 0.9 or len(change.moved) < 2:
+    first = group[0]
+    text = f"That it is this that moved: probability {_probability(first.probability)}"
+    others = [each for each in change.moved if each not in group]
+    if first.probability > 0.9 or not others:
         return f"{text}."
-    other = change.moved[1]
-    name = quantity_words(other.quantity, other.end, other.plane)
-    return f"{text}; next {name}, {_probability(other.probability)}."
-
-
-def _suspects(change: Change) -> list[Moved]:
-    """The likeliest quantity and those that the data cannot tell from it, the likeliest first."""
-    first = change.moved[0]
-    return [first, *(each for each in change.moved[1:] if each.quantity in first.alike)]
+    name = quantity_words(others[0].quantity, others[0].end, others[0].plane)
+    return f"{text}; next {name}, {_probability(others[0].probability)}."
 
 
 def _and_more(count: int) -> str:
@@ -175,16 +219,14 @@ def _shifts(beyond: Sequence[Drift], change: Change | None) -> str:
 def _told_apart(change: Change | None) -> str:
     if change is None:
         return ""
-    first, *others = _suspects(change)
-    if not others:
-        name = quantity_words(first.quantity, first.end, first.plane)
-        return f" That only the {name} has changed: probability {_probability(first.probability)}."
+    groups = suspected_groups(change)
     told = " or ".join(
-        f"{quantity_words(each.quantity, each.end, each.plane)} "
-        f"(probability {_probability(each.probability)})"
-        for each in (first, *others)[:_LISTED]
+        f"{group_words(each)} (probability {_probability(each[0].probability)})"
+        for each in groups[:_LISTED]
     )
-    more = _and_more(len(others) + 1 - _LISTED)
+    if len(groups) == 1:
+        return f" It is the {told} that has changed."
+    more = _and_more(len(groups) - _LISTED)
     return f" These tests cannot tell whether it is {told}{more} that has changed."
 
 
@@ -197,7 +239,7 @@ def _threshold(drift: Drift) -> str:
 def _now(test: WatchedTest, beyond: Sequence[Drift], change: Change | None) -> str:
     """The tension in kN where it is spoken of: a figure that the owner knows."""
     spoken = [drift.quantity for drift in beyond] + (
-        [each.quantity for each in _suspects(change)] if change else []
+        [each.quantity for each in suspects(change)] if change else []
     )
     for drift in test.drifts:
         if drift.quantity == TENSION and TENSION in spoken:
@@ -248,7 +290,7 @@ def _thresholds(test: WatchedTest, change: Change | None) -> str:
     if change is None:
         return ""
     by_name = {drift.quantity: drift for drift in test.drifts}
-    found = [by_name[each.quantity] for each in _suspects(change) if each.quantity in by_name]
+    found = [by_name[each.quantity] for each in suspects(change) if each.quantity in by_name]
     if not found:
         return ""
     nearest = max(found, key=lambda drift: drift.probability)
@@ -282,8 +324,9 @@ def _urgency(change: Change | None, is_beyond: bool) -> str:
 
 
 def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
-    first = change.moved[0] if change else None
-    if first is not None and first.alike:
+    groups = suspected_groups(change) if change else []
+    first = groups[0][0] if groups else None
+    if len(groups) > 1:
         return (
             "A sensor near each end and more modes tell them apart. Compare the hangers beside it "
             "(`shm drift bridge`), and look at its anchorages."
@@ -291,8 +334,8 @@ def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
     quantity, shift = _leading(first, beyond)
     if quantity == TENSION:
         return _look_at_tension(shift > 0)
-    known = first.end if first and first.quantity == quantity else None
-    end = f"the {known} end" if known else "both ends"
+    ends = {each.end for each in groups[0]} if first and first.quantity == quantity else {None}
+    end = "both ends" if None in ends else _ends(ends)
     if shift < 0:
         return f"If it holds, look at {end}: a worn pin, a crack in the plate, loose bolts."
     return f"If it holds, look at {end}: a pin that rust or dirt has seized."

@@ -113,3 +113,41 @@ def test_drift_without_a_sub_command_lists_as_ever(shm: Shm, workspace: Path) ->
     assert [row["test"] for row in plain] == ["t2"]
     after = shm("drift", "--workspace", workspace, "--hanger", 3, "--all", "--json").document
     assert [row["test"] for row in after["drifts"]] == ["t1", "t2"]
+
+
+def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
+    shm: Shm, workspace: Path
+) -> None:
+    told = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30").out
+    assert "Still open of it: alert 1." in told
+    shown = shm("--workspace", workspace, "drift").out
+    assert " ".join(shown.split()) == (
+        "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "
+        "set."
+    )
+    report = shm("--workspace", workspace, "report", "--hanger", 3, "--json").document
+    assert report["drifts"] == []
+    assert report["status"] == "first"
+    assert report["alerts"]
+
+
+def test_a_report_says_who_took_note_of_an_alert(shm: Shm, workspace: Path) -> None:
+    shm("--workspace", workspace, *ACK, "--who", "Jansen")
+    report = shm("--workspace", workspace, "report", "--hanger", 3, "--json").document
+    (noted,) = report["acknowledged"].values()
+    assert noted.startswith("Jansen, ")
+    assert noted.endswith(": pin replaced")
+
+
+def test_of_one_hanger_drift_tells_how_it_goes_with_the_temperature(
+    shm: Shm, workspace: Path
+) -> None:
+    document = shm("--workspace", workspace, "drift", "--hanger", 3, "--json").document
+    tension = document["temperature_coefficients"][0]
+    assert (tension["quantity"], tension["known"]) == ("tension", False)
+    assert tension["why_not_known"] == "the temperatures of the tests differ by 0.0 K only"
+    told = " ".join(shm("--workspace", workspace, "drift", "--hanger", 3).out.split())
+    assert "not known: the temperatures of the tests differ by 0.0 K only" in told
+    assert (
+        "temperature_coefficients" not in shm("--workspace", workspace, "drift", "--json").document
+    )

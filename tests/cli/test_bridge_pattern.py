@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from shm.errors import NothingThere
+from shm.errors import NothingThere, UsageError
 from shm.store import IdentifiedTest, Lineage, Store, Workspace
 from shm.values import Drift, Selection, WatchedTest
 from shm_cli.bridge_pattern import command
+from shm_cli.report import command as report
 from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
 from tests.helpers.workspaces import make_workspace
 
@@ -85,6 +86,33 @@ def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -
 def test_the_figure_is_written(arch: Workspace, tmp_path: Path) -> None:
     call(arch, "--figure", str(tmp_path / "bridge.png"))
     assert (tmp_path / "bridge.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_table_draws_who_lost_and_who_gained(arch: Workspace) -> None:
+    told = call(arch).stdout
+    assert "<=====|......" in told
+    assert "......|==>..." in told
+
+
+def test_the_report_of_the_bridge_holds_the_elevation(arch: Workspace, tmp_path: Path) -> None:
+    page = tmp_path / "bridge.html"
+    ended = CliRunner().invoke(report, ["--bridge", "--out", str(page)], obj=str(arch.folder))
+    assert ended.exit_code == 0, ended.output
+    written = page.read_text()
+    assert written.count("<svg") == 1
+    assert "Hanger 6 has lost 35 kN" in written
+    told = CliRunner().invoke(report, ["--bridge", "--json"], obj=str(arch.folder)).stdout
+    document = json.loads(told)
+    assert document["schema"] == "shm.bridge_report/1"
+    assert [each["status"] for each in document["hangers"]][-2:] == ["watch", None]
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["--bridge", "--hanger", "6"], ["--bridge", "--test", "t"]]
+)
+def test_a_report_is_of_one_hanger_or_of_the_bridge(arch: Workspace, arguments: list[str]) -> None:
+    ended = CliRunner().invoke(report, arguments, obj=str(arch.folder))
+    assert isinstance(ended.exception, UsageError)
 
 
 def test_too_few_hangers_are_an_answer_that_is_not_there_yet(tmp_path: Path) -> None:

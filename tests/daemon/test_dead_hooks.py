@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ from shm.bridge import Hook
 from shm.store import Delivery, DeliveryState, Stage, Workspace
 from shm.values import Alert
 from shm_daemon import Bell, HookNotifier, run
-from tests.helpers.flows import Clock, a_flow
+from tests.helpers.flows import Clock, a_flow, threads
 from tests.helpers.listeners import Answer, a_listener, a_silent_listener
 from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.workspaces import make_workspace
@@ -46,7 +45,7 @@ def test_what_a_server_refuses_is_given_up_at_once_and_what_may_pass_waits(
 ) -> None:
     with a_listener(lambda told: Answer(status, b"no such topic")) as listener:
         workspace = with_webhook(tmp_path / "bridge", listener.url)
-        run(workspace, once=True, make_executor=ThreadPoolExecutor)
+        run(workspace, once=True, make_executor=threads)
     delivery = outbox(workspace)
     assert (delivery.state, delivery.attempts) == (state, 1)
     assert f"answered {status}: no such topic." in delivery.last_error.replace("topic ", "topic. ")
@@ -60,7 +59,7 @@ def test_a_server_that_hangs_holds_up_neither_the_files_nor_the_end(tmp_path: Pa
         daemon = threading.Thread(
             target=run,
             args=(workspace,),
-            kwargs={"bell": bell, "make_executor": ThreadPoolExecutor},
+            kwargs={"bell": bell, "make_executor": threads},
         )
         daemon.start()
         for file in range(2):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,10 +14,13 @@ import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
 from shm.pipeline import Flow, steps
+from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Store, Workspace
 from shm_daemon import Bell, run
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
+from tests.helpers.flows import threads as make_threads
+from tests.helpers.footprint import open_files
 from tests.helpers.workspaces import make_workspace, put, write_loss, write_test
 
 
@@ -34,7 +38,7 @@ def serve(workspace: Workspace) -> Iterator[Callable[..., Bell]]:
 
     def begin(where: Workspace = workspace, **options: object) -> Bell:
         bell = Bell()
-        options = {"make_executor": ThreadPoolExecutor, "bell": bell, **options}
+        options = {"make_executor": make_threads, "bell": bell, **options}
         thread = threading.Thread(target=run, args=(where,), kwargs=options)
         bells.append(bell)
         threads.append(thread)
@@ -50,7 +54,7 @@ def serve(workspace: Workspace) -> Iterator[Callable[..., Bell]]:
 
 
 def run_once(workspace: Workspace, **options: object) -> None:
-    run(workspace, once=True, **{"make_executor": ThreadPoolExecutor, **options})  # type: ignore[arg-type]
+    run(workspace, once=True, **{"make_executor": make_threads, **options})  # type: ignore[arg-type]
 
 
 def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
@@ -78,6 +82,19 @@ def test_files_dropped_while_it_runs_are_done(
         write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
     until(lambda: counts(workspace) == {Stage.DONE: 3})
     assert list(workspace.spool.iterdir()) == []
+
+
+def test_open_files_do_not_grow_with_the_tests(
+    workspace: Workspace, serve: Callable[..., Bell]
+) -> None:
+    serve()
+    held = []
+    for last in (5, 10, 15):
+        for day in range(last - 5, last):
+            write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+        until(lambda done=last: counts(workspace) == {Stage.DONE: done})  # type: ignore[misc]
+        held.append(min(open_files(os.getpid()) for _ in range(20)))  # a scan opens folders too
+    assert held[2] <= held[0]
 
 
 def test_a_file_being_written_is_not_taken_before_it_is_whole(
@@ -212,6 +229,9 @@ class Mortal(ThreadPoolExecutor):
     """A pool whose workers die once, on the first job."""
 
     lives = 1
+
+    def __init__(self, settings: Settings):
+        super().__init__(settings.workers)
 
     def submit(self, fn, /, *args, **kwargs):  # type: ignore[no-untyped-def]
         if Mortal.lives:

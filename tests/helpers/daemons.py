@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,10 +16,16 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @contextmanager
-def real_daemon(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """`python -m shm_daemon`, as an owner begins it, logging to `daemon.log`; ended at the end."""
+def real_daemon(
+    folder: Path, *, standby: bool = False, log_name: str = "daemon.log"
+) -> Iterator[subprocess.Popen[bytes]]:
+    """The daemon as an owner begins it, logging to `log_name`; killed at the end."""
     command = [sys.executable, "-m", "shm_daemon", str(folder)]
-    with (folder / "daemon.log").open("ab") as log, subprocess.Popen(command, stderr=log) as daemon:
+    if standby:
+        shm = "from shm_cli.main import main; main()"
+        words = ("--workspace", str(folder), "daemon", "--standby")
+        command = [sys.executable, "-c", shm, *words]
+    with (folder / log_name).open("ab") as log, subprocess.Popen(command, stderr=log) as daemon:
         try:
             yield daemon
         finally:
@@ -77,12 +82,20 @@ def quick_daemons(folder: Path) -> Iterator[QuickDaemons]:
 
 
 def until_serving(pid: int, folder: Path, seconds: float = 30.0) -> None:
-    """Waits until a daemon begun a moment ago holds the workspace."""
-    lock, end = folder / "shm.lock", time.monotonic() + seconds
-    while not lock.exists() or lock.read_text() != str(pid):
+    """Waits until a daemon begun a moment ago holds the workspace: its lock says so, or its log."""
+    lock, log, end = folder / "shm.lock", folder / "daemon.log", time.monotonic() + seconds
+    while not (_says(lock, str(pid)) or f"{pid} watching" in _text(log)):
         if time.monotonic() > end:
             raise TimeoutError(f"process {pid} does not serve {folder}")
         time.sleep(0.005)
+
+
+def _says(path: Path, text: str) -> bool:
+    return _text(path) == text
+
+
+def _text(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
 
 
 def _nurse(folder: Path) -> None:
@@ -91,15 +104,18 @@ def _nurse(folder: Path) -> None:
     from shm.pipeline import steps
     from shm.store import Workspace
     from tests.helpers import quick_update
+    from tests.helpers.flows import threads
 
-    logging.basicConfig(filename=folder / "daemon.log", level=logging.INFO)
+    logging.basicConfig(
+        filename=folder / "daemon.log", level=logging.INFO, format="%(process)d %(message)s"
+    )
     for verb in ("update", "refresh", "select"):
         setattr(steps, verb, getattr(quick_update, verb))
     for line in sys.stdin:
         pid = os.fork()
         if pid == 0:
             once = line == "once\n"
-            shm_daemon.run(Workspace.open(folder), once=once, make_executor=ThreadPoolExecutor)
+            shm_daemon.run(Workspace.open(folder), once=once, make_executor=threads)
             return
         print(pid, flush=True)
         print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), flush=True)

@@ -53,6 +53,7 @@ def assert_all_done_once(feed: Feed) -> None:
         assert tests == sorted(name.removesuffix(".modes.json") for name in done)
         assert len(store.posteriors(3)) == len(tests)
         assert [drift.test for drift in store.drifts(3)] == tests[1:]
+        assert len(store.watches(3)) == len(tests) - 1
         assert store.events("duplicate") == ()
     _assert_quarantine_holds(workspace.folder / "quarantine", feed)
 

@@ -9,6 +9,7 @@ from datetime import datetime, timedelta
 
 from shm.bridge import Hook
 from shm.pipeline import Flow, Notifier
+from shm.settings import Settings
 from shm.store import Store, Workspace
 from shm.values import Alert
 from tests.helpers.workspaces import START
@@ -63,6 +64,11 @@ def a_flow(
             yield flow
         finally:
             flow.close()
+
+
+def threads(settings: Settings) -> ThreadPoolExecutor:
+    """Where a daemon's steps run without a process of their own."""
+    return ThreadPoolExecutor(settings.workers)
 
 
 def receive_all(flow: Flow) -> None:

@@ -14,7 +14,7 @@ _LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 def make_baseline(workspace: Workspace) -> None:
     """The first test of hanger 3, with which later ones are compared."""
     with workspace.store() as store:
-        (test,) = _entered(store, [0])
+        (test,) = entered(store, [0])
         store.selected(3, [test], Selection((a_posterior(),), (1.0,)), _LINEAGE, NOW)
 
 
@@ -23,7 +23,7 @@ def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[s
     with workspace.store() as store:
         baseline = store.baseline(3)
         assert baseline is not None
-        for test in _entered(store, numbers):
+        for test in entered(store, numbers):
             name = test.test.id
             store.updated(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
             alert = an_alert(f"hanger-3:{name}", name)
@@ -32,7 +32,7 @@ def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[s
             )
 
 
-def _entered(store: Store, numbers: Iterable[int]) -> list[StoredTest]:
+def entered(store: Store, numbers: Iterable[int]) -> list[StoredTest]:
     names = set()
     for number in numbers:
         recording = store.receive(a_file(number), NOW).recording

@@ -19,6 +19,7 @@ import pytest
 from shm.documents import dump, modes_document
 from shm.errors import ShmError, StoreBusy, StoreError, UsageError
 from shm.pipeline import steps
+from shm.read import Limits
 from shm.store import DeliveryState, Stage, Store, Workspace
 from shm.values import AddedMass, ModalTest, Posterior
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
@@ -71,13 +72,13 @@ def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
 ) -> None:
     load, others = steps.load_modes, threading.Semaphore(0)
 
-    def load_the_earliest_last(path: Path) -> tuple[ModalTest, ...]:
+    def load_the_earliest_last(path: Path, limits: Limits) -> tuple[ModalTest, ...]:
         if path.name.startswith("earliest"):
             assert others.acquire(timeout=20)
             time.sleep(0.1)
         else:
             others.release()
-        return load(path)
+        return load(path, limits)
 
     monkeypatch.setattr(steps, "load_modes", load_the_earliest_last)
     spool(workspace, "earliest", day=0)
@@ -325,10 +326,10 @@ def test_passing_trouble_is_waited_out_and_holds_up_nobody(
 ) -> None:
     read_modes, trouble = steps.load_modes, [True]
 
-    def fail_once(path):  # type: ignore[no-untyped-def]
+    def fail_once(path, limits):  # type: ignore[no-untyped-def]
         if path.name.startswith("a") and trouble.pop():
             raise ShmError("not now.", retry_after_s=30.0)
-        return read_modes(path)
+        return read_modes(path, limits)
 
     monkeypatch.setattr(steps, "load_modes", fail_once)
     trouble[:] = [False, True]

@@ -17,6 +17,7 @@ from shm.models import build
 from shm.pipeline import steps
 from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
+from shm.read import Limits
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
 from shm.update import UpdateOptions
 from shm.values import Alert, Hanger, ModalTest, Recording, WatchedTest
@@ -50,7 +51,7 @@ class Logger:
         self.time: datetime | None = NOW
         self.asked: dict[str, Any] = {}
 
-    def read_test(self, path: Path) -> tuple[Recording, ...]:
+    def read_test(self, path: Path, limits: Limits) -> tuple[Recording, ...]:
         return (Recording(path.name, (), 512.0, self.hanger, self.time),)
 
     def identify(self, records: Any, options: Any, *, test_id: str, hanger: Hanger) -> Any:
@@ -170,7 +171,9 @@ def test_an_alert_belongs_to_its_baseline(workspace: Workspace) -> None:
     def watch(number: int, tests: Sequence[ModalTest]) -> tuple[WatchedTest, Alert | None]:
         baseline = Baseline(number, 3, posteriors[0], NOW, "shm", "first")
         dated = [(first, START)], [(test, test.time or NOW) for test in tests]
-        return watch_test(baseline, dated, posteriors[len(tests)], hanger, 100.0)
+        said = watch_test(baseline, dated, posteriors[len(tests)], hanger, 100.0)
+        assert said is not None
+        return said[:2]
 
     keys = set()
     for number in (1, 2):

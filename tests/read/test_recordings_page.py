@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.read import FORMATS, peek, read, sidecar_path
-from shm.read.limits import LARGEST_BYTES, MOST_ACCELERATIONS
+from shm.read.limits import Limits
 from shm.read.packed import MOST_MEMBERS
 from shm.read.units import unit_of
 from shm.values import FrequencyResponse, Recording
@@ -77,8 +77,8 @@ def test_the_page_names_every_format_unit_and_limit() -> None:
     named = re.sub(r"\(also (.*?)\)", r", \1", f"{units[1]}, {units[2]}")
     assert all(unit_of(unit) for unit in re.split(r",\s*", named) if unit.strip())
     for limit in (
-        f"1 to {MOST_ACCELERATIONS} acc",
-        f"{LARGEST_BYTES >> 20} MB",
+        f"1 to {Limits().max_channels} acc",
+        f"{Limits().bytes_at_once >> 20} MB",
         f"{MOST_MEMBERS} f",
     ):
         assert limit in PAGE.replace("\n", " ")

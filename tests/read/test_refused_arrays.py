@@ -8,6 +8,7 @@ import pickle
 import resource
 import struct
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from nptdms import ChannelObject, TdmsWriter
 
 from shm.errors import BadInput
 from shm.read import peek, read
+from shm.read.limits import Limits, limited
 from shm.read.matlab_elements import elements_of
 
 SERIES = np.random.default_rng(8).standard_normal(200)
@@ -199,14 +201,22 @@ def test_a_matlab_shape_that_claims_too_much_is_refused(tmp_path: Path) -> None:
     assert_refused(path, "acc_1: holds 1x400000000 values, beyond the 256 MB")
 
 
-def test_a_compressed_matlab_variable_that_unpacks_too_far_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_compressed_matlab_variable_that_unpacks_too_far_is_refused(tmp_path: Path) -> None:
     path = mat(tmp_path, acc_1=np.zeros(3_000_000), pack=True)
     assert path.stat().st_size < 40_000
-    monkeypatch.setattr("shm.read.matlab_elements.LARGEST_BYTES", 2**22)
-    with pytest.raises(BadInput, match="'acc_1' cannot be read"):
+    claim_less_in_packed(path, struct.pack("<II", 1, 3_000_000), struct.pack("<II", 1, 300))
+    few = limited(Limits(parse_memory_bytes=4 * 2**22))
+    with few, pytest.raises(BadInput, match="'acc_1' cannot be read"):
         read(path)
+
+
+def claim_less_in_packed(path: Path, said: bytes, claimed: bytes) -> None:
+    """Changes the shape of the last variable of a file, within what is compressed."""
+    head, *_, element = path.read_bytes()[:128], *elements_of(path.read_bytes())
+    whole = zlib.decompress(element.packed)
+    assert whole.count(said) == 1
+    packed = zlib.compress(whole.replace(said, claimed))
+    path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
 
 
 @pytest.mark.parametrize("kind", [0, 8, 14, 15, 99, 2057])
@@ -269,12 +279,10 @@ def test_a_tdms_header_that_claims_too_much_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".uff", ".csv.gz", ".mat"])
-def test_a_file_beyond_what_is_read_at_once_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
-) -> None:
+def test_a_file_beyond_what_is_read_at_once_is_refused(tmp_path: Path, suffix: str) -> None:
     starts = {".mat": mat(tmp_path, acc_1=SERIES).read_bytes(), ".uff": b"    -1\n    58\n"}
     content = starts.get(suffix, b"# sampling_rate_hz: 1\nforce,acc_1\n") + b"1,2\n" * 300_000
     path = tmp_path / f"test{suffix}"
     path.write_bytes(gzip.compress(content) if suffix.endswith(".gz") else content)
-    monkeypatch.setattr("shm.read.content.LARGEST_BYTES", 1_000_000)
-    assert_refused(path, "more than the 256 MB that are read at once")
+    with limited(Limits(parse_memory_bytes=4 * 2**20)):
+        assert_refused(path, "more than the 1 MB that are read at once")

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from shm.errors import BadInput, UsageError
 from shm.read import bundle, holds_test, peek, peek_test, read, read_test, sidecar_path, write
+from shm.read.limits import Limits, limited
 from shm.values import FrequencyResponse, Recording
 
 SUFFIXES = (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz")
@@ -214,10 +215,10 @@ def test_a_member_that_unpacks_too_far_is_refused_while_it_does(tmp_path: Path) 
             read_test(archive)
 
 
-def test_all_members_together_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shm.read.bundles.LARGEST_BYTES", 1000)
+def test_all_members_together_are_limited(tmp_path: Path) -> None:
     archive = zipped(tmp_path / "test.zip", {f"hit_{i}.csv": csv(100) for i in (1, 2)})
-    with pytest.raises(BadInput, match=r"'hit_2.csv' unpacks to far more"):
+    few = limited(Limits(parse_memory_bytes=4000))
+    with few, pytest.raises(BadInput, match=r"'hit_2.csv' unpacks to far more"):
         read_test(archive)
 
 

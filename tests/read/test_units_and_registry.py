@@ -82,8 +82,8 @@ def test_all_formats_of_owners_are_registered() -> None:
 
 def test_the_public_names_are_these() -> None:
     assert sorted(shm.read.__all__) == [
-        "FORMATS", "Format", "Peek", "PeekChannel", "bundle", "holds_test", "peek", "peek_test",
-        "read", "read_test", "sidecar_path", "write",
+        "FORMATS", "Format", "Limits", "Peek", "PeekChannel", "bundle", "holds_test", "peek",
+        "peek_test", "read", "read_test", "sidecar_path", "write",
     ]  # fmt: skip
 
 

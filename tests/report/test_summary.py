@@ -61,13 +61,13 @@ def test_the_baseline_test_is_not_compared_with_itself(season: HangerReport) -> 
     assert status(itself) is Status.FIRST
 
 
-def test_a_rise_of_stiffness_is_told_in_decades(season: HangerReport) -> None:
+def test_a_rise_of_stiffness_is_told_as_a_factor(season: HangerReport) -> None:
     rise = Drift(
         3, "t009", season.drifts[0].time, "longitudinal_end_stiffness", 7, 8, 1.0, 0.2, 0.5, 0.99
     )
     told = summary(replace(season, drifts=(rise,)))
-    assert "The longitudinal end stiffness has risen by 1.00 decades (90 % interval" in told
-    assert "its threshold of 0.5 decades is 0.990" in told
+    assert "end stiffness has risen to 10 times what it was (90 % interval 4.7 to 21 times)" in told
+    assert "its threshold of 0.32 or 3.2 times is 0.990" in told
 
 
 def test_without_a_sure_shift_the_likeliest_is_named(season: HangerReport) -> None:
@@ -110,3 +110,11 @@ def test_an_interval_wider_than_the_threshold_is_said(season: HangerReport, hang
     assert any(
         "wider than the threshold of 1 %" in t for t in advice(replace(season, hanger=sharp))
     )
+
+
+def test_a_called_change_below_its_threshold_is_to_be_watched(season: HangerReport) -> None:
+    small = replace(season.drifts[0], probability=0.01)
+    calm = replace(season, drifts=(small,))
+    assert status(calm) is Status.STEADY
+    assert status(replace(calm, is_called=True)) is Status.WATCH
+    assert "set a new baseline once it is explained" in summary(replace(calm, is_called=True))

@@ -51,7 +51,7 @@ def test_the_truth_is_that_of_the_modal_campaign_of_the_same_generator(hanger: H
 
 
 def test_both_planes_of_a_round_bar_come_back_with_order_and_shape(hanger: Hanger) -> None:
-    """Its planes have equal frequencies; stated deviations are 1e-4 and half a percent."""
+    """Its planes have equal frequencies: its shapes' direction is as unsure as they say."""
     plan = CampaignPlan(temperatures_c=(4.0,), amplitudes=(2.0,), mass_share=0.0)
     campaign = made(hanger, plan, CLAMP, recorder=Recorder())
     found = {(mode.plane, mode.order): mode for mode in identified(campaign, hanger).modes}
@@ -59,7 +59,8 @@ def test_both_planes_of_a_round_bar_come_back_with_order_and_shape(hanger: Hange
     for true in campaign.truth.frequencies:
         mode = found[true.plane, true.order]
         errors.append((mode.frequency_hz - true.frequency_hz) / mode.frequency_sd_hz)
-        assert max(abs(point.cross) for point in mode.shape) < 0.02
+        assert max(abs(point.cross) / point.sd for point in mode.shape) < 3
+        assert max(abs(point.cross) for point in mode.shape) < 0.1
         assert max(abs(point.value) for point in mode.shape) == pytest.approx(1)
     assert len(errors) == 16
     assert np.abs(errors).max() < 4

@@ -10,7 +10,7 @@ import pytest
 
 from shm.bridge import load_bridge, load_hanger
 from shm.errors import BadInput
-from shm.values import EndPlate, Turnbuckle
+from shm.values import EndPlate, Thresholds, Turnbuckle
 
 ROUND = """
 [[hanger]]
@@ -146,12 +146,15 @@ def test_a_part_that_cannot_be_is_named(
 
 
 def test_thresholds_and_hooks_are_read(tmp_path: Path) -> None:
-    text = ROUND + "thresholds = { tension_shift_fraction = 0.03, alert_probability = 0.9 }\n"
+    text = ROUND + (
+        "thresholds = { tension_shift_fraction = 0.03, alert_probability = 0.9, "
+        "false_call_years = 20 }\n"
+    )
     text += '[[hook]]\nname = "mail"\ncommand = ["/usr/bin/true", "-x"]\n'
     text += "[settings]\nsamples = 300\n[bridge]\nname = 'Arch'\n"
     bridge = load_bridge(written(tmp_path, text))
     assert bridge.name == "Arch"
-    assert bridge.hanger(3).thresholds.tension_shift_fraction == 0.03
+    assert bridge.hanger(3).thresholds == Thresholds(0.03, 0.5, 0.9, 20)
     assert bridge.hooks[0].command == ("/usr/bin/true", "-x")
     assert bridge.settings_table == {"samples": 300}
 
@@ -169,6 +172,11 @@ def test_thresholds_and_hooks_are_read(tmp_path: Path) -> None:
         (("diameter_m = 0.130", ""), "area_m2 is missing"),
         (("id = 3", "id = 3\nthresholds = { tension = 1 }"), "unknown key"),
         (("id = 3", "id = 3\nthresholds = { alert_probability = 1 }"), "below 1"),
+        (
+            ("id = 3", "id = 3\nthresholds = { false_call_years = 0.01 }"),
+            r"thresholds: false_call_years = 0.01 is not from 0.1 to 1e\+06",
+        ),
+        (("id = 3", "id = 3\nthresholds = { false_call_years = 'long' }"), "is not a number"),
         (("id = 3", "id = "), "not a readable TOML file"),
     ],
 )

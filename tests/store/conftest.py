@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from shm.store import Store
+from tests.helpers.postgres import Databases
+from tests.store.make_released_database import fill
 
 
 @pytest.fixture(scope="session")
@@ -17,7 +19,57 @@ def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def store(tmp_path: Path, empty_database: Path) -> Iterator[Store]:
-    shutil.copyfile(empty_database, tmp_path / "shm.db")
-    with Store.open(tmp_path / "shm.db") as store:
+def sqlite(tmp_path: Path, empty_database: Path) -> Path:
+    """An empty store that is a file."""
+    return Path(shutil.copyfile(empty_database, tmp_path / "shm.db"))
+
+
+@pytest.fixture
+def server(request: pytest.FixtureRequest) -> Iterator[str]:
+    """An empty store in PostgreSQL, whose server is begun only where a test needs it."""
+    with request.getfixturevalue("postgresql").store() as url:
+        yield url
+
+
+@pytest.fixture(params=["sqlite", "server"])
+def location(request: pytest.FixtureRequest) -> str | Path:
+    """Where an empty store is, of either kind: what holds of one must hold of the other."""
+    found: str | Path = request.getfixturevalue(request.param)
+    return found
+
+
+@pytest.fixture
+def store(location: str | Path) -> Iterator[Store]:
+    with Store.open(location) as store:
         yield store
+
+
+@pytest.fixture
+def file_store(sqlite: Path) -> Iterator[Store]:
+    with Store.open(sqlite) as store:
+        yield store
+
+
+@pytest.fixture
+def server_store(server: str) -> Iterator[Store]:
+    with Store.open(server) as store:
+        yield store
+
+
+@pytest.fixture
+def filled(store: Store) -> Store:
+    """A store of either kind with something in every corner."""
+    fill(store)
+    return store
+
+
+@pytest.fixture(params=["file", "database"])
+def empty(
+    request: pytest.FixtureRequest, tmp_path: Path, postgresql: Databases
+) -> Iterator[str | Path]:
+    """Where a store of either kind may be made."""
+    if request.param == "file":
+        yield tmp_path / "empty.db"
+    else:
+        with postgresql.database() as url:
+            yield url

@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.store import Adoption, IdentifiedTest, Lineage, Store
+from shm.store import Adoption, IdentifiedTest, Lineage, Stage, Store
 from shm.store.tables import SCHEMA
 from shm.values import Selection
 from tests.helpers.diagnoses import a_diagnosis
@@ -69,6 +69,21 @@ def fill(store: Store) -> None:
     record = ("engineer", "new pin", second.time)
     joint = a_posterior("beam1", ("t2",), seed=9)
     store.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
+    _update_again(store)
+
+
+def _update_again(store: Store) -> None:
+    """A test of its own file is updated and watched twice: what it had first is superseded."""
+    number = store.receive(a_file(4), NOW).recording.id
+    store.identified(number, [IdentifiedTest(a_test("t4", 4))], LINEAGE, NOW)
+    baseline = store.baseline(3)
+    assert baseline is not None
+    for seed in (10, 11):
+        third = store.tests(3)[-1]
+        store.updated(third, a_posterior("beam1", ("t4",), seed=seed), LINEAGE, NOW)
+        store.watched(third, baseline, a_watched_test("t4"), None, [], NOW)
+        if seed == 10:
+            store.again(number, Stage.UPDATED, NOW)
 
 
 def main() -> None:

@@ -195,6 +195,10 @@ def test_waiting_tests_come_by_hanger_and_time_whatever_their_arrival(store: Sto
         identified(store, number, IdentifiedTest(a_test(f"t{number}", days, hanger=hanger)))
     waiting = store.waiting_tests()
     assert [(test.hanger, test.id) for test in waiting] == [(3, 3), (3, 2), (4, 1)]
+    first = store.waiting_tests(1)
+    assert [(test.hanger, test.id) for test in first] == [(3, 3), (4, 1)]
+    others = store.waiting_tests(1, excluding=[first[0].recording_id])
+    assert [(test.hanger, test.id) for test in others] == [(3, 2), (4, 1)]
 
 
 @pytest.mark.parametrize("test", [None, "t1"])

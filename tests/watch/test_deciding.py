@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from typing import Literal
 
 import pytest
 
-from shm.values import Alert, Change, Drift, Moved, Thresholds, WatchedTest
-from shm.watch.deciding import alerts_of, new_alert
+from shm.errors import BadInput
+from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
+from shm.watch.deciding import after, alerts_of, new_alert
+from shm.watch.told import Told
 from shm.watch.wording import shift_words
 from tests.helpers.hangers import HANGER_3
 
@@ -200,8 +203,8 @@ def test_keys_of_long_test_names_fit_the_store_and_stay_apart() -> None:
 def test_a_sudden_loss_says_first_what_moved_and_last_what_to_do() -> None:
     message = only(day(2, change(called=True, began=2), 0.3)).message
     assert message == (
-        "Hanger 3: tension fell by 8.2 % (90 % interval 7.1 to 9.3 %). That it is this and nothing "
-        "else: probability 0.97. Tension is now 654.1 kN, 8.0 % below the 711 kN of the baseline. "
+        "Hanger 3: tension fell by 8.2 % (90 % interval 7.1 to 9.3 %). That it is this that "
+        "moved: probability 0.97. Tension is now 654.1 kN, 8.0 % below the 711 kN of the baseline. "
         "It came suddenly (probability 0.98), between 2026-04-30 and 2026-05-03. That anything has "
         "changed: probability 0.90; a hanger that does not change raises such an alert at most "
         "once in 200 years on the average. The threshold of the tension is 5 %: passed with "
@@ -245,14 +248,14 @@ def test_beyond_the_threshold_names_what_the_data_cannot_tell_from_it() -> None:
 def test_a_spring_known_for_sure_sends_the_crew_to_its_end() -> None:
     deck = replace(DECK, probability=0.95, alike=())
     message = only(day(2, change(called=True, moved=(deck, ARCH)))).message
-    assert "That it is this and nothing else: probability 0.95." in message
+    assert "That it is this that moved: probability 0.95." in message
     assert "look at the deck end: a worn pin" in message
 
 
 def test_where_the_end_is_not_known_both_are_looked_at() -> None:
     somewhere = replace(DECK, end=None, alike=())
     message = only(day(2, change(called=True, moved=(somewhere,)))).message
-    assert "k1 (which end not known, transverse)" in message
+    assert "k1 (which end is not known, transverse)" in message
     assert "look at both ends" in message
 
 
@@ -290,7 +293,7 @@ def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None
     )
     assert call.change is not None
     assert beyond.change == replace(call.change, probability=0.99)
-    assert "That only the tension has changed: probability 0.97." in beyond.message
+    assert "It is the tension (probability 0.97) that has changed." in beyond.message
     assert "between 2026-04-30 and 2026-05-03" in beyond.message
     assert "k3" not in beyond.message
     assert "once in 200 years" not in beyond.message
@@ -341,3 +344,101 @@ def test_a_call_without_a_suspect_is_still_told() -> None:
 )  # fmt: skip
 def test_shifts_read_as_people_say_them(quantity: str, mean: float, sd: float, words: str) -> None:
     assert shift_words(quantity, mean, sd) == words
+
+
+# ---------------------------------------------------------------- what moved together
+
+
+def _joint(*names: str, shift: float = -0.155, **of_first: object) -> tuple[Moved, ...]:
+    places: dict[str, tuple[Literal["deck", "arch"], Plane]] = {
+        "log10_k1": ("deck", "transverse"),
+        "log10_k2": ("deck", "longitudinal"),
+        "log10_k3": ("arch", "transverse"),
+        "log10_k4": ("arch", "longitudinal"),
+    }
+    moved = [
+        Moved(name, 0.96, shift, 0.02, *places[name], together=tuple(n for n in names if n != name))
+        for name in names
+    ]
+    return replace(moved[0], **of_first), *moved[1:]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("names", "where"),
+    [
+        (("log10_k1", "log10_k2"), "both planes at the deck end"),
+        (("log10_k1", "log10_k3"), "the transverse plane at both ends"),
+        (("log10_k1", "log10_k2", "log10_k3", "log10_k4"), "both planes at both ends"),
+    ],
+)
+def test_what_moved_together_is_told_as_one(names: tuple[str, ...], where: str) -> None:
+    message = only(day(1), day(2, change(called=True, moved=_joint(*names)))).message
+    assert f"Hanger 3: end stiffness in {where} fell to 0.70 times what it was" in message
+    assert "That it is this that moved: probability 0.96." in message
+    look = "the deck end" if "log10_k3" not in names else "both ends"
+    assert f"look at {look}: a worn pin" in message
+
+
+def test_ends_that_cannot_be_told_apart_are_told_as_such_together() -> None:
+    moved = tuple(
+        Moved(
+            f"{plane}_end_stiffness",
+            0.9,
+            -0.15,
+            0.02,
+            None,
+            plane,
+            together=(f"{other}_end_stiffness",),
+        )
+        for plane, other in (PLANES, PLANES[::-1])
+    )
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "end stiffness in both planes (which end is not known) fell to 0.71 times" in message
+
+
+def test_quantities_that_went_different_ways_together_are_told_each() -> None:
+    deck = _joint("log10_k1", "log10_k2")
+    moved = (deck[0], replace(deck[1], shift_mean=-0.4))
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "both planes at the deck end moved together: end stiffness k1 (deck end" in message
+    assert "and end stiffness k2 (deck end, longitudinal) fell to 0.40 times" in message
+
+
+def test_one_and_several_that_explain_the_data_alike_are_told_as_alternatives() -> None:
+    first, second = _joint("log10_k1", "log10_k2", alike=("tension",))
+    moved = (first, second, replace(FELL, probability=0.3, alike=("log10_k1", "log10_k2")))
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "cannot tell what: end stiffness in both planes at the deck end fell to 0.70" in message
+    assert "; or tension fell by 8.2 %" in message
+    assert message.count("both planes at the deck end") == 1
+
+
+# ---------------------------------------------------------------- kept between tests
+
+
+def test_what_was_told_comes_back_from_its_text() -> None:
+    stands = Told()
+    assert Told.from_text("") == Told.from_text(stands.to_text()) == stands
+    joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
+    for test in (day(1), day(2, joint), day(3, change(called=True, began=2), probability=0.99)):
+        stands, _ = after(stands, test, HANGER_3)
+    assert stands.beyond
+    assert len(stands.called) == 2
+    assert Told.from_text(stands.to_text()) == stands
+
+
+def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
+    history = [day(1), day(2, change(called=True)), day(3, probability=0.99), day(4), day(5)]
+    text, alerts = "", []
+    for test in history:
+        stands, alert = after(Told.from_text(text), test, HANGER_3)
+        text = stands.to_text()
+        alerts += [alert] if alert else []
+    assert tuple(alerts) == alerts_of(history, HANGER_3)
+    assert len(alerts) == 2
+
+
+@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"beyond": [1], "call": null, "called": []}'])
+def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="cannot be read"):
+        Told.from_text(text)

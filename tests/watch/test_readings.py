@@ -310,3 +310,16 @@ def test_steel_that_softens_as_it_warms_is_no_change() -> None:
     nothing = np.zeros(3)
     assert distance(known, nothing) < 0.05
     assert distance(unknown, nothing) > 20 * distance(known, nothing)
+
+
+def test_a_test_without_a_temperature_says_what_a_kelvin_has_done_to_it() -> None:
+    mild = measured(frequencies(SPRUNG), temperature_c=10.0)
+    warm = replace(HANGER_3, elastic_modulus_pa=HANGER_3.elastic_modulus_pa * (1 - 20 * 3e-4))
+    softer = frequencies(SPRUNG, hanger=warm)
+    reader = Reader(posterior(SPRUNG), [mild], HANGER_3)
+    known = reader.reading(measured(softer, temperature_c=30.0), WHEN)
+    unknown = reader.reading(measured(softer), WHEN)
+    assert known.per_kelvin is None
+    assert unknown.per_kelvin is not None
+    corrected = replace(unknown, mean=unknown.mean - 20 * unknown.per_kelvin)
+    assert distance(corrected, np.zeros(3)) < 0.1 < distance(unknown, np.zeros(3)) / 20

@@ -11,8 +11,16 @@ import pytest
 
 from shm.models import build
 from shm.update import UpdateOptions, update
-from shm.values import PLANES, ModalTest, Mode, Posterior
-from shm.watch import Watched, WatchOptions, end_stiffness, watch_hanger
+from shm.values import PLANES, ModalTest, Mode, Posterior, Thresholds
+from shm.watch import (
+    Newest,
+    Watched,
+    WatchOptions,
+    end_stiffness,
+    watch_hanger,
+    watch_newest,
+)
+from shm.watch.deciding import alerts_of
 from tests.helpers.hangers import HANGER_3
 
 BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
@@ -98,3 +106,53 @@ def test_a_solid_class_is_watched_by_the_rotational_stiffness_of_its_faces() -> 
     expected = np.log10(2 / (1 / thin + 1 / wide))
     assert list(found) == ["transverse_end_stiffness", "longitudinal_end_stiffness"]
     np.testing.assert_allclose(list(found.values()), expected)
+
+
+def test_a_hanger_may_have_its_own_mean_time_to_a_false_call() -> None:
+    posterior, tests = _baseline()
+    own = replace(HANGER_3, thresholds=Thresholds(false_call_years=7.0))
+    found = watch_hanger(posterior, _dated(tests), [], own, WatchOptions(limit_years=50.0))
+    assert found.latest.change.limit_years == 7.0
+    common = watch_hanger(posterior, _dated(tests), [], HANGER_3, WatchOptions(limit_years=50.0))
+    assert common.latest.change.limit_years == 50.0
+
+
+LOST = (0.93, *SOUND[1:])
+
+
+def _newest(later: list[tuple[ModalTest, datetime]], kept: bytes | None = None) -> Newest | None:
+    posterior, tests = _baseline()
+    return watch_newest(posterior, _dated(tests), later, HANGER_3, WatchOptions(), kept)
+
+
+def _later(*thetas: tuple[float, ...]) -> list[tuple[ModalTest, datetime]]:
+    rng = np.random.default_rng(2)
+    return _dated(tuple(_test(BASELINE_TESTS + k, theta, rng) for k, theta in enumerate(thetas)))
+
+
+def test_going_on_test_by_test_from_what_was_kept_finds_the_same() -> None:
+    later = _later(SOUND, SOUND, LOST, LOST, LOST)
+    whole = _watched(SOUND, SOUND, LOST, LOST, LOST)
+    kept, alerts = None, []
+    for test in later:
+        found = _newest([test], kept)
+        assert found is not None
+        kept = found.kept
+        alerts += [found.alert] if found.alert else []
+    assert found.test.drifts == whole.latest.drifts
+    assert found.test.change == whole.latest.change
+    at_once = _newest(later)
+    assert at_once is not None
+    assert at_once.test.change == whole.latest.change
+    assert tuple(alerts) == alerts_of(whole.watch.tests, HANGER_3)
+    assert len(alerts) == 1
+
+
+def test_under_another_limit_nothing_goes_on_from_what_was_kept() -> None:
+    later = _later(SOUND, SOUND)
+    found = _newest(later[:1])
+    assert found is not None
+    posterior, tests = _baseline()
+    own = replace(HANGER_3, thresholds=Thresholds(false_call_years=7.0))
+    gone = watch_newest(posterior, _dated(tests), later[1:], own, WatchOptions(), found.kept)
+    assert gone is None

@@ -35,6 +35,10 @@ class HookNotifier:
         """Delivers; what the hook answered. Raises HookFailed or DeliveryRefused."""
         return self._deliverers[type(hook)](hook, alert)
 
+    def ready(self, hook: Hook) -> str:
+        """Where its alerts would go; raises HookFailed where none could be delivered."""
+        return self._deliverers[type(hook)].ready(hook)
+
     def close(self) -> None:
         """Ends deliveries under way; what they were to deliver is delivered again."""
         for deliverer in self._deliverers.values():

@@ -31,20 +31,29 @@ class AppriseDeliverer:
 
     def __call__(self, hook: AppriseHook, alert: Alert) -> str:
         """Sends the alert; raises HookFailed naming the services that did not take it."""
-        addresses = hook.addresses or self._addresses(hook)
-        schemes = [_allowed(address) for address in addresses]
-        if find_spec("apprise") is None:
-            raise HookFailed(
-                "the library apprise is not installed.", remedy="Run `pip install 'shm[alerts]'`."
-            )
+        addresses, schemes = self._where(hook)
         # By standard input, as arguments are seen by everyone on the machine. -P: this folder
         # holds a module of the library's name.
         command = [sys.executable, "-P", str(_SENDER)]
         self._processes.run(command, _told(alert, addresses), {})
         return f"taken by {', '.join(schemes)}"
 
+    def ready(self, hook: AppriseHook) -> str:
+        """The services; raises HookFailed where one or the library is missing."""
+        return ", ".join(self._where(hook)[1])
+
     def close(self) -> None:
         self._processes.close()
+
+    def _where(self, hook: AppriseHook) -> tuple[tuple[str, ...], list[str]]:
+        """The addresses and their schemes, the only part that may be told."""
+        addresses = hook.addresses or self._addresses(hook)
+        schemes = [_allowed(address) for address in addresses]
+        if find_spec("apprise") is None:
+            raise HookFailed(
+                "the library apprise is not installed.", remedy="Run `pip install 'shm[alerts]'`."
+            )
+        return addresses, schemes
 
     def _addresses(self, hook: AppriseHook) -> tuple[str, ...]:
         try:

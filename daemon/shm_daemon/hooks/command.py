@@ -21,5 +21,9 @@ class CommandDeliverer:
         answer = self._processes.run(hook.command, told, {"SHM_ALERT_KEY": alert.key})
         return f"exit code 0: {answer}" if answer else "exit code 0"
 
+    def ready(self, hook: CommandHook) -> str:
+        """The program; raises HookFailed where it is not there or cannot be run."""
+        return self._processes.find(hook.command[0])
+
     def close(self) -> None:
         self._processes.close()

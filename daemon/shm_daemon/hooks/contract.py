@@ -37,6 +37,12 @@ class Deliverer(Protocol):
         Raises HookFailed where another try may help, DeliveryRefused where none will.
         """
 
+    def ready(self, hook: object) -> str:
+        """Where alerts would go, told without secrets, nothing being sent.
+
+        Raises HookFailed where none could be delivered as things are.
+        """
+
     def close(self) -> None:
         """Ends, from another thread, deliveries that are under way; no more are begun."""
 

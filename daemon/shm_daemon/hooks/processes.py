@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -49,6 +50,17 @@ class Processes:
                     remedy="See what its program needs, then try `shm alerts test`.",
                 )
             return _tail(answer)
+
+    def find(self, program: str) -> str:
+        """Where a program is that `run` would begin; raises HookFailed."""
+        beside = self._folder / program if "/" in program else program
+        found = shutil.which(beside, path=self._environment.get("PATH"))
+        if found is None:
+            raise HookFailed(
+                f"{program} is not there, or cannot be run.",
+                remedy="Check its path, and that it may be executed.",
+            )
+        return str(found)
 
     def close(self) -> None:
         """Ends running programs; what they were to deliver is delivered again."""

@@ -56,6 +56,11 @@ class WebhookDeliverer:
                 # Not `from error`: its words hold the whole address, and that may be a key.
                 raise self._failure(hook, line, error) from None
 
+    def ready(self, hook: WebhookHook) -> str:
+        """The machine that is told; raises HookFailed where the secret is missing."""
+        self._secret(hook)
+        return hook.host
+
     def close(self) -> None:
         self._lines.close()
 
@@ -77,7 +82,7 @@ class WebhookDeliverer:
         except OSError as error:
             raise HookFailed(
                 f"the secret in {hook.secret_file} cannot be read: {error.strerror}.",
-                remedy="Make it readable for the user that runs the daemon.",
+                remedy="Write it, readable for the user that runs the daemon; see docs/alerts.md.",
             ) from None
 
     def _failure(self, hook: WebhookHook, line: Line, error: Exception) -> HookFailed:

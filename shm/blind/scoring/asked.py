@@ -105,6 +105,9 @@ _CALIBRATED = (
 )  # fmt: skip
 
 _SHRUNK = (
+    Question(
+        "tension error of sound hangers, %", of_kind("none"), figures(after_percent), median
+    ),
     Question("tension error before, %", known, figures(before_percent), median, above=LARGE),
     Question("tension error after, %", known, figures(after_percent), median, above=LARGE),
     Question(

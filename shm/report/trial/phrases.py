@@ -72,6 +72,9 @@ PHRASES: dict[MarkName, Phrase] = {
     "Brier score": Phrase(
         "Brier score", "mean square error of all probabilities; 0 is best, 2 worst"
     ),
+    "tension error of sound hangers, %": Phrase(
+        "median error of the tension of sound hangers, %", "what bar and length leave unknown"
+    ),
     "tension error before, %": Phrase(
         "median error of the tension before, %", "by the baseline alone"
     ),

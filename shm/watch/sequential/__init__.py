@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from shm.watch.sequential.watching import Call, Watch, watch_over, watched
+from shm.watch.sequential.state import WatchState
+from shm.watch.sequential.watching import Call, Watch, Watcher, watch_over, watched
 
-__all__ = ["Call", "Watch", "watch_over", "watched"]
+__all__ = ["Call", "Watch", "WatchState", "Watcher", "watch_over", "watched"]

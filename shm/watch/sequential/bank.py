@@ -1,4 +1,4 @@
-"""The bank of filters: no change, and a change of one quantity from each possible beginning.
+"""The bank of filters: no change, and a change in each direction from each possible beginning.
 
 Each change has a mass in years, whose sum over the bank is the Shiryaev-Roberts statistic: the time
 in which it may have begun times its likelihood ratio to no change. Under no change each mass stays
@@ -18,7 +18,8 @@ import numpy as np
 from shm.values import BoolArray, FloatArray, IntArray
 from shm.watch.options import WatchOptions
 from shm.watch.sequential.design import Design
-from shm.watch.sequential.filtering import Filters, update, update_new
+from shm.watch.sequential.directions import Direction
+from shm.watch.sequential.filtering import Filters, Sight, update, update_new
 from shm.watch.sequential.measurement import Measurement
 
 STEP, RAMP = 0, 1
@@ -41,33 +42,35 @@ class Beginning:
 class Bank:
     """Filters (B): first no change, one for each scatter (K), then a block for each beginning.
 
-    Blocks run over K x kinds x q; `beginnings` are in the order of time. `log_mass` (B,) is the
-    logarithm of the probability of each scatter without change (they add to 1), then of each
-    change's mass in years; `log_choices` is that of the number of scatters at first. `years` is the
-    time of the last reading, `outlier` (B,) the probability
-    by each filter that this was one.
+    Blocks run over K x kinds x `directions` (D); `beginnings` are in the order of time. `log_mass`
+    (B,) is the logarithm of the probability of each scatter without change (they add to 1), then of
+    each change's mass in years; `log_choices` is that of the number of scatters at first. `years`
+    is the time of the last reading, `outlier` (B,) the probability by each filter that this was
+    one. `called` (q,) is the probability that what was called before moved each quantity.
     """
 
     design: Design
+    directions: tuple[Direction, ...]
     scatters: int
     filters: Filters
     log_mass: FloatArray
     years: float
     log_choices: float
+    called: FloatArray
     beginnings: tuple[Beginning, ...] = ()
     outlier: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def changes(self) -> FloatArray:
-        """Log mass of all changes (beginnings, K, kinds, q)."""
-        shape = (len(self.beginnings), self.scatters, KINDS, self.design.q)
+        """Log mass of all changes (beginnings, K, kinds, D)."""
+        shape = (len(self.beginnings), self.scatters, KINDS, len(self.directions))
         return self.log_mass[self.scatters :].reshape(shape)
 
     @property
     def progress(self) -> FloatArray:
         """How much of the change each filter takes for done (B,): of a ramp the years since."""
         since = np.array([self.years - each.ramp_years for each in self.beginnings])
-        kinds = np.ones((len(since), self.scatters, KINDS, self.design.q))
+        kinds = np.ones((len(since), self.scatters, KINDS, len(self.directions)))
         kinds[:, :, RAMP] = since[:, None, None]
         return np.concatenate([np.zeros(self.scatters), kinds.ravel()])
 
@@ -82,6 +85,18 @@ class Bank:
         return log_total(self.changes[:-1]) - max(likeliest + self.log_choices, 0.0)
 
     @property
+    def members(self) -> BoolArray:
+        """Which quantities move in each direction (D, q)."""
+        numbers = np.arange(self.design.q)
+        return np.array([np.isin(numbers, each.members) for each in self.directions])
+
+    @property
+    def shares(self) -> FloatArray:
+        """Probability of each change, given that there is one (beginnings, K, kinds, D)."""
+        changes = self.changes
+        return np.exp(changes - log_total(changes)) if self.beginnings else changes
+
+    @property
     def log_statistic(self) -> float:
         """Log of the statistic in years, a change before the last test included."""
         return log_total(self.changes)
@@ -92,21 +107,23 @@ def log_total(log_mass: FloatArray) -> float:
     return float(np.logaddexp.reduce(log_mass.ravel())) if log_mass.size else -math.inf
 
 
-def first_bank(scatter: FloatArray, coefficient_sd: FloatArray, years: float) -> Bank:
+def first_bank(
+    directions: tuple[Direction, ...], scatter: FloatArray, coefficient_sd: FloatArray
+) -> Bank:
     """Before any reading; `scatter` (K, q) and `coefficient_sd` (q,) per kelvin in steps.
 
     The level is left to the baseline's tests. They lie about 0, but not at the same temperature.
     """
     n_scatters, q = scatter.shape
-    variances = np.concatenate([np.full(q, _LEVEL_SD**2), coefficient_sd**2, [0.0]])
+    variances = np.concatenate([np.full(q, _LEVEL_SD**2), coefficient_sd**2, np.zeros(q)])
     filters = Filters(
         np.zeros((n_scatters, len(variances))),
         np.tile(np.diag(variances), (n_scatters, 1, 1)),
-        np.zeros(n_scatters, dtype=np.int64),
         scatter**2,
     )
     choices = math.log(n_scatters)
-    return Bank(Design(q), n_scatters, filters, np.full(n_scatters, -choices), years, choices)
+    log_mass = np.full(n_scatters, -choices)
+    return Bank(Design(q), directions, n_scatters, filters, log_mass, 0.0, choices, np.zeros(q))
 
 
 def read(bank: Bank, measurement: Measurement, options: WatchOptions, *, may_change: bool) -> Bank:
@@ -122,13 +139,12 @@ def read(bank: Bank, measurement: Measurement, options: WatchOptions, *, may_cha
 def _updated(bank: Bank, measurement: Measurement, outlier_probability: float, old: int) -> Bank:
     """After a reading; the changes of all filters but the first `old` begin with it."""
     loadings = bank.design.loadings(measurement.years, measurement.kelvin)
+    sight = Sight(loadings, measurement, outlier_probability, bank.directions)
     rows, progress = np.arange(len(bank.filters)), bank.progress
-    found = update(
-        bank.filters.taken(rows[:old]), loadings, progress[:old], measurement, outlier_probability
-    )
-    new = update_new(
-        bank.filters.taken(rows[old:]), loadings, progress[old:], measurement, outlier_probability
-    )
+    found = update(bank.filters.taken(rows[:old]), progress[:old], sight)
+    prior = np.array([each.covariance for each in bank.directions])
+    which = (rows[old:] - bank.scatters) % len(prior)
+    new = update_new(bank.filters.taken(rows[old:]), prior[which], progress[old:], sight)
     log_mass = bank.log_mass + np.concatenate([found.log_density, new.log_density])
     return replace(
         bank,
@@ -140,15 +156,12 @@ def _updated(bank: Bank, measurement: Measurement, outlier_probability: float, o
 
 def _begun(bank: Bank, years: float) -> Bank:
     """With changes that begin between the last reading and one at `years`."""
-    q, k = bank.design.q, bank.scatters
-    rows = np.repeat(np.arange(k), KINDS * q)
-    new = bank.filters.taken(rows)
-    quantity: IntArray = np.tile(np.arange(q), k * KINDS)
-    new = replace(new, quantity=quantity)
-    waited = math.log(max(years - bank.years, 1e-12) / (KINDS * q))
+    choices = KINDS * len(bank.directions)
+    rows = np.repeat(np.arange(bank.scatters), choices)
+    waited = math.log(max(years - bank.years, 1e-12) / choices)
     return replace(
         bank,
-        filters=bank.filters.with_more(new),
+        filters=bank.filters.with_more(bank.filters.taken(rows)),
         log_mass=np.concatenate([bank.log_mass, bank.log_mass[rows] + waited]),
         beginnings=(*bank.beginnings, Beginning(bank.years, years, bank.years)),
     )

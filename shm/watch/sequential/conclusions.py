@@ -24,14 +24,15 @@ from shm.watch.options import WatchOptions
 from shm.watch.quantities import value_at
 from shm.watch.sequential.bank import STEP, Bank, log_total
 from shm.watch.sequential.measurement import DAYS_PER_YEAR
-from shm.watch.sequential.shifts import shift_of_mixture
+from shm.watch.sequential.shifts import Shift, beyond, shift_of_mixture
 
 _ALIKE_NATS = 3.0
 _TAIL = 0.05
+_DIGITS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Watcher:
+class Subject:
     """What all tests of one hanger share; `start` is the time of the first reading."""
 
     quantities: tuple[WatchedQuantity, ...]
@@ -50,18 +51,18 @@ def probability_of_change(bank: Bank, options: WatchOptions) -> float:
     return 1 / (1 + math.exp(min(-odds, 700.0)))
 
 
-def changed(watcher: Watcher, bank: Bank, reading: Reading, before: float) -> Change:
+def changed(subject: Subject, bank: Bank, reading: Reading, before: float) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier."""
-    now = probability_of_change(bank, watcher.options)
-    began_after, began_by = _began(watcher, bank, reading)
+    now = probability_of_change(bank, subject.options)
+    began_after, began_by = _began(subject, bank, reading)
     return Change(
         evidence_years=math.exp(min(bank.log_evidence, 700.0)),
-        limit_years=watcher.options.limit_years,
+        limit_years=subject.options.limit_years,
         probability=1 - (1 - before) * (1 - now),
         sudden=_sudden(bank),
         began_after=began_after,
         began_by=began_by,
-        moved=_moved(watcher.quantities, bank),
+        moved=_moved(subject.quantities, bank),
         outlier_probability=float(_weights(bank, now) @ bank.outlier),
     )
 
@@ -69,81 +70,130 @@ def changed(watcher: Watcher, bank: Bank, reading: Reading, before: float) -> Ch
 def _weights(bank: Bank, probability: float) -> FloatArray:
     """The probability of each filter (B,), given that of a change."""
     none = (1 - probability) * np.exp(bank.log_mass[: bank.scatters])
-    return np.concatenate([none, probability * _shares(bank).ravel()])
-
-
-def _shares(bank: Bank) -> FloatArray:
-    """Probabilities given a change (beginnings, K, kinds, q)."""
-    if not bank.beginnings:
-        return bank.changes
-    return np.exp(bank.changes - log_total(bank.changes))
+    return np.concatenate([none, probability * bank.shares.ravel()])
 
 
 def _sudden(bank: Bank) -> float:
-    return float(_shares(bank)[:, :, STEP].sum()) if bank.beginnings else NAN
+    return float(bank.shares[:, :, STEP].sum()) if bank.beginnings else NAN
 
 
-def _began(watcher: Watcher, bank: Bank, reading: Reading) -> tuple[datetime, datetime]:
+def _began(subject: Subject, bank: Bank, reading: Reading) -> tuple[datetime, datetime]:
     """Between which times the change began, with 90 % probability; the test's own if none can."""
     if not bank.beginnings:
         return reading.time, reading.time
-    reached = np.cumsum(_shares(bank).sum(axis=(1, 2, 3)))
+    reached = np.cumsum(bank.shares.sum(axis=(1, 2, 3)))
     last = len(bank.beginnings) - 1
     first, final = (min(int(np.searchsorted(reached, p)), last) for p in (_TAIL, 1 - _TAIL))
     return (
-        watcher.at(bank.beginnings[first].after_years),
-        watcher.at(bank.beginnings[final].by_years),
+        subject.at(bank.beginnings[first].after_years),
+        subject.at(bank.beginnings[final].by_years),
     )
 
 
 def _moved(quantities: Sequence[WatchedQuantity], bank: Bank) -> tuple[Moved, ...]:
-    """Each quantity as the only one that changed, the likeliest first."""
+    """Each quantity as one that changed, the likeliest first.
+
+    A spring precedes the tension that is as likely: a part of its loss may be read as tension.
+    """
     if not bank.beginnings:
         return ()
-    log_mass = np.logaddexp.reduce(bank.changes.reshape(-1, len(quantities)), axis=0)
-    return tuple(_alone(quantities, bank, j, log_mass) for j in np.argsort(-log_mass).tolist())
+    log_mass = np.logaddexp.reduce(bank.changes.reshape(-1, len(bank.directions)), axis=0)
+    probability = np.minimum(np.exp(log_mass - log_total(log_mass)) @ bank.members, 1.0)
+    is_tension = [quantity.name == TENSION for quantity in quantities]
+    return tuple(
+        _as_changed(quantities, bank, j, log_mass, float(probability[j]))
+        for j in np.lexsort([is_tension, -probability.round(_DIGITS)]).tolist()
+    )
 
 
-def _alone(
-    quantities: Sequence[WatchedQuantity], bank: Bank, j: int, log_mass: FloatArray
+def _as_changed(
+    quantities: Sequence[WatchedQuantity],
+    bank: Bank,
+    j: int,
+    log_mass: FloatArray,
+    probability: float,
 ) -> Moved:
-    """Quantity `j` as the only one that changed; `log_mass` (q,) is what speaks for each."""
-    quantity, mine = quantities[j], bank.filters.quantity[bank.scatters :] == j
-    size = bank.filters.mean[bank.scatters :][mine, -1]
-    variance = np.maximum(bank.filters.covariance[bank.scatters :][mine, -1, -1], 0)
-    progress = bank.progress[bank.scatters :][mine]
-    weights = np.exp(bank.changes[..., j].ravel() - log_mass[j])
+    """Quantity `j`, given that it changed; `log_mass` (D,) is what speaks for each direction."""
+    quantity = quantities[j]
+    weights = _given(bank, bank.shares * bank.members[:, j])[bank.scatters :]
+    at = bank.design.known + j
+    size = bank.filters.mean[bank.scatters :, at]
+    variance = np.maximum(bank.filters.covariance[bank.scatters :, at, at], 0)
+    progress = bank.progress[bank.scatters :]
     shift = shift_of_mixture(quantity, weights, progress * size, progress * np.sqrt(variance))
-    close = np.abs(log_mass - log_mass[j]) < _ALIKE_NATS
+    together, alike = _company(bank, j, log_mass)
     return Moved(
         quantity=quantity.name,
-        probability=float(np.exp(log_mass[j] - log_total(log_mass))),
+        probability=probability,
         shift_mean=shift.mean,
         shift_sd=shift.sd,
         end=quantity.end,
         plane=quantity.plane,
-        alike=tuple(
-            other.name for i, other in enumerate(quantities) if close[i] and other is not quantity
-        ),
+        alike=tuple(quantities[i].name for i in alike),
+        together=tuple(quantities[i].name for i in together),
     )
 
 
-def drifted(watcher: Watcher, bank: Bank, reading: Reading) -> tuple[Drift, ...]:
-    """The shift of each quantity since the baseline, called changes and a possible new one."""
-    weights = _weights(bank, probability_of_change(bank, watcher.options))
+def _company(bank: Bank, j: int, log_mass: FloatArray) -> tuple[list[int], list[int]]:
+    """What moves with quantity `j` in the likeliest direction with it; what does as well without.
+
+    The latter are the quantities of the directions without `j` whose evidence is as good, those
+    aside that only add to another such.
+    """
+    members = bank.members
+    likeliest = int(np.argmax(np.where(members[:, j], log_mass, -np.inf)))
+    close = np.abs(log_mass - log_mass[likeliest]) < _ALIKE_NATS
+    others = [set(np.flatnonzero(each).tolist()) for each in members[close & ~members[:, j]]]
+    fewest = [each for each in others if not any(other < each for other in others)]
+    together = set(np.flatnonzero(members[likeliest]).tolist())
+    return sorted(together - {j}), sorted(set().union(*fewest) - together)
+
+
+def _given(bank: Bank, shares: FloatArray) -> FloatArray:
+    """The probability of each filter (B,), given one of the changes with `shares`."""
+    return np.concatenate([np.zeros(bank.scatters), (shares / shares.sum()).ravel()])
+
+
+def drifted(subject: Subject, bank: Bank, reading: Reading) -> tuple[Drift, ...]:
+    """The shift of each quantity since the baseline, called changes and a possible new one.
+
+    Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
+    would pass for none, and be surer the smaller it is. The probability of a shift beyond the
+    threshold is averaged over all.
+    """
+    weights = _weights(bank, probability_of_change(bank, subject.options))
     mean, sd = _shifts(bank)
-    return tuple(
-        _drift(watcher, quantity, reading, weights, mean[:, j], sd[:, j])
-        for j, quantity in enumerate(watcher.quantities)
-    )
+    found = []
+    for j, quantity in enumerate(subject.quantities):
+        given_change = _given_any_change(bank, j, weights)
+        shift = shift_of_mixture(quantity, given_change, mean[:, j], sd[:, j])
+        moving = (sd[:, j] > 0) | (mean[:, j] != 0)
+        threshold = _threshold(subject, quantity)
+        chance = beyond(quantity, weights[moving], mean[moving, j], sd[moving, j], threshold)
+        found.append(_drift(subject, quantity, reading, shift, threshold, chance))
+    return tuple(found)
+
+
+def _given_any_change(bank: Bank, j: int, weights: FloatArray) -> FloatArray:
+    """The probability of each filter (B,), given that quantity `j` changed since the baseline.
+
+    What a call said to have moved has changed, whatever came since; `weights` are not given that.
+    A change that the last test alone speaks for does not count: that may be a blunder.
+    """
+    shares = bank.shares * bank.members[:, j]
+    if len(bank.beginnings) < 2 or not shares[:-1].any():
+        return weights
+    shares[-1] = 0
+    called = float(bank.called[j])
+    return called * weights + (1 - called) * _given(bank, shares)
 
 
 def _shifts(bank: Bank) -> tuple[FloatArray, FloatArray]:
     """Mean and sd of each quantity's shift by each filter (B, q), in steps."""
-    filters, q = bank.filters, bank.design.q
+    filters, q, known = bank.filters, bank.design.q, bank.design.known
     loadings = np.zeros((len(filters), q, bank.design.size))
-    loadings[:, :, :-1] = bank.design.change_loadings(bank.years)
-    loadings[np.arange(len(filters)), filters.quantity, -1] = bank.progress
+    loadings[:, :, :known] = bank.design.change_loadings(bank.years)
+    loadings[:, range(q), range(known, known + q)] = bank.progress[:, None]
     moving = slice(2 * q, None)
     loadings = loadings[:, :, moving]
     reached = loadings @ filters.covariance[:, moving, moving]
@@ -152,29 +202,34 @@ def _shifts(bank: Bank) -> tuple[FloatArray, FloatArray]:
     return mean, np.sqrt(np.maximum(variance, 0))
 
 
+def _threshold(subject: Subject, quantity: WatchedQuantity) -> float:
+    limits = subject.hanger.thresholds
+    return (
+        limits.tension_shift_fraction
+        if quantity.name == TENSION
+        else limits.stiffness_shift_decades
+    )
+
+
 def _drift(
-    watcher: Watcher,
+    subject: Subject,
     quantity: WatchedQuantity,
     reading: Reading,
-    weights: FloatArray,
-    mean: FloatArray,
-    sd: FloatArray,
+    shift: Shift,
+    threshold: float,
+    probability: float,
 ) -> Drift:
-    limits = watcher.hanger.thresholds
-    tension = quantity.name == TENSION
-    threshold = limits.tension_shift_fraction if tension else limits.stiffness_shift_decades
-    moving = (sd > 0) | (mean != 0)
-    shift = shift_of_mixture(quantity, weights[moving], mean[moving], sd[moving], threshold)
     at_rest = value_at(quantity, 0.0)
+    is_tension = quantity.name == TENSION
     return Drift(
-        hanger=watcher.hanger.id,
+        hanger=subject.hanger.id,
         test=reading.test,
         time=reading.time,
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=at_rest * (1 + shift.mean) if tension else at_rest + shift.mean,
+        value=at_rest * (1 + shift.mean) if is_tension else at_rest + shift.mean,
         shift_mean=shift.mean,
         shift_sd=shift.sd,
         threshold=threshold,
-        probability=shift.beyond,
+        probability=probability,
     )

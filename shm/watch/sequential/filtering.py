@@ -1,10 +1,10 @@
 """Many Kalman filters at once, each of which may take a reading for an outlier by itself.
 
 A reading is good with probability 1 - p. An outlier says nothing of the state; it lies anywhere, by
-a multivariate t distribution ten times as wide as a good one, or as if one quantity had changed for
-this test alone. The latter makes sure that no single reading speaks for a change by more than 2/p,
-of whatever size it is. After each reading the two cases are merged by their moments (Harrison and
-Stevens 1976).
+a multivariate t distribution ten times as wide as a good one, or as if what may change had done so
+for this test alone. The latter makes sure that no single reading speaks for a change by more than
+2/p, of whatever size it is. After each reading the two cases are merged by their moments (Harrison
+and Stevens 1976).
 
 A change is of the size of a step in nine cases of ten, else of six. Its first reading tells which,
 so that the two are one filter from then on.
@@ -13,11 +13,13 @@ so that the two are one filter from then on.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shm.values import FloatArray, IntArray
+from shm.watch.sequential.directions import Direction
 from shm.watch.sequential.measurement import Measurement
 
 _WIDER = 10.0
@@ -30,13 +32,12 @@ _LOG_SHARES = np.log([0.9, 0.1])
 class Filters:
     """States of B filters: `mean` (B, n) and `covariance` (B, n, n).
 
-    The last element of a state is a change of the one `quantity` (B,), whose test-to-test scatter
-    has the variances `scatter` (B, q); all in units of a step.
+    The last q elements of a state are a change of each quantity, whose test-to-test scatter has the
+    variances `scatter` (B, q); all in units of a step.
     """
 
     mean: FloatArray
     covariance: FloatArray
-    quantity: IntArray
     scatter: FloatArray
 
     def __len__(self) -> int:
@@ -44,16 +45,13 @@ class Filters:
 
     def taken(self, rows: IntArray) -> Filters:
         """Some of them, in the order of `rows`."""
-        return Filters(
-            self.mean[rows], self.covariance[rows], self.quantity[rows], self.scatter[rows]
-        )
+        return Filters(self.mean[rows], self.covariance[rows], self.scatter[rows])
 
     def with_more(self, other: Filters) -> Filters:
         """These, then the others."""
         return Filters(
             np.concatenate([self.mean, other.mean]),
             np.concatenate([self.covariance, other.covariance]),
-            np.concatenate([self.quantity, other.quantity]),
             np.concatenate([self.scatter, other.scatter]),
         )
 
@@ -81,40 +79,41 @@ class _Innovation:
     reached: FloatArray
 
 
-def update(
-    filters: Filters,
-    loadings: FloatArray,
-    progress: FloatArray,
-    measurement: Measurement,
-    outlier_probability: float,
-) -> Updated:
-    """One reading into all filters.
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """How a reading sees the states of filters.
 
-    `loadings` (q, n - 1) say how the level of each quantity follows from the state without its last
-    element, `progress` (B,) how much of the change each filter takes for done.
+    `loadings` (q, n - q) say how the level of each quantity follows from the state without the
+    change. Of the changes that may be, `directions`, each may be an outlier's, too.
     """
+
+    loadings: FloatArray
+    measurement: Measurement
+    outlier_probability: float
+    directions: tuple[Direction, ...]
+
+
+def update(filters: Filters, progress: FloatArray, sight: Sight) -> Updated:
+    """One reading into all filters; `progress` (B,) is how much of the change each has for done."""
+    measurement, outlier_probability = sight.measurement, sight.outlier_probability
     if not len(measurement.values):
         return Updated(filters, np.zeros(len(filters)), np.full(len(filters), outlier_probability))
-    seen = _innovation(filters, loadings, progress, measurement)
+    seen = _innovation(filters, progress, sight)
     size = -(len(measurement.values) * math.log(2 * math.pi) + seen.log_det) / 2
     good = math.log1p(-outlier_probability) + size - seen.square / 2
-    bad = math.log(outlier_probability) + _log_outlier(seen, size, measurement.directions)
+    bad = math.log(outlier_probability) + _log_outlier(seen, size, sight)
     log_density = np.logaddexp(good, bad)
     weight = np.exp(good - log_density)
     return Updated(_moved(filters, seen, weight), log_density, 1 - weight)
 
 
-def update_new(
-    filters: Filters,
-    loadings: FloatArray,
-    progress: FloatArray,
-    measurement: Measurement,
-    outlier_probability: float,
-) -> Updated:
-    """The first reading into filters whose change begins with it and is of unknown size."""
+def update_new(filters: Filters, prior: FloatArray, progress: FloatArray, sight: Sight) -> Updated:
+    """The first reading into filters whose change begins with it.
+
+    Its covariance is `prior` (B, q, q) by an unknown size.
+    """
     by_size = [
-        update(_of_size(filters, size), loadings, progress, measurement, outlier_probability)
-        for size in _SIZES.tolist()
+        update(_of_size(filters, size**2 * prior), progress, sight) for size in _SIZES.tolist()
     ]
     joint = _LOG_SHARES[:, None] + np.array([each.log_density for each in by_size])
     log_density = np.logaddexp.reduce(joint, axis=0)
@@ -126,32 +125,28 @@ def update_new(
     covariance = np.einsum("sb,sbij->bij", weights, covariances)
     covariance += np.einsum("sb,sbi,sbj->bij", weights, apart, apart)
     outlier = np.einsum("sb,sb->b", weights, np.array([each.outlier for each in by_size]))
-    merged = Filters(mean, covariance, filters.quantity, filters.scatter)
-    return Updated(merged, log_density, outlier)
+    return Updated(Filters(mean, covariance, filters.scatter), log_density, outlier)
 
 
-def _of_size(filters: Filters, size: float) -> Filters:
-    """The same, their change not yet known, of standard deviation `size`."""
+def _of_size(filters: Filters, change: FloatArray) -> Filters:
+    """The same, their change not yet known, of covariance `change` (B, q, q)."""
+    known = filters.mean.shape[1] - change.shape[1]
     covariance = filters.covariance.copy()
-    covariance[:, :, -1] = covariance[:, -1, :] = 0
-    covariance[:, -1, -1] = size**2
-    return Filters(filters.mean, covariance, filters.quantity, filters.scatter)
+    covariance[:, :, known:] = covariance[:, known:, :] = 0
+    covariance[:, known:, known:] = change
+    return Filters(filters.mean, covariance, filters.scatter)
 
 
-def _innovation(
-    filters: Filters, loadings: FloatArray, progress: FloatArray, measurement: Measurement
-) -> _Innovation:
-    rows, n, q = np.arange(len(filters)), loadings.shape[1], len(loadings)
-    covariance, quantity = filters.covariance, filters.quantity
-    reached = covariance[:, :, :n] @ loadings.T
-    reached[rows, :, quantity] += progress[:, None] * covariance[:, :, n]
-    level = loadings @ reached[:, :n]
-    level[rows, quantity] += progress[:, None] * reached[:, n]
+def _innovation(filters: Filters, progress: FloatArray, sight: Sight) -> _Innovation:
+    loadings, measurement = sight.loadings, sight.measurement
+    q, known = loadings.shape
+    done, covariance = progress[:, None, None], filters.covariance
+    reached = covariance[:, :, :known] @ loadings.T + done * covariance[:, :, known:]
+    level = loadings @ reached[:, :known] + done * reached[:, known:]
     level[:, range(q), range(q)] += filters.scatter
     if measurement.kelvin_sd > 0:
-        level += measurement.kelvin_sd**2 * _coefficient_square(filters, q)
-    mean = filters.mean[:, :n] @ loadings.T
-    mean[rows, quantity] += progress * filters.mean[:, n]
+        level += measurement.kelvin_sd**2 * _per_kelvin_square(filters, measurement)
+    mean = filters.mean[:, :known] @ loadings.T + progress[:, None] * filters.mean[:, known:]
     directions, d = measurement.directions, len(measurement.values)
     spread = np.swapaxes(level @ directions, 1, 2) @ directions
     spread[:, range(d), range(d)] += measurement.variances
@@ -163,15 +158,16 @@ def _innovation(
     return _Innovation(error, inverse, log_det, square, reached @ inverse, reached)
 
 
-def _coefficient_square(filters: Filters, q: int) -> FloatArray:
-    """Mean of the outer product of the temperature coefficients (B, q, q)."""
-    mean = filters.mean[:, q : 2 * q]
+def _per_kelvin_square(filters: Filters, measurement: Measurement) -> FloatArray:
+    """Mean of the outer product of what a kelvin does to the quantities (B, q, q)."""
+    q = len(measurement.per_kelvin)
+    mean = filters.mean[:, q : 2 * q] + measurement.per_kelvin
     return filters.covariance[:, q : 2 * q, q : 2 * q] + mean[:, :, None] * mean[:, None, :]
 
 
-def _log_outlier(seen: _Innovation, size: FloatArray, directions: FloatArray) -> FloatArray:
+def _log_outlier(seen: _Innovation, size: FloatArray, sight: Sight) -> FloatArray:
     """Log density (B,) of a reading that is an outlier; `size` is a normal one's at its top."""
-    d, q = seen.error.shape[1], len(directions)
+    d = seen.error.shape[1]
     constant = (
         math.lgamma((_TAIL + d) / 2)
         - math.lgamma(_TAIL / 2)
@@ -179,15 +175,45 @@ def _log_outlier(seen: _Innovation, size: FloatArray, directions: FloatArray) ->
         - d * math.log(_WIDER)
     )
     anywhere = size + constant - (_TAIL + d) / 2 * np.log1p(seen.square / _TAIL / _WIDER**2)
-    weighed = seen.inverse @ directions.T
+    weighed = seen.inverse @ sight.measurement.directions.T
     along = (seen.error[:, None, :] @ weighed)[:, 0]
-    seen_alone = np.einsum("qd,bdq->bq", directions, weighed)
-    grown = 1 + _SIZES[:, None, None] ** 2 * seen_alone
-    gained = along**2 * _SIZES[:, None, None] ** 2 / grown
-    lone = _LOG_SHARES[:, None, None] + (gained - np.log(grown)) / 2
-    lone_mean = np.logaddexp.reduce(lone, axis=(0, 2)) - math.log(q) + size - seen.square / 2
-    either: FloatArray = np.logaddexp(anywhere, lone_mean) - math.log(2)
+    lone = _log_lone(along, sight.measurement.directions @ weighed, sight.directions)
+    either: FloatArray = np.logaddexp(anywhere, lone + size - seen.square / 2) - math.log(2)
     return either
+
+
+def _log_lone(
+    along: FloatArray, information: FloatArray, directions: Sequence[Direction]
+) -> FloatArray:
+    """Log of how much more likely (B,) a reading is if one of `directions` was its alone.
+
+    `information` (B, q, q) is the reading's of all quantities, `along` (B, q) that by what was not
+    expected.
+    """
+    factors = []
+    for direction in directions:
+        pull, precision = along @ direction.root, direction.root.T @ information @ direction.root
+        factors += [
+            share + _log_factor(size * pull, size**2 * precision)
+            for size, share in zip(_SIZES, _LOG_SHARES, strict=True)
+        ]
+    mean: FloatArray = np.logaddexp.reduce(factors, axis=0) - math.log(len(directions))
+    return mean
+
+
+def _log_factor(pull: FloatArray, precision: FloatArray) -> FloatArray:
+    """Log of exp(v' (I + M)^-1 v / 2) / sqrt(det(I + M)) with v `pull` (B, r), M `precision`.
+
+    One latent variable after another, which is faster than inverses of many small matrices.
+    """
+    found = np.zeros(len(pull))
+    for k in range(pull.shape[1]):
+        grown = 1 + precision[:, k, k]
+        found += (pull[:, k] ** 2 / grown - np.log(grown)) / 2
+        column = precision[:, k]
+        pull = pull - column * (pull[:, k] / grown)[:, None]
+        precision = precision - column[:, :, None] * (column / grown[:, None])[:, None]
+    return found
 
 
 def _moved(filters: Filters, seen: _Innovation, weight: FloatArray) -> Filters:
@@ -198,6 +224,5 @@ def _moved(filters: Filters, seen: _Innovation, weight: FloatArray) -> Filters:
     return Filters(
         filters.mean + weight[:, None] * pull,
         filters.covariance - learnt + unsure[:, :, None] * unsure[:, None, :],
-        filters.quantity,
         filters.scatter,
     )

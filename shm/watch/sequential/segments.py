@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from shm.values import FloatArray, IntArray
-from shm.watch.sequential.bank import KINDS, RAMP, Bank, log_total
+from shm.values import BoolArray, FloatArray, IntArray
+from shm.watch.sequential.bank import KINDS, RAMP, Bank
 from shm.watch.sequential.design import Design
 from shm.watch.sequential.filtering import Filters
 
@@ -19,7 +21,7 @@ def taken_over(bank: Bank) -> Bank:
     All changes that may have been the called one are merged by their moments. Jump and level stay
     apart in the state, so that later tests still sharpen both, and which quantity it was.
     """
-    share = np.exp(bank.changes - log_total(bank.changes))
+    share = bank.shares
     design = _design(bank, share)
     rows = bank.scatters + np.arange(share.size).reshape(share.shape)
     states = [
@@ -28,20 +30,31 @@ def taken_over(bank: Bank) -> Bank:
     filters = Filters(
         np.array([mean for mean, _ in states]),
         np.array([covariance for _, covariance in states]),
-        np.zeros(bank.scatters, dtype=np.int64),
         bank.filters.scatter[: bank.scatters],
     )
     log_mass = np.log(np.maximum(share.sum(axis=(0, 2, 3)), 1e-300))
-    return Bank(design, bank.scatters, filters, log_mass, bank.years, bank.log_choices)
+    return replace(
+        bank,
+        design=design,
+        filters=filters,
+        log_mass=log_mass,
+        called=1 - (1 - bank.called) * (1 - share.sum(axis=(0, 1, 2)) @ bank.members),
+        beginnings=(),
+        outlier=np.zeros(0),
+    )
 
 
 def _design(bank: Bank, share: FloatArray) -> Design:
     """With a place for each quantity that may have changed, and for what may be going on."""
-    jumped = share.sum(axis=(0, 1, 2)) > _PLACE_FOR_A_JUMP
-    going_on = share[:, :, RAMP].sum(axis=(0, 1)) > _PLACE_FOR_A_RATE
-    return bank.design.after(
-        bank.years, set(np.flatnonzero(jumped).tolist()), set(np.flatnonzero(going_on).tolist())
-    )
+    jumped = _members(bank, share.sum(axis=(0, 1, 2)) > _PLACE_FOR_A_JUMP)
+    going_on = _members(bank, share[:, :, RAMP].sum(axis=(0, 1)) > _PLACE_FOR_A_RATE)
+    return bank.design.after(bank.years, jumped, going_on)
+
+
+def _members(bank: Bank, chosen: BoolArray) -> set[int]:
+    """The quantities that move in the directions `chosen` (D,)."""
+    pairs = zip(bank.directions, chosen.tolist(), strict=True)
+    return {j for direction, taken in pairs if taken for j in direction.members}
 
 
 def _merged(
@@ -53,9 +66,8 @@ def _merged(
     progress = bank.progress
     means, covariances = [], []
     for row in rows:
-        kind = (row - bank.scatters) // bank.design.q % KINDS
-        quantity = int(bank.filters.quantity[row])
-        carry = bank.design.carried(design, quantity, float(progress[row]), kind == RAMP)
+        kind = (row - bank.scatters) // len(bank.directions) % KINDS
+        carry = bank.design.carried(design, float(progress[row]), kind == RAMP)
         means.append(carry @ bank.filters.mean[row])
         covariances.append(carry @ bank.filters.covariance[row] @ carry.T)
     mean = weights @ np.array(means)

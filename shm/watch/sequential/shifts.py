@@ -18,19 +18,14 @@ _NEGLIGIBLE = 1e-7
 
 @dataclass(frozen=True)
 class Shift:
-    """Mean and sd of a shift, and the probability that it is beyond a threshold, one way."""
+    """Mean and sd of a shift."""
 
     mean: float
     sd: float
-    beyond: float
 
 
 def shift_of_mixture(
-    quantity: WatchedQuantity,
-    weights: FloatArray,
-    mean: FloatArray,
-    sd: FloatArray,
-    threshold: float = math.inf,
+    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
 ) -> Shift:
     """Of normal distributions (B,) in units of a step; no shift at all with what `weights` leave.
 
@@ -43,21 +38,21 @@ def shift_of_mixture(
     first = float(weights @ shifts @ _WEIGHTS)
     second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
     second += (1 - float(weights.sum())) * first**2
-    return Shift(
-        first, math.sqrt(max(second, 0.0)), _beyond(quantity, weights, mean, sd, threshold)
-    )
+    return Shift(first, math.sqrt(max(second, 0.0)))
 
 
-def _beyond(
+def beyond(
     quantity: WatchedQuantity,
     weights: FloatArray,
     mean: FloatArray,
     sd: FloatArray,
     threshold: float,
 ) -> float:
-    """The likelier of a shift below minus the threshold and one above it."""
+    """Probability of a shift beyond a threshold, the likelier way, by the same mixture."""
+    kept = weights > _NEGLIGIBLE
+    weights, mean = weights[kept], mean[kept] * quantity.step_sd
+    sd = np.maximum(sd[kept] * quantity.step_sd, 1e-12)
     low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
-    sd = np.maximum(sd, 1e-12)
     down = float(weights @ ndtr((low - mean) / sd))
     up = float(weights @ ndtr((mean - high) / sd))
     return min(max(down, up), 1.0)

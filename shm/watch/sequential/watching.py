@@ -1,14 +1,17 @@
-"""The sequential watch of one hanger: a pass over its readings, a result after each."""
+"""The sequential watch of one hanger: a result after each reading, from the state before it."""
 
 from __future__ import annotations
 
+import hashlib
 import itertools
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from shm.errors import BadInput
+from shm.errors import BadInput, UsageError
 from shm.values import (
     TENSION,
     Change,
@@ -20,10 +23,14 @@ from shm.values import (
 )
 from shm.watch.options import WatchOptions
 from shm.watch.sequential.bank import Bank, first_bank, read
-from shm.watch.sequential.conclusions import Watcher, changed, drifted, probability_of_change
-from shm.watch.sequential.measurement import measurements
+from shm.watch.sequential.conclusions import Subject, changed, drifted, probability_of_change
+from shm.watch.sequential.directions import directions_of
+from shm.watch.sequential.measurement import Warmth, measurement_of, years_between
 from shm.watch.sequential.segments import taken_over
+from shm.watch.sequential.state import WatchState
 
+# To be raised whenever the same readings give other results than before: kept states are void then.
+_VERSION = 1
 # All is measured from a baseline of one test: taken for a blunder, every loss after it would be the
 # truth that it missed.
 _OUTLIER_IF_ALONE = 1e-6
@@ -45,6 +52,98 @@ class Watch:
     calls: tuple[Call, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Watcher:
+    """Watches one hanger, test by test: `begin` with its baseline, `after` for each one later.
+
+    Of each quantity the level is fixed, but for a linear effect of the temperature whose
+    coefficient is learnt, and for changes: steps, or ramps that go on. A `change` is `called` at
+    one test only; after it the watch looks for a further one, and drifts are the sum of all.
+    Raises BadInput without any quantity.
+    """
+
+    quantities: tuple[WatchedQuantity, ...]
+    hanger: Hanger
+    options: WatchOptions = field(default_factory=WatchOptions)
+
+    def __post_init__(self) -> None:
+        if not self.quantities:
+            raise BadInput("The watch was given no quantity.", remedy="Watch the tension at least.")
+
+    @cached_property
+    def key(self) -> str:
+        """Names what a state rests on beside the readings: the rules, options and quantities."""
+        given = [_VERSION, asdict(self.options), [_told(each) for each in self.quantities]]
+        return hashlib.sha256(json.dumps(given).encode()).hexdigest()
+
+    def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
+        """The state after the readings of the baseline, by time, and a result for each of them.
+
+        Raises UsageError where these are more than the options' `baseline_tests`, or none. Where
+        they are fewer, the state cannot go on.
+        """
+        if not 0 < len(readings) <= self.options.baseline_tests:
+            raise UsageError(
+                f"The watch was to begin with {len(readings)} readings; its baseline has "
+                f"{self.options.baseline_tests}."
+            )
+        time = readings[0].time
+        bank = first_bank(directions_of(self.quantities), *_priors(self.quantities, self.options))
+        warmth = Warmth.at([reading.temperature_c for reading in readings])
+        state, tests = WatchState(self.key, 0, time, time, bank, warmth, 1.0), []
+        for reading in readings:
+            state, found = self._next(state, reading)
+            tests.append(found)
+        return state, Watch(tuple(tests), ())
+
+    def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        """The state after one more reading, and the result.
+
+        Raises BadInput where the reading is older than the last, or of other quantities, UsageError
+        where the state is that of another watch, or its baseline is not complete.
+        """
+        if state.key != self.key or state.tests < self.options.baseline_tests:
+            raise UsageError(
+                "This state of a watch is not of this hanger, baseline and options.",
+                remedy="Begin the watch anew.",
+            )
+        return self._next(state, reading)
+
+    def _next(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        if reading.time < state.last_time:
+            raise BadInput(
+                f"The watch was given test {reading.test} after one that is later.",
+                remedy="Sort the tests by time.",
+            )
+        years = years_between(state.start, reading.time)
+        warmth, *kelvin = state.warmth.after(reading.temperature_c, years, self.options)
+        steps = np.array([quantity.step_sd for quantity in self.quantities])
+        measurement = measurement_of(reading, steps, years, *kelvin)
+        is_baseline = state.tests < self.options.baseline_tests
+        bank = read(state.bank, measurement, self._believed(state), may_change=not is_baseline)
+        subject = Subject(self.quantities, self.hanger, self.options, state.start)
+        found = _result(subject, bank, reading, 1 - state.still_same)
+        still_same = state.still_same
+        if found.change.called:
+            still_same *= 1 - probability_of_change(bank, self.options)
+            bank = taken_over(bank)
+        later = replace(
+            state,
+            tests=state.tests + 1,
+            last_time=reading.time,
+            bank=bank,
+            warmth=warmth,
+            still_same=still_same,
+        )
+        return later, found
+
+    def _believed(self, state: WatchState) -> WatchOptions:
+        alone = self.options.baseline_tests == 1 and not state.tests
+        return (
+            replace(self.options, outlier_probability=_OUTLIER_IF_ALONE) if alone else self.options
+        )
+
+
 def watched(
     readings: Sequence[Reading],
     quantities: tuple[WatchedQuantity, ...],
@@ -63,41 +162,36 @@ def watch_over(
 ) -> Watch:
     """One result a reading, each of which rests on the readings up to it alone.
 
-    Of each quantity the level is fixed, but for a linear effect of the temperature whose
-    coefficient is learnt, and for changes: steps, or ramps that go on. A `change` is `called` at
-    one test only; after it the watch looks for a further one, and drifts are the sum of all.
-    Raises BadInput where readings are not in the order of time or not of these quantities.
+    The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
+    time or not of these quantities.
     """
-    options = options or WatchOptions()
-    if not quantities:
-        raise BadInput("The watch was given no quantity.", remedy="Watch the tension at least.")
+    watcher = Watcher(quantities, hanger, options or WatchOptions())
     if not readings:
         return Watch((), ())
-    watcher = Watcher(quantities, hanger, options, readings[0].time)
-    bank = first_bank(*_priors(quantities, options), years=0.0)
-    tests: list[WatchedTest] = []
-    calls: list[Call] = []
-    still_same = 1.0
-    alone = replace(options, outlier_probability=_OUTLIER_IF_ALONE)
-    for index, measurement in enumerate(measurements(readings, quantities, options)):
-        is_baseline = index < options.baseline_tests
-        believed = alone if is_baseline and options.baseline_tests == 1 else options
-        bank = read(bank, measurement, believed, may_change=not is_baseline)
-        tests.append(_result(watcher, bank, readings[index], 1 - still_same))
-        if tests[-1].change.called:
-            still_same *= 1 - probability_of_change(bank, options)
-            calls.append(Call(index, tests[-1].change))
-            bank = taken_over(bank)
+    count = watcher.options.baseline_tests
+    state, begun = watcher.begin(readings[:count])
+    tests = list(begun.tests)
+    for reading in readings[count:]:
+        state, found = watcher.after(state, reading)
+        tests.append(found)
+    calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
 
 
-def _result(watcher: Watcher, bank: Bank, reading: Reading, before: float) -> WatchedTest:
+def _told(quantity: WatchedQuantity) -> list[object]:
+    """All of a quantity, its table as a digest."""
+    table = np.array([quantity.coordinates, quantity.values]).tobytes()
+    plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))
+    return [*plain, *quantity.parameters, hashlib.sha256(table).hexdigest()]
+
+
+def _result(subject: Subject, bank: Bank, reading: Reading, before: float) -> WatchedTest:
     return WatchedTest(
         test=reading.test,
         time=reading.time,
         temperature_c=reading.temperature_c,
-        drifts=drifted(watcher, bank, reading),
-        change=changed(watcher, bank, reading, before),
+        drifts=drifted(subject, bank, reading),
+        change=changed(subject, bank, reading, before),
     )
 
 

@@ -26,8 +26,8 @@ class Outcome:
     `days` (tests,) since the beginning; `changed_at` is the index of the first test after the
     change, None without one. `statistics` by rule (tests,): a rule alarms where its own is beyond
     its limit. `named` (tests,) is what the watch held to have moved, the likeliest first, then what
-    the data cannot tell from it. `plane_of` gives the plane of each spring; `truth` the springs
-    that gave way, or the tension.
+    moved with it and what the data cannot tell from it. `plane_of` gives the plane of each spring;
+    `truth` the springs that gave way, or the tension.
     """
 
     seed: int

@@ -107,11 +107,11 @@ def _beyond(told: WatchedTest) -> float:
 
 
 def _named(told: WatchedTest) -> tuple[str, ...]:
-    """What moved likeliest and what is alike; nothing within the baseline."""
+    """What moved likeliest, what moved with it and what is alike; nothing within the baseline."""
     if not told.change.moved:
         return ()
     first = told.change.moved[0]
-    return (first.quantity, *(name for name in first.alike if name != first.quantity))
+    return first.quantity, *first.together, *first.alike
 
 
 def _truth(

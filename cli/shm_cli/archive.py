@@ -1,0 +1,141 @@
+"""`shm archive`: takes old raw files out of the archive once copies of them lie elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import rich_click as click
+
+from shm.errors import UsageError
+from shm.pipeline import utc_now
+from shm.store import Store, Workspace
+from shm.store.retention import (
+    Refused,
+    Retention,
+    empty_quarantine,
+    expendable,
+    fetch,
+    refused_files,
+    removable,
+    remove,
+)
+from shm_cli.common import json_option, opened_store, progress_bar, show
+
+_DAYS = click.IntRange(1, 36500)
+
+
+@click.group()
+def command() -> None:
+    """Keep the archive and the quarantine from growing for ever.
+
+    \b
+    Example: shm archive fetch t7
+    """
+
+
+@command.command()
+@click.option("--keep-days", type=_DAYS, metavar="N", help="Raw files younger than that stay.")
+@click.option(
+    "--quarantine-days", type=_DAYS, metavar="N", help="Refused files younger than that stay."
+)
+@click.option("--dry-run", is_flag=True, help="Only say what would go.")
+@json_option
+@click.pass_context
+def prune(
+    ctx: click.Context,
+    keep_days: int | None,
+    quarantine_days: int | None,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Remove old raw files of which a whole copy lies elsewhere; rows and results stay.
+
+    A raw file goes only where `shm db backup --archive DIR` has noted a copy that is there now with
+    the same SHA-256, and where its recording is through. A refused file goes from the quarantine
+    only where its bytes lie in the archive or in such a copy. What has no copy stays, however old.
+
+    \b
+    Example: shm archive prune --keep-days 400 --dry-run
+    """
+    if keep_days is None and quarantine_days is None:
+        raise UsageError("nothing is to be pruned.", remedy="Give --keep-days N.")
+    with opened_store(ctx) as (workspace, store):
+        raw = _prune_archive(workspace, store, keep_days, dry_run)
+        refused = _prune_quarantine(workspace, store, quarantine_days, dry_run)
+    document = {"dry_run": dry_run, "archive": raw.document, "quarantine": refused.document}
+    if as_json:
+        show(document)
+        return
+    for what, pruned in (("archive", raw), ("quarantine", refused)):
+        for said in pruned.sentences(what, dry_run):
+            click.echo(said)
+
+
+@command.command("fetch")
+@click.argument("which", metavar="ID")
+@click.pass_context
+def fetch_command(ctx: click.Context, which: str) -> None:
+    """Bring the raw file of a recording (by number) or test (by name) back from its copy.
+
+    \b
+    Example: shm archive fetch t7
+    """
+    with opened_store(ctx) as (workspace, store):
+        recording = store.recording(store.recording_named(which)[0])
+        if workspace.archive.holds(recording.file):
+            click.echo(f"{recording.file.file_name} is in the archive.")
+            return
+        folder = fetch(store, workspace.archive, recording)
+    click.echo(f"{recording.file.file_name} is back in the archive, from {folder}.")
+
+
+@dataclass(frozen=True)
+class _Pruned:
+    """What went, or would go, of one of the folders, and why the rest of the old ones stays."""
+
+    files: Sequence[str]
+    freed_bytes: int
+    kept: dict[str, int]
+
+    @property
+    def document(self) -> dict[str, Any]:
+        return {"files": list(self.files), "freed_bytes": self.freed_bytes, "kept": self.kept}
+
+    def sentences(self, what: str, dry_run: bool) -> list[str]:
+        verb = "would be removed, which would free" if dry_run else "removed, which freed"
+        said = [f"{what}: {len(self.files)} files {verb} {self.freed_bytes / 1e6:.1f} MB."]
+        said += [f"  {count} old ones stay: {reason}." for reason, count in self.kept.items()]
+        return said
+
+
+def _prune_archive(
+    workspace: Workspace, store: Store, keep_days: int | None, dry_run: bool
+) -> _Pruned:
+    found = Retention((), {})
+    if keep_days is not None:
+        with progress_bar("comparing") as tell:
+            before = utc_now() - timedelta(days=keep_days)
+            found = removable(store, workspace.archive, before, tell)
+    freed = found.size_bytes
+    if not dry_run:
+        freed = remove(store, workspace.archive, found.removals, utc_now())
+    files = [removal.recording.file.file_name for removal in found.removals]
+    return _Pruned(files, freed, dict(found.kept))
+
+
+def _prune_quarantine(
+    workspace: Workspace, store: Store, keep_days: int | None, dry_run: bool
+) -> _Pruned:
+    old: tuple[Refused, ...] = ()
+    if keep_days is not None:
+        old = refused_files(workspace.quarantine.folder, utc_now() - timedelta(days=keep_days))
+    going = expendable(store, workspace.archive, old)
+    if not dry_run:
+        empty_quarantine(going)
+    names = [file.path.name for file in going]
+    left = len(old) - len(going)
+    kept = {"their bytes lie nowhere else": left} if left else {}
+    return _Pruned(names, sum(file.size_bytes for file in going), kept)

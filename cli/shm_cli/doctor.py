@@ -1,0 +1,65 @@
+"""`shm doctor`: whether all is well, and what to do where it is not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import rich_click as click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from shm.errors import StoreError
+from shm.pipeline import utc_now
+from shm_cli.common import json_option, show
+from shm_daemon.doctor import Finding, Level, examine
+
+_STYLES = {
+    Level.OK: "green",
+    Level.UNKNOWN: "dim",
+    Level.WARNING: "yellow",
+    Level.FAULT: "bold red",
+}
+_FAULT = 1
+
+
+@click.command()
+@json_option
+@click.pass_context
+def command(ctx: click.Context, as_json: bool) -> int:
+    """Whether all is well, and what to do where it is not.
+
+    Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers and
+    versions; changes and sends nothing. Exit code 0 without a fault (warnings are none), 5 where
+    the store is at fault, else 1.
+
+    \b
+    Example: shm --workspace arch doctor
+    """
+    findings = examine(Path(ctx.obj), utc_now())
+    if as_json:
+        show({"worst": _worst(findings), "findings": [asdict(each) for each in findings]})
+    else:
+        _show(findings)
+    faults = {each.check for each in findings if each.level is Level.FAULT}
+    return StoreError.exit_code if "store" in faults else _FAULT if faults else 0
+
+
+def _worst(findings: Sequence[Finding]) -> str:
+    order = list(Level)
+    return max((each.level for each in findings), key=order.index)
+
+
+def _show(findings: Sequence[Finding]) -> None:
+    made = Table(box=None, show_header=False, pad_edge=False)
+    for each in findings:
+        remedy = f"\n-> {each.remedy}" if each.remedy else ""
+        level = Text(each.level, style=_STYLES[each.level])
+        made.add_row(level, Text(each.check), Text(f"{each.found}{remedy}"))
+    console = Console(highlight=False)
+    console.print(made)
+    counted = Counter(each.level for each in findings)
+    console.print(f"faults: {counted[Level.FAULT]}, warnings: {counted[Level.WARNING]}")

@@ -1,0 +1,85 @@
+"""`shm token`: who may read and write over the network."""
+
+from __future__ import annotations
+
+import rich_click as click
+
+from shm_cli.common import json_option, opened_store, show, show_table, table
+
+
+@click.group()
+def command() -> None:
+    """Who may read and write over the network.
+
+    \b
+    Example: shm token list
+    """
+
+
+@command.command()
+@click.argument("name")
+@click.option(
+    "--scope",
+    type=click.Choice(["read", "write"]),
+    default="read",
+    show_default=True,
+    help="`write` may upload and acknowledge, and read.",
+)
+@click.pass_context
+def create(ctx: click.Context, name: str, scope: str) -> None:
+    """Make a token and print it, this once.
+
+    It goes into the header `Authorization: Bearer TOKEN`. Only its checksum is kept: where it is
+    lost, revoke it and make another.
+
+    \b
+    Example: shm token create logger --scope write
+    """
+    from shm.pipeline import utc_now
+    from shm.store import Scope
+
+    with opened_store(ctx) as (_, store):
+        secret = store.create_token(name, Scope(scope), utc_now())
+    click.echo(secret)
+    click.echo(f"Token {name} may {scope}. It is not shown again.", err=True)
+
+
+@command.command("list")
+@json_option
+@click.pass_context
+def list_tokens(ctx: click.Context, as_json: bool) -> None:
+    """Tokens, when they were last used, and which are revoked.
+
+    \b
+    Example: shm token list --json
+    """
+    with opened_store(ctx) as (_, store):
+        tokens = store.tokens()
+    if as_json:
+        show({"tokens": [{**vars(each), "scopes": sorted(each.scopes)} for each in tokens]})
+        return
+    if not tokens:
+        click.echo("No token has been made.")
+        return
+    made = table("tokens", "name", "may", "made", "last used", "revoked")
+    for each in tokens:
+        times = (each.created_at, each.last_used_at, each.revoked_at)
+        told = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
+        made.add_row(each.name, ", ".join(sorted(each.scopes)), *told)
+    show_table(made)
+
+
+@command.command()
+@click.argument("name")
+@click.pass_context
+def revoke(ctx: click.Context, name: str) -> None:
+    """End a token, at once.
+
+    \b
+    Example: shm token revoke logger
+    """
+    from shm.pipeline import utc_now
+
+    with opened_store(ctx) as (_, store):
+        store.revoke_token(name, utc_now())
+    click.echo(f"Token {name} is revoked.")

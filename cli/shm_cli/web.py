@@ -1,0 +1,46 @@
+"""`shm web`: the web interface in a process of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rich_click as click
+
+from shm_cli.common import log_file_option, open_workspace
+
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.option("--host", default="127.0.0.1", show_default=True, help="The address to listen on.")
+@click.option(
+    "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="The port."
+)
+@click.option("--certificate", type=_FILE, metavar="PEM", help="Serve HTTPS with this.")
+@click.option("--key", type=_FILE, metavar="PEM", help="The key of the certificate.")
+@log_file_option
+@click.pass_context
+def command(
+    ctx: click.Context,
+    host: str,
+    port: int,
+    certificate: Path | None,
+    key: Path | None,
+    log_file: Path | None,
+) -> None:
+    """Upload, states, alerts, health and metrics over HTTP.
+
+    Only this machine can reach it unless --host says otherwise; then all but /health needs a token
+    of `shm token create`. Writing always needs one. Runs beside the daemon, or with it as
+    `shm daemon --web`.
+
+    \b
+    Example: shm --workspace arch web --port 8400
+    """
+    from shm_daemon.logs import begin_logging
+    from shm_daemon.web.address import Address
+    from shm_daemon.web.serving import serve
+
+    workspace = open_workspace(ctx)
+    begin_logging(workspace.settings, log_file)
+    serve(workspace, Address(host, port), certificate, key)

@@ -1,0 +1,44 @@
+"""A flow of the command line's own: what `shm ingest` takes in or sends back is done at once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+
+from shm.pipeline import Flow
+from shm.store import Stage, Workspace
+from shm_cli.common import counting_bar
+from shm_daemon.execution import children_ended, executor_of
+from shm_daemon.hooks import HookNotifier
+
+
+@contextmanager
+def working(workspace: Workspace) -> Iterator[Flow]:
+    """A flow while the context lasts; raises StoreBusy where another process ingests."""
+    settings = workspace.settings
+    with ExitStack() as stack:
+        stack.enter_context(workspace.lock())
+        store = stack.enter_context(workspace.store())
+        stack.enter_context(children_ended())
+        executor = executor_of(settings)
+        stack.callback(executor.shutdown, wait=False, cancel_futures=True)
+        notifier = HookNotifier(workspace.folder, settings.hook_timeout_seconds, os.environ)
+        stack.callback(notifier.close)
+        flow = Flow(workspace, store, executor, notifier=notifier, lanes=settings.workers)
+        stack.callback(flow.close)
+        yield flow
+
+
+def finish(flow: Flow, ids: Sequence[int]) -> None:
+    """Works until nothing waits, and counts the recordings that are through."""
+    ended = {Stage.DONE, Stage.REFUSED}
+    with counting_bar() as bar:
+        task = bar.add_task("ingesting", total=len(ids))
+
+        def count() -> None:
+            through = sum(flow.store.recording(recording_id).stage in ended for recording_id in ids)
+            bar.update(task, completed=through)
+
+        flow.drain(count)
+        count()

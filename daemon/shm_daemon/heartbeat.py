@@ -1,0 +1,62 @@
+"""The signs by which others can tell whether the daemon lives: a file, and messages to systemd."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import time
+from contextlib import suppress
+
+from shm.store import Workspace
+
+HEARTBEAT = "daemon.heartbeat"
+"""A file of the workspace that the active daemon touches at each turn."""
+_PATIENCE_S = 60.0
+_BEATS_A_WATCHDOG = 3
+
+log = logging.getLogger(__name__)
+
+
+def beat(workspace: Workspace) -> None:
+    """Shows that the loop of the active daemon went round."""
+    with suppress(OSError):  # a full or read-only disk is waited out elsewhere
+        (workspace.folder / HEARTBEAT).touch()
+    tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=watching {workspace.spool}")
+
+
+def tell_systemd(*said: str) -> None:
+    """Tells systemd how the service is, where it asked to be told (sd_notify(3)); else nothing.
+
+    READY=1 may be said again and again.
+    """
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
+        return
+    if address.startswith("@"):  # a name that is no file
+        address = "\0" + address[1:]
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as line:
+            line.settimeout(1.0)
+            line.sendto("\n".join(said).encode(), address)
+    except OSError as error:
+        log.debug("systemd cannot be told: %s", error)
+
+
+def longest_wait_s() -> float:
+    """How long the loop may rest between two signs: systemd ends a service that gives none."""
+    limit_us = os.environ.get("WATCHDOG_USEC", "")
+    return int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else float("inf")
+
+
+def seconds_since_beat(workspace: Workspace) -> float | None:
+    """How long ago the loop last went round; None where it never did."""
+    try:
+        return max(0.0, time.time() - (workspace.folder / HEARTBEAT).stat().st_mtime)
+    except OSError:
+        return None
+
+
+def patience_s(workspace: Workspace) -> float:
+    """After so long without a sign the daemon is taken to be down, or stuck."""
+    return _PATIENCE_S + 2 * workspace.settings.spool_scan_seconds

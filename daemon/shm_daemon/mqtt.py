@@ -1,0 +1,292 @@
+"""Recordings by MQTT: topic `shm/<bridge>/<hanger>[/<file name>]`, the payload is the file.
+
+A message lands in the spool as an upload does, and is acknowledged only once the store says that
+its file was received: a daemon or a broker killed before that has it sent again. Protocol 3.1.1,
+which every broker speaks, with a session that the broker keeps while the daemon is down.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import re
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote, urlsplit
+
+from shm.errors import BadInput, ShmError
+from shm.pipeline import utc_now
+from shm.read import FORMATS, sidecar_path
+from shm.store import Store, Workspace
+from shm.store.archive import MODES_SUFFIX
+from shm_daemon.extras import needing
+from shm_daemon.landing import Incoming, Landed, incoming, landing_name
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client, MQTTMessage
+
+PASSWORD_VARIABLE = "SHM_MQTT_PASSWORD"  # noqa: S105
+_PORTS = {"mqtt": 1883, "mqtts": 8883}
+_LOOK_S = 0.2
+_RETRY_S = 5.0
+_LONGEST_RETRY_S = 120
+_HEAD_BYTES = 4096
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Broker:
+    """Where the broker is and who we are there."""
+
+    host: str
+    port: int
+    encrypted: bool
+    user: str = ""
+    password: str = field(default="", repr=False)
+
+    @classmethod
+    def of(cls, url: str, environment: Mapping[str, str]) -> Broker:
+        """The broker of a setting `mqtt_url`; raises BadInput. The password is never in it."""
+        try:
+            parts = urlsplit(url)
+            port = parts.port or _PORTS.get(parts.scheme, 0)
+        except ValueError:
+            raise _bad_url("is no address of a broker") from None
+        if parts.password is not None:
+            raise _bad_url("holds a password, which would stand in files and logs")
+        if parts.scheme not in _PORTS or not parts.hostname or parts.path not in ("", "/"):
+            raise _bad_url("is no address of a broker")
+        user, encrypted = unquote(parts.username or ""), parts.scheme == "mqtts"
+        return cls(parts.hostname, port, encrypted, user, environment.get(PASSWORD_VARIABLE, ""))
+
+
+def topic_of(bridge_name: str) -> str:
+    """The part of the topics that all recordings of a bridge share: `shm/arch-bridge`."""
+    plain = re.sub(r"[^a-z0-9]+", "-", bridge_name.lower()).strip("-")
+    return f"shm/{plain or 'bridge'}"
+
+
+@contextmanager
+def messages(workspace: Workspace) -> Iterator[None]:
+    """Takes messages in while the context lasts; without a setting `mqtt_url`, does nothing.
+
+    For the holder of the workspace's lock. A broker that is down or refuses us is tried again for
+    ever and stops nobody. Raises BadInput for a wrong `mqtt_url`, UsageError where the extra
+    `[mqtt]` is not installed.
+    """
+    url = workspace.settings.mqtt_url
+    if not url:
+        yield
+        return
+    listener = Listener(workspace, Broker.of(url, os.environ))
+    listener.begin()
+    try:
+        yield
+    finally:
+        listener.end()
+
+
+@dataclass(frozen=True)
+class _Message:
+    """A message; its number `mid` means something on the connection that it came by only."""
+
+    connection: int
+    mid: int
+    topic: str
+    payload: bytes
+    again: bool
+
+
+class Listener:
+    """One connection and one worker: messages are queued by the first, landed by the second."""
+
+    def __init__(self, workspace: Workspace, broker: Broker):
+        self._workspace, self._broker = workspace, broker
+        self._topic = topic_of(workspace.bridge.name)
+        self._queue: queue.SimpleQueue[_Message | None] = queue.SimpleQueue()
+        self._pending: list[tuple[_Message, Landed]] = []
+        self._connection, self._ended = 0, threading.Event()
+        self._store: Store | None = None
+        self._subscribed = False
+        self._worker = threading.Thread(target=self._work, name="mqtt", daemon=True)
+        self._client = self._make_client()
+
+    def begin(self) -> None:
+        """Connects, or goes on trying, and returns at once."""
+        self._worker.start()
+        self._client.connect_async(self._broker.host, self._broker.port, keepalive=30)
+        self._client.loop_start()
+
+    def end(self) -> None:
+        """What is not acknowledged by now the broker sends again."""
+        self._ended.set()
+        self._queue.put(None)
+        self._client.disconnect()
+        self._client.loop_stop()
+        self._worker.join(_RETRY_S)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the broker has accepted our subscription."""
+        return self._subscribed
+
+    @property
+    def waiting(self) -> list[str]:
+        """The checksums of what has landed and is not acknowledged yet."""
+        return [landed.sha256 for _, landed in list(self._pending)]
+
+    def _make_client(self) -> Client:
+        with needing("mqtt"):
+            from paho.mqtt.client import Client
+            from paho.mqtt.enums import CallbackAPIVersion
+        # The same name each time, or the broker would keep a session for nobody.
+        name = self._topic.replace("/", "-")
+        client = Client(
+            CallbackAPIVersion.VERSION2, client_id=name, clean_session=False, manual_ack=True
+        )
+        if self._broker.encrypted:
+            client.tls_set()
+        if self._broker.user:
+            client.username_pw_set(self._broker.user, self._broker.password or None)
+        client.reconnect_delay_set(1, _LONGEST_RETRY_S)
+        client.on_connect, client.on_disconnect = self._connected, self._disconnected
+        client.on_subscribe, client.on_message = self._granted, self._heard
+        return client
+
+    # ------------------------------------------------------------ on the connection's thread
+
+    def _connected(self, client: Client, _: Any, flags: Any, reason: Any, properties: Any) -> None:
+        if reason.is_failure:
+            log.warning("the broker %s refuses us: %s", self._broker.host, reason)
+            return
+        self._connection += 1
+        client.subscribe([(f"{self._topic}/+", 1), (f"{self._topic}/+/+", 1)])
+
+    def _granted(self, client: Client, _: Any, mid: int, reasons: Any, properties: Any) -> None:
+        if any(reason.is_failure for reason in reasons):
+            log.warning("the broker %s does not let us have %s/#", self._broker.host, self._topic)
+            return
+        self._subscribed = True
+        log.info("recordings are taken from %s, topic %s/#", self._broker.host, self._topic)
+
+    def _disconnected(self, client: Client, _: Any, flags: Any, reason: Any, __: Any) -> None:
+        self._connection += 1
+        self._subscribed = False
+        if not self._ended.is_set():
+            log.warning("no connection to the broker %s: %s", self._broker.host, reason)
+
+    def _heard(self, client: Client, _: Any, message: MQTTMessage) -> None:
+        again = message.dup or message.retain
+        self._queue.put(
+            _Message(self._connection, message.mid, message.topic, bytes(message.payload), again)
+        )
+
+    # ------------------------------------------------------------ on the worker's thread
+
+    def _work(self) -> None:
+        while not self._ended.is_set():
+            message = self._next()
+            try:
+                if message is not None:
+                    self._take(message)
+                    message = None
+                self._acknowledge_received()
+            except ShmError as error:
+                self._try_later(message, error)
+            except Exception as error:  # the daemon goes on without messages rather than not at all
+                log.exception("a message could not be taken")
+                self._try_later(message, error)
+        if self._store is not None:
+            self._store.close()
+
+    def _next(self) -> _Message | None:
+        try:
+            return self._queue.get(timeout=_LOOK_S if self._pending else None)
+        except queue.Empty:
+            return None
+
+    def _try_later(self, message: _Message | None, error: Exception) -> None:
+        log.warning("a message waits: %s", error)
+        if message is not None:
+            self._queue.put(message)
+        self._ended.wait(getattr(error, "retry_after_s", None) or _RETRY_S)
+
+    def _take(self, message: _Message) -> None:
+        """Lands a message; one of an earlier connection comes again by itself."""
+        if message.connection != self._connection:
+            return
+        level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
+        largest = self._workspace.settings.mqtt_max_bytes
+        with incoming(self._workspace.spool, len(message.payload)) as file:
+            file.write(message.payload)
+            name = _name(given, level, message.payload, file.sha256)
+            if message.again and self._is_received(file.sha256):
+                self._acknowledge(message)
+            elif len(message.payload) > largest:
+                self._lay_out(file, name, largest)
+                self._acknowledge(message)
+            else:
+                hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
+                landed = file.land(name, {"hanger": hanger})
+                self._pending.append((replace(message, payload=b""), landed))
+
+    def _lay_out(self, file: Incoming, name: str, largest: int) -> None:
+        """Lays a message that is too large in the quarantine, with the reason."""
+        reason = {
+            "schema": "shm.reason/1",
+            "file": name,
+            "line": None,
+            "channel": None,
+            "message": f"a message of {file.size_bytes} bytes, where {largest} are taken.",
+            "remedy": "Raise the setting mqtt_max_bytes, or send it another way.",
+            "time": utc_now(),
+            "sha256": file.sha256,
+        }
+        path = file.whole()
+        self._workspace.quarantine.put(path, name, reason, sidecar_path(path))
+        log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"])
+
+    def _acknowledge_received(self) -> None:
+        """Acknowledges what has left the spool for the store."""
+        for entry in list(self._pending):
+            message, landed = entry
+            if message.connection != self._connection:
+                self._pending.remove(entry)
+            elif not landed.path.exists() and self._is_received(landed.sha256):
+                self._pending.remove(entry)
+                self._acknowledge(message)
+
+    def _acknowledge(self, message: _Message) -> None:
+        if message.connection == self._connection:
+            self._client.ack(message.mid, qos=1)
+
+    def _is_received(self, sha256: str) -> bool:
+        if self._store is None:
+            self._store = self._workspace.store()
+        return self._store.recording_of(sha256) is not None
+
+
+def _name(given: str, level: str, payload: bytes, sha256: str) -> str:
+    """The name that the topic gives, or one made of what the file looks like."""
+    try:
+        return landing_name(given)
+    except BadInput:
+        return landing_name(f"hanger-{level}-{sha256[:8]}{_suffix(payload[:_HEAD_BYTES])}")
+
+
+def _suffix(head: bytes) -> str:
+    if head.lstrip().startswith(b"{"):
+        return MODES_SUFFIX
+    return next((kind.suffixes[0] for kind in FORMATS if kind.recognises(head)), "")
+
+
+def _bad_url(what: str) -> BadInput:
+    return BadInput(
+        f"the setting mqtt_url {what}.",
+        remedy=f"Write mqtts://user@host:8883, and put the password into {PASSWORD_VARIABLE}.",
+    )

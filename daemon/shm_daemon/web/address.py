@@ -1,0 +1,57 @@
+"""Where the web interface listens, and who may call it by which name."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import dataclass
+from ipaddress import ip_address
+
+DEFAULT_PORT = 8400
+
+
+@dataclass(frozen=True)
+class Address:
+    """Host and port to listen at; by default only this machine can reach it."""
+
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine can reach it."""
+        return _is_loopback(self.host)
+
+    def answers_to(self, host_header: str, names: tuple[str, ...]) -> bool:
+        """Whether a request with this `Host` is meant for us.
+
+        A page of a stranger may have its own name resolve to this machine; numbers cannot be
+        turned that way. `names` are further names of ours.
+        """
+        name = _name_of(host_header)
+        known = {"localhost", *names} | (set() if self.is_loopback else {_machine()})
+        if name in known:
+            return True
+        return _is_loopback(name) if self.is_loopback else _is_number(name)
+
+
+def _name_of(host_header: str) -> str:
+    text = host_header.strip().lower()
+    if text.startswith("["):
+        return text[1:].partition("]")[0]
+    return text.partition(":")[0].rstrip(".")
+
+
+def _is_loopback(name: str) -> bool:
+    return name == "localhost" or (_is_number(name) and ip_address(name).is_loopback)
+
+
+def _is_number(name: str) -> bool:
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _machine() -> str:
+    return socket.gethostname().lower()

@@ -1,0 +1,71 @@
+"""Around every request: whose Host it names, which headers protect the answer, a line in the log.
+
+Plain ASGI: what wraps requests the comfortable way would hold uploads in memory.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from shm_daemon.web.faults import fault
+from shm_daemon.web.site import Site
+
+PROTECTION = {
+    "Content-Security-Policy": "default-src 'self'; base-uri 'none'; form-action 'self'; "
+    "frame-ancestors 'none'; object-src 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+    "Cache-Control": "no-store",
+}
+
+log = logging.getLogger(__name__)
+
+
+class Around:
+    """Wraps the app."""
+
+    def __init__(self, app: ASGIApp, site: Site):
+        self._app, self._site = app, site
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        began, status = time.monotonic(), 500
+
+        async def protected(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                headers = MutableHeaders(scope=message)
+                for name, value in PROTECTION.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        try:
+            await self._answer(scope, receive, protected)
+        finally:
+            # Neither headers nor what stands behind the path: tokens end up in such places.
+            seconds = time.monotonic() - began
+            path = scope["path"].encode("ascii", "backslashreplace").decode()
+            log.info("%s %.200r %d %.3f s", scope["method"], path, status, seconds)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        host = Headers(scope=scope).get("host", "")
+        if self._site.answers_to(host):
+            await self._app(scope, receive, send)
+            return
+        refusal = fault(
+            400,
+            "The request is meant for another host.",
+            "Call the interface by its address, or name the host in the setting web_hosts.",
+        )
+        await refusal(scope, receive, send)

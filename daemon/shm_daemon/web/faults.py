@@ -1,0 +1,102 @@
+"""What goes wrong, as answers: a status, and a document that says what is wrong and what to do."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
+
+from shm.errors import BadInput, NothingThere, ShmError, StoreError, UsageError
+from shm_daemon.landing import TooLarge
+
+log = logging.getLogger(__name__)
+
+_STATUS: tuple[tuple[type[ShmError], int], ...] = (
+    (TooLarge, 413),
+    (NothingThere, 404),
+    (BadInput, 422),
+    (UsageError, 409),
+    (StoreError, 503),
+)
+_WORDS = {
+    400: "The request itself is off, or its Host is not ours.",
+    401: "A token is missing, wrong or revoked.",
+    403: "The token does not allow this.",
+    404: "There is no such thing, or not yet.",
+    408: "The sender fell silent.",
+    409: "This was done already.",
+    413: "The file is larger than is taken.",
+    415: "The body is no plain file.",
+    422: "A value cannot be used.",
+    503: "The store cannot be used now; `Retry-After` says when to try again.",
+}
+
+
+class Fault(BaseModel):
+    """What is wrong and what to do about it."""
+
+    message: str
+    remedy: str = ""
+
+
+class Refused(HTTPException):
+    """An answer that is no result, with a remedy."""
+
+    def __init__(
+        self, status: int, message: str, remedy: str = "", headers: dict[str, str] | None = None
+    ):
+        super().__init__(status, message, headers)
+        self.remedy = remedy
+
+
+def answers(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The faults that a route documents."""
+    return {status: {"model": Fault, "description": _WORDS[status]} for status in statuses}
+
+
+def handle_faults(app: FastAPI) -> None:
+    """Turns every error into an answer of ours; one that is not ours is logged and not told."""
+    app.add_exception_handler(HTTPException, _refused)
+    app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(ShmError, _known)
+    app.add_exception_handler(Exception, _unknown)
+
+
+def fault(
+    status: int, message: str, remedy: str = "", headers: dict[str, str] | None = None
+) -> JSONResponse:
+    """The answer itself."""
+    return JSONResponse(Fault(message=message, remedy=remedy).model_dump(), status, headers)
+
+
+def _refused(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    headers = dict(error.headers) if error.headers else None
+    return fault(error.status_code, error.detail, getattr(error, "remedy", ""), headers)
+
+
+def _invalid(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    where = " ".join(str(part) for part in first["loc"])
+    return fault(422, f"{where}: {first['msg']}.", "See /openapi.json for what is expected.")
+
+
+def _known(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, ShmError)
+    status = next((code for kind, code in _STATUS if isinstance(error, kind)), 500)
+    if error.retry_after_s is not None:
+        status = 503
+    headers = {"Retry-After": f"{error.retry_after_s or 60:.0f}"} if status == 503 else None
+    if status >= 500:
+        log.error("%s", error)
+    return fault(status, error.message, error.remedy, headers)
+
+
+def _unknown(request: Request, error: Exception) -> JSONResponse:
+    return fault(500, "an internal error.", "The log of the web interface says more.")

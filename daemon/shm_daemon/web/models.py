@@ -1,0 +1,147 @@
+"""The documents that the interface answers with. Unknown numbers are null."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, Field
+
+
+def _written(text: str) -> str:
+    """Text that a person may have written and any database keeps."""
+    if not text.strip() or not all(sign.isprintable() or sign in "\n\t" for sign in text):
+        raise ValueError("a text without control characters is expected")
+    return text.strip()
+
+
+Written = Annotated[str, Field(max_length=2000), AfterValidator(_written)]
+
+
+class Uploaded(BaseModel):
+    """An upload that is safe: the daemon takes it from the spool."""
+
+    sha256: str
+    size_bytes: int
+    file_name: str = Field(description="The name in the spool; another where that was taken.")
+    outcome: Literal["new", "duplicate", "reopened"] = Field(
+        description="`duplicate`: these bytes are stored already. `reopened`: they were refused "
+        "before and are tried again."
+    )
+    status_url: str = Field(description="Says how far it has come, once the daemon has taken it.")
+
+
+class RecordingStatus(BaseModel):
+    """A recording and how far it has come."""
+
+    id: int
+    sha256: str
+    file_name: str
+    size_bytes: int
+    received_at: datetime
+    stage: Literal["received", "identified", "updated", "watched", "done", "refused"]
+    hanger: int | None
+    reason: dict[str, Any] | None = Field(description="Why it was refused; null where it was not.")
+
+
+class Quantity(BaseModel):
+    """A posterior in numbers; `q05` and `q95` bound 90 % of it."""
+
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+    map: float
+
+
+class Shift(BaseModel):
+    """How far a quantity has moved from its baseline: tension a fraction, a spring decades."""
+
+    quantity: str
+    shift_mean: float | None
+    shift_sd: float | None
+    threshold: float | None
+    probability: float | None = Field(description="That the shift is beyond the threshold.")
+
+
+class HangerState(BaseModel):
+    """What is known of a hanger after its latest test; null or empty before the first."""
+
+    hanger: int
+    tests: int
+    latest_test_at: datetime | None
+    model: str | None
+    nominal_tension_n: float
+    tension_n: Quantity | None
+    baseline_set_at: datetime | None
+    shifts: list[Shift]
+    open_alerts: int
+
+
+class Hangers(BaseModel):
+    """All hangers of the bridge."""
+
+    hangers: list[HangerState]
+
+
+class DeliveryState(BaseModel):
+    """One alert on its way to one hook."""
+
+    hook: str
+    state: str
+    attempts: int
+
+
+class Acknowledged(BaseModel):
+    """Who has taken note of an alert, when, and what they say to it."""
+
+    who: str
+    why: str
+    at: datetime
+
+
+class AlertState(BaseModel):
+    """An alert; it is open while `acknowledged` is null."""
+
+    id: int
+    hanger: int
+    raised_at: datetime
+    test_at: datetime
+    message: str
+    acknowledged: Acknowledged | None
+    deliveries: list[DeliveryState]
+
+
+class Alerts(BaseModel):
+    """Alerts as they were raised."""
+
+    alerts: list[AlertState]
+
+
+class Acknowledge(BaseModel):
+    """What a person makes of an alert."""
+
+    why: Written = Field(description="What came of it, for the record.")
+    who: Written | None = Field(
+        default=None, description="The person; the name of the token is noted in any case."
+    )
+
+
+class Status(BaseModel):
+    """What the workspace holds and what waits."""
+
+    bridge: str
+    recordings: dict[str, int] = Field(description="How many stand at each stage.")
+    spool: int
+    quarantine: int
+    open_alerts: int
+    waiting_deliveries: int
+    daemon_seen_seconds_ago: float | None
+
+
+class Health(BaseModel):
+    """Whether all is well; `reasons` says what is not."""
+
+    status: Literal["ok", "failing"]
+    reasons: list[str]

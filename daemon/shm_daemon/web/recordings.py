@@ -1,0 +1,245 @@
+"""Recordings over HTTP: streamed to disk, landed in the spool, and asked after."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from datetime import datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Path, Query, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
+
+from shm.documents import parse_time
+from shm.errors import BadInput, NothingThere
+from shm.store import Stage, Store, StoredRecording
+from shm_daemon.landing import Incoming, Landed, TooLarge, landing_name
+from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.faults import Refused, answers
+from shm_daemon.web.models import RecordingStatus, Uploaded
+
+_PIECE_BYTES = 1 << 20
+_SILENCE_S = 60.0
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "description": "The bytes of the file, as they are: no form.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+
+List = Annotated[str | None, Query(max_length=2000)]
+Number = Annotated[float | None, Query(allow_inf_nan=False)]
+
+
+def described_by(
+    hanger: Annotated[int | None, Query(ge=0, le=2**31 - 1)] = None,
+    time: Annotated[str | None, Query(max_length=40, description="ISO 8601")] = None,
+    temperature_c: Number = None,
+    added_mass_kg: Number = None,
+    added_mass_at_m: Number = None,
+    sampling_rate_hz: Number = None,
+    unit: List = None,
+    x_m: List = None,
+    plane: List = None,
+    calibration: List = None,
+    full_scale: List = None,
+) -> dict[str, object]:
+    """What the file cannot say: becomes its sidecar and goes before what the file says.
+
+    The last five are lists in the order of the channels, parted by commas, as in the header of a
+    CSV file. More (single channels by name) is said by a sidecar in a .zip with the file.
+    """
+    values = {
+        "hanger": hanger,
+        "time": _time(time),
+        "temperature_c": temperature_c,
+        "added_mass_kg": added_mass_kg,
+        "added_mass_at_m": added_mass_at_m,
+        "sampling_rate_hz": sampling_rate_hz,
+        **{key: _listed(text) for key, text in (("unit", unit), ("plane", plane))},
+        **{
+            key: _numbers(key, text)
+            for key, text in (
+                ("x_m", x_m), ("calibration", calibration), ("full_scale", full_scale),
+            )
+        },
+    }  # fmt: skip
+    return {key: value for key, value in values.items() if value is not None}
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=Uploaded,
+    responses=answers(400, 401, 403, 408, 413, 415, 422, 503),
+    openapi_extra=_BODY,
+    summary="Upload a recording",
+)
+async def upload(
+    request: Request,
+    site: AtSite,
+    _: Writer,
+    described: Annotated[dict[str, object], Depends(described_by)],
+    name: Annotated[
+        str, Query(min_length=1, max_length=255, description="The name of the file, with suffix.")
+    ],
+    x_content_sha256: Annotated[
+        str | None, Header(pattern="^[0-9a-fA-F]{64}$", description="Checked where it is given.")
+    ] = None,
+) -> Uploaded:
+    """Takes the bytes of one file and answers once they are safe on disk.
+
+    The daemon then takes the file from the spool as any other. The same bytes may be sent again
+    after a broken connection: they are stored once.
+
+    Example: `curl -X POST -T hanger3.csv -H "Authorization: Bearer $TOKEN"
+    "http://127.0.0.1:8400/api/recordings?name=hanger3.csv&hanger=3"`
+    """
+    landing_name(name)
+    workspace = site.workspace
+    _refuse_form(request)
+    _refuse_large(request, workspace.settings.max_file_bytes)
+    file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
+    try:
+        await _stream(request, file)
+        landed = await run_in_threadpool(_land, file, name, described, x_content_sha256)
+    finally:
+        await run_in_threadpool(file.close)
+    outcome = await run_in_threadpool(_outcome, site.store, landed)
+    status_url = f"/api/recordings/{landed.sha256}"
+    return Uploaded(
+        sha256=landed.sha256,
+        size_bytes=landed.size_bytes,
+        file_name=landed.path.name,
+        outcome=outcome,
+        status_url=status_url,
+    )
+
+
+@router.get(
+    "/{key}",
+    response_model=RecordingStatus,
+    responses=answers(400, 401, 403, 404, 422, 503),
+    summary="How far a recording has come",
+)
+def status(
+    site: AtSite,
+    _: Reader,
+    key: Annotated[
+        str, Path(pattern="^([0-9]{1,9}|[0-9a-fA-F]{64})$", description="Its number or SHA-256.")
+    ],
+) -> Any:
+    """The stage of a recording, and why it was refused where it was."""
+    return _row(_recording(site.store, key))
+
+
+async def _stream(request: Request, file: Incoming) -> None:
+    """Writes what comes, a piece at a time, beside the loop that serves the others."""
+    pieces, waiting = request.stream(), bytearray()
+    try:
+        while True:
+            async with asyncio.timeout(_SILENCE_S):
+                piece = await anext(pieces, None)
+            if piece is None:
+                break
+            waiting += piece
+            if len(waiting) >= _PIECE_BYTES:
+                await run_in_threadpool(file.write, waiting)
+                waiting = bytearray()
+    except TimeoutError:
+        raise Refused(408, f"Nothing came for {_SILENCE_S:.0f} s.", "Send it again.") from None
+    except ClientDisconnect:
+        raise Refused(400, "The connection broke off.", "Send it again.") from None
+    await run_in_threadpool(file.write, waiting)
+
+
+def _refuse_form(request: Request) -> None:
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind.startswith("multipart/"):
+        raise Refused(
+            415, "A form is not taken.", "Send the bytes of the file as the body: `curl -T FILE`."
+        )
+
+
+def _refuse_large(request: Request, max_bytes: int) -> None:
+    """Before a byte of it is sent, where the sender says how much it is and waits for our word."""
+    if int(request.headers.get("content-length", 0)) > max_bytes:
+        raise TooLarge(
+            f"more than {max_bytes} bytes are not taken.",
+            remedy="Send less at once, or raise the setting max_file_bytes.",
+        )
+
+
+def _land(
+    file: Incoming, name: str, described: dict[str, object], expected_sha256: str | None
+) -> Landed:
+    if file.size_bytes == 0:
+        raise BadInput("the body is empty.", remedy="Send the bytes of the file.")
+    if expected_sha256 is not None and expected_sha256.lower() != file.sha256:
+        raise BadInput(
+            f"what arrived has the checksum {file.sha256}, not the one that was sent.",
+            remedy="Send it again.",
+        )
+    return file.land(name, described)
+
+
+def _outcome(store: Store, landed: Landed) -> Any:
+    known = store.recording_of(landed.sha256)
+    if known is None:
+        return "new"
+    return "reopened" if known.stage is Stage.REFUSED else "duplicate"
+
+
+def _recording(store: Store, key: str) -> StoredRecording:
+    if len(key) < 64:
+        return store.recording(int(key))
+    found = store.recording_of(key.lower())
+    if found is None:
+        raise NothingThere(
+            "no recording of this checksum was taken in yet.", remedy="Ask again in some seconds."
+        )
+    return found
+
+
+def _row(recording: StoredRecording) -> dict[str, Any]:
+    file = recording.file
+    return {
+        "id": recording.id,
+        "sha256": file.sha256,
+        "file_name": file.file_name,
+        "size_bytes": file.size_bytes,
+        "received_at": recording.received_at,
+        "stage": recording.stage.value,
+        "hanger": recording.hanger,
+        "reason": recording.reason,
+    }
+
+
+def _time(text: str | None) -> datetime | None:
+    try:
+        return None if text is None else parse_time(text)
+    except (ValueError, OverflowError):
+        raise BadInput(
+            f"time = {text!r} is not an ISO 8601 time.", remedy="Write 2026-05-01T10:00:00Z."
+        ) from None
+
+
+def _listed(text: str | None) -> list[str] | None:
+    return None if text is None else [part.strip() for part in text.split(",")]
+
+
+def _numbers(key: str, text: str | None) -> list[object] | None:
+    """Numbers, and empty texts where a channel has none."""
+    if text is None:
+        return None
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part == "" or _NUMBER.fullmatch(part) for part in parts):
+        raise BadInput(f"{key} = {text!r} is no list of numbers.", remedy="Part them by commas.")
+    return [float(part) if part else "" for part in parts]
+
+
+_NUMBER = re.compile(r"[+-]?\d{1,12}(\.\d{0,12})?([eE][+-]?\d{1,2})?")

@@ -1,0 +1,14 @@
+"""The bridge as plain text for a terminal."""
+
+from __future__ import annotations
+
+from shm.report.bridge.content import BridgeReport
+from shm.report.bridge.tables import summary, tables
+from shm.report.table import headed, laid_out
+
+
+def bridge_text(data: BridgeReport) -> str:
+    """The report of a bridge: the summary, then the tables."""
+    verdict = f": {data.worst.value}" if data.worst else ""
+    head = headed(f"{data.bridge}{verdict}", summary(data))
+    return "\n".join((head, *(laid_out(table) for table in tables(data, bars=True))))

@@ -1,0 +1,74 @@
+"""How tension and stiffness of a hanger go with the temperature, as far as its tests tell."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from shm.report import words
+from shm.report.content import Interval
+from shm.report.states import StatesOverTime
+from shm.report.table import Table
+from shm.values import TENSION, TemperatureCoefficient
+
+TITLE = "Change with the temperature"
+_PERCENT_A_DECADE = 100 * math.log(10)
+_WIDE_K = 10.0
+
+
+def temperature_table(states: StatesOverTime) -> Table:
+    """Each quantity's change per kelvin in percent of itself, or why it is not known."""
+    why = _why_not_known(states)
+    titles = {quantity.name: quantity.title for quantity in states.quantities}
+    return Table(
+        TITLE,
+        ("quantity", "change per K", "90 % interval"),
+        tuple(
+            _row(each, titles.get(each.quantity, words.quantity(each.quantity)), why)
+            for each in states.temperature_coefficients
+        ),
+        note="In percent of the quantity, mean and standard deviation, beside what the softening "
+        "of steel explains (0.03 % of its modulus per K). Shifts and states have this swing taken "
+        "out.",
+    )
+
+
+def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
+    """Of each quantity its change per kelvin; `known` is false where no test says anything."""
+    return [
+        {
+            "quantity": each.quantity,
+            "unit": f"{'fraction' if each.quantity == TENSION else 'decades'} per K",
+            "mean": each.mean,
+            "sd": each.sd,
+            "prior_sd": each.prior_sd,
+            "known": each.is_known,
+            "why_not_known": "" if each.is_known else _why_not_known(states),
+        }
+        for each in states.temperature_coefficients
+    ]
+
+
+def _row(each: TemperatureCoefficient, title: str, why: str) -> tuple[str, ...]:
+    if not each.is_known:
+        return (title, f"not known: {why}", "")
+    scale = 100.0 if each.quantity == TENSION else _PERCENT_A_DECADE
+    change = Interval.normal(each.mean, each.sd).scaled(scale)
+    sd = f"{scale * each.sd:.{words.decimals(change.width)}f}"
+    return (
+        title,
+        f"{words.mean(change, True)} ± {sd} % per K",
+        f"{words.span(change, True)} % per K",
+    )
+
+
+def _why_not_known(states: StatesOverTime) -> str:
+    known = states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
+    if len(known) < 2:
+        return f"{words.counted(len(known), 'test')} with a temperature"
+    span_k = float(np.ptp(known))
+    if span_k >= _WIDE_K:
+        return f"{len(known)} tests over {span_k:.0f} K are too few to tell it from other changes"
+    return f"the temperatures of the tests differ by {span_k:.1f} K only"

@@ -1,0 +1,122 @@
+"""Whether a store and its archive are whole."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection
+
+from shm.store.archive import Archive, checksum
+from shm.store.copying import TableContent, Tell, contents
+from shm.store.database import Database
+from shm.store.tables import metadata, recordings
+from shm.store.upkeep import Upkeep
+
+
+@dataclass(frozen=True)
+class CheckedStore:
+    """What every table holds, and what is wrong; nothing is wrong where `troubles` is empty."""
+
+    tables: tuple[TableContent, ...]
+    troubles: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CheckedArchive:
+    """Raw files by their path in the archive: those that are as they were, and those that are not.
+
+    `unreferenced` belong to no recording, as after a crash; they do no harm. `removed` is how many
+    were taken out on purpose, as copies of them lie elsewhere.
+    """
+
+    whole: int
+    missing: tuple[str, ...]
+    damaged: tuple[str, ...]
+    unreferenced: tuple[str, ...]
+    removed: int = 0
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        return file_troubles(self.missing, self.damaged)
+
+
+def file_troubles(missing: Iterable[str], damaged: Iterable[str]) -> tuple[str, ...]:
+    """A sentence a file."""
+    return (
+        *(f"{name} is not in the archive" for name in missing),
+        *(f"{name} of the archive has another SHA-256" for name in damaged),
+    )
+
+
+def quick_troubles(store: Database) -> tuple[str, ...]:
+    """What a look at the pages of a SQLite file finds wrong; of a server, nothing."""
+    if store.engine.dialect.name != "sqlite":
+        return ()
+    with store.reading() as connection:
+        found = connection.exec_driver_sql("PRAGMA quick_check(5)").scalars().all()
+    return tuple(str(said) for said in found if said != "ok")
+
+
+def check_store(store: Database, tell: Tell) -> CheckedStore:
+    """Reads everything that the store holds; raises StoreError where it cannot be read."""
+    with store.reading() as connection:
+        troubles = (*_damage(connection), *_orphans(connection))
+        return CheckedStore(contents(connection, tell), troubles)
+
+
+def check_archive(store: Upkeep, archive: Archive, tell: Tell) -> CheckedArchive:
+    """Reads every raw file that the store refers to and compares it with its name, a SHA-256."""
+    referenced, removed = archived_names(store), store.removed_names(archive)
+    names = [name for name in referenced if name not in removed]
+    missing, damaged = [], []
+    for number, name in enumerate(names, start=1):
+        path = archive.folder / name
+        if not path.is_file():
+            missing.append(name)
+        elif checksum(path) != path.name[:64]:
+            damaged.append(name)
+        tell("archive", number / len(names))
+    whole = len(names) - len(missing) - len(damaged)
+    return CheckedArchive(
+        whole, tuple(missing), tuple(damaged), _unreferenced(archive, referenced), len(removed)
+    )
+
+
+def archived_names(store: Database) -> tuple[str, ...]:
+    """Every file of the archive that a recording refers to, sidecars too, each once."""
+    with store.reading() as connection:
+        rows = connection.execute(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
+        return tuple(sorted({name for row in rows for name in row if name is not None}))
+
+
+def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
+    kept = (path.relative_to(archive.folder).as_posix() for path in archive.folder.glob("??/*"))
+    return tuple(sorted(set(kept) - set(names)))
+
+
+def _damage(connection: Connection) -> list[str]:
+    """What SQLite finds wrong with its file; a PostgreSQL server watches over its own pages."""
+    if connection.dialect.name != "sqlite":
+        return []
+    found = connection.exec_driver_sql("PRAGMA integrity_check").scalars()
+    return [f"the file is damaged: {said}" for said in found if said != "ok"]
+
+
+def _orphans(connection: Connection) -> list[str]:
+    """Rows that refer to rows that are not there."""
+    found = []
+    for table in metadata.sorted_tables:
+        for column in table.columns:
+            for key in column.foreign_keys:
+                there = key.column.table.alias()
+                missing = ~sa.exists().where(there.c[key.column.name] == column)
+                query = sa.select(sa.func.count()).select_from(table)
+                count = connection.scalar(query.where(column.is_not(None), missing))
+                if count:
+                    found.append(
+                        f"{count} rows of {table.name} refer to {key.column.table.name} "
+                        f"that are not there (column {column.name})"
+                    )
+    return found

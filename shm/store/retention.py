@@ -1,0 +1,212 @@
+"""What may leave the archive and the quarantine: old files of which a whole copy lies elsewhere.
+
+A copy counts only if it is another file than the one here and has its SHA-256 at the moment of the
+removal; that it was noted once is not enough. Rows and results always stay.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from shm.errors import NothingThere, StoreError
+from shm.read import sidecar_path
+from shm.store.archive import Archive, checksum
+from shm.store.copying import Tell
+from shm.store.rows import Stage, StoredRecording
+from shm.store.store import Store
+
+REASON_SUFFIX = ".reason.json"
+_ENDED = (Stage.DONE, Stage.REFUSED)
+# Why an old raw file stays.
+_NO_COPY = "no copy is noted"
+_COPY_LOST = "no noted copy is whole"
+_SHARED = "another recording needs its file"
+_UNDER_WAY = "not through yet"
+
+
+@dataclass(frozen=True)
+class Removal:
+    """The raw files of one recording that may go, by their path in the archive."""
+
+    recording: StoredRecording
+    names: tuple[str, ...]
+    size_bytes: int
+    copy_folder: str
+
+
+@dataclass(frozen=True)
+class Retention:
+    """What may go, and of those old enough how many stay for which reason."""
+
+    removals: tuple[Removal, ...]
+    kept: Mapping[str, int]
+
+    @property
+    def size_bytes(self) -> int:
+        return sum(removal.size_bytes for removal in self.removals)
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A refused file in the quarantine, with its reason and sidecar, and when it was laid there."""
+
+    path: Path
+    reason: Path
+    refused_at: datetime
+    size_bytes: int
+    sha256: str
+
+
+def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> Retention:
+    """The raw files here of recordings that were received before a time and may go."""
+    folders = _folders(store)
+    everything = store.recordings()
+    old = [each for each in everything if each.received_at < before and archive.holds(each.file)]
+    kept: Counter[str] = Counter()
+    found: dict[int, str] = {}
+    for number, recording in enumerate(old, start=1):
+        copy_folder = _copy(archive, recording, folders[recording.id])
+        if recording.stage not in _ENDED:
+            kept[_UNDER_WAY] += 1
+        elif copy_folder is None:
+            kept[_COPY_LOST if folders[recording.id] else _NO_COPY] += 1
+        else:
+            found[recording.id] = copy_folder
+        tell("archive", number / len(old))
+    needed = {name for each in everything if each.id not in found for name in _names(each)}
+    removals = []
+    for recording in old:
+        if recording.id in found and recording.file.archived_as in needed:
+            kept[_SHARED] += 1
+        elif recording.id in found:
+            names = tuple(name for name in _names(recording) if name not in needed)
+            size = sum(_size(archive.folder / name) for name in names)
+            removals.append(Removal(recording, names, size, found[recording.id]))
+    return Retention(tuple(removals), dict(kept))
+
+
+def remove(store: Store, archive: Archive, removals: Iterable[Removal], at: datetime) -> int:
+    """Takes raw files out of the archive; how many bytes that freed.
+
+    Each is noted in the store before it goes. One whose copy has vanished since, or that is being
+    done again, is left alone.
+    """
+    freed = 0
+    for removal in removals:
+        ended = store.recording(removal.recording.id).stage in _ENDED
+        if not ended or _copy(archive, removal.recording, [removal.copy_folder]) is None:
+            continue
+        store.note_removed(removal.recording, removal.copy_folder, at)
+        for name in removal.names:
+            path = archive.folder / name
+            freed += _size(path)
+            path.unlink(missing_ok=True)
+    return freed
+
+
+def fetch(store: Store, archive: Archive, recording: StoredRecording) -> str:
+    """Copies a recording's raw files back into the archive; the folder that they came from.
+
+    Raises NothingThere where no copy was noted, StoreError where none is whole.
+    """
+    folders = _folders(store)[recording.id]
+    if not folders:
+        raise NothingThere(
+            f"no copy of {recording.file.file_name} is noted.", remedy="Drop the file again."
+        )
+    for folder in folders:
+        if all(_is_whole(Path(folder) / name) for name in _names(recording)):
+            for name in _names(recording):
+                archive.keep(Path(folder) / name)
+            return folder
+    raise StoreError(
+        f"no whole copy of {recording.file.file_name} is in {', '.join(folders)}.",
+        remedy="Connect the disk with the copies, or drop the file again.",
+    )
+
+
+def refused_files(quarantine: Path, before: datetime) -> tuple[Refused, ...]:
+    """Refused files that were laid in the quarantine before a time, the oldest first."""
+    found = (_refused(reason) for reason in quarantine.glob(f"*{REASON_SUFFIX}"))
+    old = [each for each in found if each is not None and each.refused_at < before]
+    return tuple(sorted(old, key=lambda each: each.refused_at))
+
+
+def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tuple[Refused, ...]:
+    """Of refused files those whose bytes lie in the archive too, or in a whole copy of it."""
+    folders = _folders(store)
+    kept = []
+    for file in files:
+        recording = store.recording_of(file.sha256)
+        if recording is not None and recording.file.archived_as is not None:
+            places = [str(archive.folder), *folders[recording.id]]
+            name = recording.file.archived_as
+            if any(_is_whole(Path(place) / name, file.path) for place in places):
+                kept.append(file)
+    return tuple(kept)
+
+
+def empty_quarantine(files: Iterable[Refused]) -> None:
+    """Takes refused files out of the quarantine, with their sidecars; the reason goes last."""
+    for file in files:
+        file.path.unlink(missing_ok=True)
+        sidecar_path(file.path).unlink(missing_ok=True)
+        file.reason.unlink(missing_ok=True)
+
+
+def _folders(store: Store) -> defaultdict[int, list[str]]:
+    """Where copies of each recording were noted, the newest first."""
+    found: defaultdict[int, list[str]] = defaultdict(list)
+    for copy in reversed(store.archive_copies()):
+        found[copy.recording_id].append(copy.folder)
+    return found
+
+
+def _names(recording: StoredRecording) -> tuple[str, ...]:
+    given = (recording.file.archived_as, recording.file.sidecar_as)
+    return tuple(name for name in given if name is not None)
+
+
+def _copy(archive: Archive, recording: StoredRecording, folders: Iterable[str]) -> str | None:
+    """The first folder with a whole copy of all files of a recording."""
+    for folder in folders:
+        pairs = [(Path(folder) / name, archive.folder / name) for name in _names(recording)]
+        if pairs and all(_is_whole(copy, original) for copy, original in pairs):
+            return folder
+    return None
+
+
+def _is_whole(copy: Path, original: Path | None = None) -> bool:
+    """Whether a file has the SHA-256 that it is named by, and is not `original` itself."""
+    try:
+        if original is not None and original.exists() and copy.samefile(original):
+            return False  # a link to what would be deleted is no copy of it
+        return checksum(copy) == copy.name[:64]
+    except OSError:
+        return False
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def _refused(reason: Path) -> Refused | None:
+    """None for what is no reason of ours, or without its file."""
+    path = reason.with_name(reason.name.removesuffix(REASON_SUFFIX))
+    try:
+        told: Any = json.loads(reason.read_text(encoding="utf-8"))
+        sha256, refused_at = str(told["sha256"]), datetime.fromisoformat(str(told["time"]))
+        if checksum(path) != sha256:
+            return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Refused(path, reason, refused_at, _size(path), sha256)

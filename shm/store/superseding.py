@@ -1,0 +1,209 @@
+"""Doing work again: what it replaces is superseded and stays, with its lineage."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import NothingThere, UsageError
+from shm.store.database import Database
+from shm.store.files import begin_again, in_force, recording_from, write_event
+from shm.store.queries import lineage_from
+from shm.store.results import advance_recordings
+from shm.store.rows import FormerPosterior, FormerTest, Rerun, Stage
+from shm.store.stepping import write_step
+from shm.store.tables import (
+    baselines,
+    drifts,
+    posterior_tests,
+    posteriors,
+    recordings,
+    selection_entries,
+    tests,
+    watch_states,
+    watches,
+)
+
+AGAIN_FROM = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+_BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
+
+
+class Superseding(Database):
+    """The part of the store that sends tests back and remembers what was known before."""
+
+    def recording_named(self, which: str) -> tuple[int, str | None]:
+        """The recording that is meant: by its number or by the name of a test of it.
+
+        Also the test's name, where it was that. Raises NothingThere, and UsageError where several
+        hangers have a test of that name.
+        """
+        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
+        with self.reading() as connection:
+            if which.isdecimal():
+                by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
+                if connection.scalar(by_number) is not None:
+                    return int(which), None
+            found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
+        if not found:
+            raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
+        if len(found) > 1:
+            numbers = ", ".join(map(str, found))
+            raise UsageError(
+                f"{len(found)} hangers have a test {which!r}.",
+                remedy=f"Give its recording's number: {numbers}.",
+            )
+        return found[0], which
+
+    def again(
+        self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
+    ) -> Rerun:
+        """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
+
+        A file is always identified as a whole; from a later stage on it may be one `test` alone.
+        Raises NothingThere, and UsageError where the recording has not come so far.
+        """
+        with self.writing() as connection:
+            recording = _locked(connection, recording_id)
+            chosen = _chosen(connection, recording, stage, test)
+            ids = [row.id for row in chosen]
+            own = _of_baselines(connection, chosen)
+            counts = _supersede_results(connection, ids, stage, at)
+            if stage is Stage.IDENTIFIED:
+                _mark(connection, tests, tests.c.id.in_(ids), at)
+                begin_again(connection, recording_id, at)
+            else:
+                _send_back(connection, recording_id, ids, stage, at)
+            kept = _kept_states(recording.hanger)
+            connection.execute(sa.delete(watch_states).where(kept))
+            message = f"sent back by request, to be {stage} again."
+            write_event(connection, at, "again", recording_id, recording.file_name, message)
+            stored = recording_from(_locked(connection, recording_id))
+        names = tuple(row.name for row in chosen)
+        return Rerun(stored, names, *counts, tuple(r.name for r in chosen if r.id in own))
+
+    def former_tests(self, recording_id: int) -> tuple[FormerTest, ...]:
+        """Every identification of a recording's tests and what was made of it, oldest first."""
+        found = sa.select(tests).where(tests.c.recording_id == recording_id).order_by(tests.c.id)
+        columns = [posteriors.c[name] for name in (*_WITHOUT_SAMPLES, *_LINEAGE)]
+        made: sa.Select[Any] = (
+            sa.select(posterior_tests.c.test_id, *columns)
+            .select_from(posterior_tests.join(posteriors).join(tests))
+            .where(tests.c.recording_id == recording_id)
+            .order_by(posteriors.c.id)
+        )
+        with self.reading() as connection:
+            rows = connection.execute(found).all()
+            by_test: defaultdict[int, list[FormerPosterior]] = defaultdict(list)
+            for row in connection.execute(made):
+                by_test[row.test_id].append(_former_posterior(row))
+        return tuple(_former_test(row, by_test[row.id]) for row in rows)
+
+
+_WITHOUT_SAMPLES = ("id", "model", "updated_at", "superseded_at")
+_LINEAGE = ("input_sha256", "settings_sha256", "version")
+
+
+def _locked(connection: Connection, recording_id: int) -> Row[Any]:
+    query = sa.select(recordings).where(recordings.c.id == recording_id)
+    row = connection.execute(query).one_or_none()
+    if row is None:
+        raise NothingThere(f"no recording {recording_id}.", remedy="See `shm status`.")
+    return row
+
+
+def _chosen(
+    connection: Connection, recording: Row[Any], stage: Stage, test: str | None
+) -> Sequence[Row[Any]]:
+    """The tests that are sent back: those of a whole file, or the one that is named."""
+    query = sa.select(tests).where(tests.c.recording_id == recording.id, in_force(tests))
+    if test is not None and stage is not Stage.IDENTIFIED:
+        query = query.where(tests.c.name == test)
+    rows = connection.execute(query.order_by(tests.c.id)).all()
+    waits = recording.stage == Stage.RECEIVED
+    if stage is not Stage.IDENTIFIED:
+        waits = not rows or any(not _has_reached(row.stage, stage) for row in rows)
+    if waits:
+        raise UsageError(
+            f"{recording.file_name} has not come so far as to be {stage} again: it is "
+            f"{recording.stage}.",
+            remedy="Wait until it is done, or give an earlier --from.",
+        )
+    return rows
+
+
+def _has_reached(stage: str, wanted: Stage) -> bool:
+    """Whether a test has what is to be done anew; one that was refused has got to nothing."""
+    return stage in AGAIN_FROM[AGAIN_FROM.index(wanted) :]
+
+
+def _of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int]:
+    """Which of the tests, or former identifications of them, a baseline was made from."""
+    made = (
+        sa.select(tests.c.hanger, tests.c.name)
+        .join(posterior_tests)
+        .join(baselines, baselines.c.posterior_id == posterior_tests.c.posterior_id)
+    )
+    names = {(row.hanger, row.name) for row in connection.execute(made)}
+    return {row.id for row in chosen if (row.hanger, row.name) in names}
+
+
+def _supersede_results(
+    connection: Connection, ids: Collection[int], stage: Stage, at: datetime
+) -> tuple[int, int]:
+    """How many posteriors and watches are superseded; those of baselines and selections stay."""
+    updated = 0
+    if stage is not Stage.WATCHED:
+        own = sa.select(posterior_tests.c.posterior_id).where(posterior_tests.c.test_id.in_(ids))
+        lasting = sa.union(
+            sa.select(baselines.c.posterior_id), sa.select(selection_entries.c.posterior_id)
+        )
+        theirs = posteriors.c.id.in_(own) & posteriors.c.id.not_in(lasting)
+        updated = _mark(connection, posteriors, theirs, at)
+    _mark(connection, drifts, drifts.c.test_id.in_(ids), at)
+    return updated, _mark(connection, watches, watches.c.test_id.in_(ids), at)
+
+
+def _mark(
+    connection: Connection, table: sa.Table, which: sa.ColumnElement[bool], at: datetime
+) -> int:
+    found = sa.update(table).where(which, in_force(table)).values(superseded_at=at)
+    return connection.execute(found).rowcount
+
+
+def _send_back(
+    connection: Connection, recording_id: int, ids: Collection[int], stage: Stage, at: datetime
+) -> None:
+    before = _BEFORE[stage]
+    connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=before))
+    for test_id in ids:
+        write_step(connection, recording_id, before, at, test_id)
+    reopened = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(reopened.values(stage=before, reason=None))
+    advance_recordings(connection, [recording_id], at)
+
+
+def _kept_states(hanger: int | None) -> sa.ColumnElement[bool]:
+    """What the watch keeps of a hanger was made with the test that is done again."""
+    return watch_states.c.hanger == hanger
+
+
+def _former_posterior(row: Row[Any]) -> FormerPosterior:
+    return FormerPosterior(row.id, row.model, row.updated_at, row.superseded_at, lineage_from(row))
+
+
+def _former_test(row: Row[Any], made: Sequence[FormerPosterior]) -> FormerTest:
+    return FormerTest(
+        id=row.id,
+        recording_id=row.recording_id,
+        name=row.name,
+        stage=Stage(row.stage),
+        identified_at=row.identified_at,
+        superseded_at=row.superseded_at,
+        lineage=lineage_from(row),
+        posteriors=tuple(made),
+    )

@@ -1,0 +1,103 @@
+"""Steps on a Dask cluster: the same to the bit, whatever dies meanwhile."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
+from pathlib import Path
+
+import pytest
+
+import shm
+from shm.errors import BadInput, ShmError
+from shm.store import Stage, Workspace
+from shm_daemon import run
+from shm_daemon.cluster import Cluster, run_if_alike, traits
+from shm_daemon.execution import executor_of
+from tests.helpers import clusters
+from tests.helpers.canonical import canonical
+from tests.helpers.workspaces import make_workspace, put, write_test
+
+FILES = 2
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[clusters.Cluster]:
+    with clusters.a_cluster(tmp_path_factory.mktemp("dask")) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def pool(cluster: clusters.Cluster) -> Iterator[Cluster]:
+    pool = Cluster(cluster.address)
+    yield pool
+    pool.shutdown()
+
+
+def worked_through(folder: Path, scheduler: str) -> Workspace:
+    """Tests with the real sampler, and a file that is refused."""
+    settings = {"scheduler": scheduler, "workers": 2}
+    workspace = make_workspace(folder, settings=settings, hooks={"mail": ["true"]})
+    for day in range(FILES):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=30 * day, tension=0.9)
+    put(workspace.spool / "bad.csv", "# hanger: 3\nnothing,1\n")
+    run(workspace, once=True)
+    return workspace
+
+
+def test_a_cluster_gives_what_the_processes_of_one_machine_give_to_the_bit(
+    tmp_path: Path, cluster: clusters.Cluster
+) -> None:
+    there = worked_through(tmp_path / "there", cluster.address)
+    here = worked_through(tmp_path / "here", "")
+    with there.store() as first, here.store() as second:
+        assert first.stage_counts()[Stage.DONE] == FILES
+        assert first.stage_counts()[Stage.REFUSED] == 1
+        assert canonical(first) == canonical(second)
+
+
+def test_an_error_of_a_step_comes_back_as_it_was(pool: Cluster) -> None:
+    with pytest.raises(BadInput, match="line 3: odd") as caught:
+        pool.submit(_refuse).result(60)
+    assert caught.value.remedy == "Mend it."
+
+
+def test_a_worker_of_another_version_is_refused_and_the_step_tried_again(
+    pool: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shm, "__version__", "9.9.9")
+    with pytest.raises(ShmError, match=r"has shm 0\.1\.0, the daemon 9\.9\.9") as caught:
+        pool.submit(os.getpid)
+    assert caught.value.retry_after_s is not None
+
+
+def test_a_worker_that_came_later_is_asked_too() -> None:
+    assert run_if_alike(traits(), lambda: 7) == 7
+    with pytest.raises(ShmError, match="has numpy"):
+        run_if_alike({**traits(), "numpy": "0.1"}, lambda: 7)
+
+
+def test_a_scheduler_that_does_not_answer_is_waited_for() -> None:
+    with pytest.raises(ShmError, match="cannot be reached") as caught:
+        Cluster("tcp://127.0.0.1:9").submit(os.getpid)
+    assert caught.value.retry_after_s is not None
+
+
+def test_a_step_that_kills_every_worker_is_told_as_a_crash(tmp_path: Path) -> None:
+    environment = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+    with clusters.a_cluster(tmp_path, workers=1, **environment) as cluster:
+        pool = Cluster(cluster.address)
+        with pytest.raises(BrokenExecutor):
+            pool.submit(os._exit, 1).result(60)
+        pool.shutdown()
+
+
+def test_without_a_scheduler_steps_run_in_processes_of_our_own(workspace: Workspace) -> None:
+    executor = executor_of(workspace.settings)
+    assert executor.submit(os.getpid).result(60) != os.getpid()
+    executor.shutdown(cancel_futures=True)
+
+
+def _refuse() -> None:
+    raise BadInput("odd.", line=3, remedy="Mend it.")

@@ -1,0 +1,373 @@
+"""The doctor: each trouble is found and named with what to do, and nothing stops it."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.pipeline.intake import receive
+from shm.store import Archive, DeliveryState, Stage, Workspace
+from shm_daemon.doctor import Finding, Level, examine, flowing, keeping
+from shm_daemon.heartbeat import HEARTBEAT, beat
+from tests.helpers.nouns import NOW
+from tests.helpers.outboxes import entered, make_baseline, raise_alerts
+from tests.helpers.postgres import Databases
+from tests.helpers.workspaces import make_workspace, put
+
+
+def found(workspace: Workspace, check: str, now: datetime | None = None) -> list[Finding]:
+    """What one check finds, with the clock of the test machine unless told else."""
+    findings = examine(workspace.folder, now or datetime.now(UTC))
+    assert not [each for each in findings if "report it" in each.remedy], findings
+    return [each for each in findings if each.check == check]
+
+
+def only(workspace: Workspace, check: str, now: datetime | None = None) -> Finding:
+    (finding,) = found(workspace, check, now)
+    return finding
+
+
+def describe(workspace: Workspace, text: str) -> None:
+    """Puts text in front of the description, before its first table."""
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace("[settings]", f"{text}\n\n[settings]"))
+
+
+def test_a_new_workspace_has_no_fault(workspace: Workspace) -> None:
+    findings = examine(workspace.folder, datetime.now(UTC))
+    assert {each.check for each in findings if each.level is Level.FAULT} == set()
+    assert {"versions", "folders", "disk", "store", "daemon", "clock"} <= {
+        each.check for each in findings
+    }
+
+
+def test_every_warning_and_fault_says_what_to_do(workspace: Workspace) -> None:
+    workspace.database.write_bytes(b"no database at all, but long enough to be looked at" * 100)
+    shutil.rmtree(workspace.folder / "archive")
+    findings = examine(workspace.folder, datetime.now(UTC))
+    troubled = [each for each in findings if each.level in (Level.WARNING, Level.FAULT)]
+    assert len(troubled) >= 3
+    assert all(each.remedy for each in troubled)
+
+
+# ------------------------------------------------------------ broken stores
+
+
+def test_a_missing_store_is_told(workspace: Workspace) -> None:
+    workspace.database.unlink()
+    finding = only(workspace, "store")
+    assert (finding.level, "no store" in finding.found) == (Level.FAULT, True)
+    assert only(workspace, "flow").level is Level.UNKNOWN
+
+
+def test_an_outdated_store_is_told(workspace: Workspace) -> None:
+    with closing(sqlite3.connect(workspace.database)) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '0001'")
+        connection.commit()
+    finding = only(workspace, "store")
+    assert (finding.level, finding.remedy) == (Level.FAULT, "Run `shm db upgrade`.")
+
+
+@pytest.mark.parametrize("harm", ["no database", "damaged page", "empty", "folder"])
+def test_a_broken_store_is_told(workspace: Workspace, harm: str) -> None:
+    make_baseline(workspace)
+    raise_alerts(workspace, range(1, 20), [])
+    content = bytearray(workspace.database.read_bytes())
+    if harm == "damaged page":
+        middle = len(content) // 2
+        content[middle : middle + 8192] = b"\xa5" * 8192
+    elif harm == "no database":
+        content = bytearray(b"x" * len(content))
+    workspace.database.unlink()
+    if harm == "folder":
+        workspace.database.mkdir()
+    else:
+        workspace.database.write_bytes(b"" if harm == "empty" else content)
+    finding = only(workspace, "store")
+    assert finding.level is Level.FAULT
+    assert finding.remedy
+
+
+def test_a_server_that_is_away_is_told_without_its_password(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url = "postgresql://shm:T0P-SECRET@127.0.0.1:1/arch"
+    monkeypatch.setenv("SHM_STORE", url)
+    findings = examine(workspace.folder, datetime.now(UTC))
+    assert "T0P-SECRET" not in str(findings)
+    (store,) = [each for each in findings if each.check == "store"]
+    assert (store.level, "127.0.0.1" in store.found) == (Level.FAULT, True)
+
+
+def test_a_server_is_examined_like_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, postgresql: Databases
+) -> None:
+    with postgresql.store() as url:
+        monkeypatch.setenv("SHM_STORE", url)
+        served = make_workspace(tmp_path / "served")
+        make_baseline(served)
+        raise_alerts(served, [1], ["siren"])
+        assert only(served, "store").level is Level.OK
+        assert "none is active" in only(served, "daemon").found
+        with served.lock():
+            beat(served)
+            assert "is active" in only(served, "daemon").found
+        assert only(served, "deliveries").level is Level.WARNING
+        put(served.spool / "stuck.csv", "x")
+        with served.store() as store:
+            receive(served.spool / "stuck.csv", served, store, NOW)
+        assert "stuck.csv" in only(served, "recordings").found
+
+
+# ------------------------------------------------------------ broken workspaces
+
+
+def test_no_folder_and_no_description_are_told(tmp_path: Path) -> None:
+    (_, finding) = examine(tmp_path / "nowhere", NOW)
+    assert (finding.level, finding.remedy) == (Level.FAULT, "Make it with `shm init`.")
+    findings = examine(tmp_path, NOW)
+    assert [each.check for each in findings if each.level is Level.FAULT] == [
+        "folders",
+        "bridge.toml",
+    ]
+
+
+def test_a_wrong_description_is_told_with_its_place(workspace: Workspace) -> None:
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace("length_m = 12.0", "length_m = -1"))
+    finding = only(workspace, "bridge.toml")
+    assert (finding.level, "length_m" in finding.found) == (Level.FAULT, True)
+
+
+def test_looking_does_not_hide_that_a_folder_is_missing(workspace: Workspace) -> None:
+    """An archive on a disk that is not mounted must not be begun anew, empty."""
+    shutil.rmtree(workspace.folder / "archive")
+    for _ in range(2):
+        finding = only(workspace, "folders")
+        assert (finding.level, "archive missing" in finding.found) == (Level.FAULT, True)
+
+
+def test_a_description_that_everybody_may_change_is_a_fault(workspace: Workspace) -> None:
+    (workspace.folder / "bridge.toml").chmod(0o666)
+    assert "everybody can change" in only(workspace, "permissions").found
+
+
+@pytest.mark.parametrize(("wanted", "level"), [("warned", Level.WARNING), ("nearly", Level.FAULT)])
+def test_a_disk_with_little_room_is_told(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, wanted: str, level: Level
+) -> None:
+    free = shutil.disk_usage(workspace.folder).free
+    monkeypatch.setenv("SHM_MIN_FREE_BYTES", str(2 * free if wanted == "warned" else 20 * free))
+    assert found(workspace, "disk")[0].level is level
+
+
+# ------------------------------------------------------------ the flow
+
+
+def test_a_daemon_is_told_by_its_lock_and_its_heartbeat(workspace: Workspace) -> None:
+    assert "none is active, never seen" in only(workspace, "daemon").found
+    with workspace.lock():
+        assert "holds the store" in only(workspace, "daemon").found  # no loop has gone round
+        beat(workspace)
+        finding = only(workspace, "daemon")
+        assert (finding.level, "is active" in finding.found) == (Level.OK, True)
+    assert (workspace.folder / HEARTBEAT).exists()
+    assert "none is active, last seen" in only(workspace, "daemon").found
+
+
+def test_files_that_wait_too_long_in_the_spool_are_told(workspace: Workspace) -> None:
+    put(workspace.spool / "waits.csv", "x")
+    (workspace.spool / "alone.toml").write_text("hanger = 3\n")
+    (workspace.spool / "broken.csv.part").write_text("x")
+    assert only(workspace, "spool").level is Level.OK
+    waiting, forgotten = found(workspace, "spool", datetime.now(UTC) + timedelta(days=2))
+    assert (waiting.level, "1 file(s) wait" in waiting.found) == (Level.WARNING, True)
+    assert "alone.toml" in forgotten.found
+    assert "broken.csv.part" in forgotten.found
+
+
+def test_a_recording_that_stands_still_is_told(workspace: Workspace) -> None:
+    put(workspace.spool / "stuck.csv", "x")
+    with workspace.store() as store:
+        receive(workspace.spool / "stuck.csv", workspace, store, NOW)
+    assert only(workspace, "recordings", NOW + timedelta(minutes=5)).level is Level.OK
+    finding = only(workspace, "recordings", NOW + timedelta(hours=2))
+    assert (finding.level, "stuck.csv" in finding.found) == (Level.WARNING, True)
+    assert "shm ingest --again 1" in finding.remedy
+
+
+def test_a_long_queue_that_moves_is_not_stuck(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = NOW + timedelta(hours=2)
+    for name, at in (("first", NOW), ("last", now)):
+        put(workspace.spool / f"{name}.csv", name)
+        with workspace.store() as store:
+            receive(workspace.spool / f"{name}.csv", workspace, store, at)
+    assert only(workspace, "recordings", now).level is Level.OK
+    monkeypatch.setattr(flowing, "_STUCK_BEHIND_OTHERS", timedelta(hours=1))
+    assert only(workspace, "recordings", now).level is Level.WARNING
+
+
+def test_tests_that_wait_for_a_baseline_are_not_stuck(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "three", settings={"baseline_tests": 3})
+    with workspace.store() as store:
+        entered(store, [1, 2])
+        assert store.stage_counts()[Stage.IDENTIFIED] == 2
+    assert "none is on its way" in only(workspace, "recordings", NOW + timedelta(days=9)).found
+    forming = [each.found for each in found(workspace, "hangers")]
+    assert "no baseline yet: 3 (2 of 3 tests)" in forming
+
+
+def test_the_quarantine_and_missing_raw_files_are_told(workspace: Workspace) -> None:
+    put(workspace.spool / "bad.csv", "x")
+    with workspace.store() as store:
+        file = receive(workspace.spool / "bad.csv", workspace, store, NOW).recording.file
+    assert only(workspace, "raw files").level is Level.OK
+    reason = {"file": "bad.csv", "message": "no header.", "sha256": file.sha256, "time": NOW}
+    with workspace.archive.opened(file) as path:
+        workspace.quarantine.put(path, "bad.csv", reason, path.with_suffix(".toml"))
+    assert "bad.csv: no header." in only(workspace, "quarantine").found
+    (workspace.archive.folder / str(file.archived_as)).unlink()
+    finding = only(workspace, "raw files")
+    assert (finding.level, "bad.csv" in finding.found) == (Level.FAULT, True)
+
+
+# ------------------------------------------------------------ keeping and telling
+
+
+def test_backups_that_are_missing_old_or_without_raw_files_are_told(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    put(workspace.spool / "raw.csv", "x")
+    with workspace.store() as store:
+        file = receive(workspace.spool / "raw.csv", workspace, store, NOW).recording.file
+        assert only(workspace, "backup").found == "never made here"
+        store.note_backup(tmp_path / "b.db", NOW)
+        fresh, alone = found(workspace, "backup", NOW + timedelta(days=1))
+        assert (fresh.level, "without a copy elsewhere: 1" in alone.found) == (Level.OK, True)
+        copies = Archive(tmp_path / "copies")
+        copies.folder.mkdir()
+        copies.keep(workspace.archive.folder / str(file.archived_as))
+        store.note_copies(copies, NOW)
+    old = only(workspace, "backup", NOW + timedelta(days=30))
+    assert (old.level, "30 d ago" in old.found) == (Level.WARNING, True)
+
+
+def test_a_clock_that_jumped_back_is_a_fault(workspace: Workspace) -> None:
+    make_baseline(workspace)
+    assert found(workspace, "clock", NOW + timedelta(hours=1))[0].level is not Level.FAULT
+    jumped = found(workspace, "clock", NOW - timedelta(hours=5))[0]
+    assert (jumped.level, "5 h before the newest row" in jumped.found) == (Level.FAULT, True)
+
+
+@pytest.mark.parametrize(
+    ("said", "level"), [(True, Level.OK), (False, Level.WARNING), (None, Level.UNKNOWN)]
+)
+def test_whether_the_clock_is_set_by_anybody_is_told(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, said: bool | None, level: Level
+) -> None:
+    monkeypatch.setattr(keeping, "_synchronised", lambda: said)
+    assert only(workspace, "clock").level is level
+
+
+def test_hangers_without_tests_are_told(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "two", hangers=(3, 4))
+    make_baseline(workspace)
+    assert [each.found for each in found(workspace, "hangers", NOW)] == ["no test yet: 4"]
+    later = found(workspace, "hangers", NOW + timedelta(days=500))
+    assert "no test for 400 days: 3" in [each.found for each in later]
+
+
+def test_deliveries_that_fail_and_that_were_given_up_are_told(workspace: Workspace) -> None:
+    make_baseline(workspace)
+    raise_alerts(workspace, [1, 2], ["siren"])
+    assert only(workspace, "deliveries", NOW).level is Level.OK
+    assert "not tried yet" in only(workspace, "deliveries", NOW + timedelta(hours=1)).found
+    with workspace.store() as store:
+        first, second = store.deliveries(DeliveryState.WAITING)
+        store.delivery_failed(first, "no such host", NOW, NOW + timedelta(hours=9))
+        store.delivery_failed(second, "answered 403", NOW, None)
+    failing, lost = found(workspace, "deliveries", NOW)
+    assert "siren, tried 1 times: no such host" in failing.found
+    assert "answered 403" in lost.found
+    assert len(found(workspace, "deliveries", NOW + timedelta(days=60))) == 1
+
+
+def test_hooks_that_could_not_be_run_are_told_and_nothing_is_sent(tmp_path: Path) -> None:
+    """The one that could run would leave a file behind."""
+    left = tmp_path / "left"
+    program = tmp_path / "program"
+    program.write_text(f"#!/bin/sh\ntouch {left}\n")
+    hooks = {"there": [str(program)], "gone": ["/no/such/program"], "named": ["cat"]}
+    workspace = make_workspace(tmp_path / "bridge", hooks=hooks)
+    assert only(workspace, "hook there").level is Level.FAULT  # it may not be executed
+    program.chmod(0o755)
+    assert only(workspace, "hook there").level is Level.OK
+    assert only(workspace, "hook named").found.endswith("/cat")
+    assert only(workspace, "hook gone").level is Level.FAULT
+    assert not left.exists()
+
+
+def test_secrets_that_are_missing_or_open_to_others_are_told_and_never_shown(
+    workspace: Workspace,
+) -> None:
+    describe(
+        workspace,
+        '[[hook]]\nname = "web"\nurl = "https://example.org/T0P-SECRET"\nsecret_file = "s"\n\n'
+        '[[hook]]\nname = "variable"\nurl = "https://example.org/"\nsecret_env = "NOT_SET"\n\n'
+        '[[hook]]\nname = "mail"\napprise_file = "addresses"',
+    )
+    missing = only(workspace, "hook web")
+    assert (missing.level, missing.remedy[:8]) == (Level.FAULT, "Write it")
+    assert only(workspace, "hook variable").level is Level.UNKNOWN
+    (workspace.folder / "s").write_text("T0P-SECRET")
+    (workspace.folder / "s").chmod(0o644)
+    (workspace.folder / "addresses").write_text("mailto://ann:T0P-SECRET@example.org\n")
+    (workspace.folder / "addresses").chmod(0o600)
+    ready, open_to_others = found(workspace, "hook web")
+    assert (ready.level, ready.found) == (Level.OK, "example.org")
+    assert "others can read s" in open_to_others.found
+    assert only(workspace, "hook mail").found == "mailto"
+    assert "T0P-SECRET" not in str(examine(workspace.folder, NOW))
+
+
+def test_an_extra_that_the_settings_call_for_must_be_installed(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert only(workspace, "extras").level is Level.OK
+    monkeypatch.setattr("shm_daemon.doctor.installed.find_spec", lambda name: None)
+    monkeypatch.setenv("SHM_MQTT_URL", "mqtts://broker:8883")
+    finding = only(workspace, "extras")
+    assert (finding.level, finding.remedy) == (Level.FAULT, "pip install 'shm[mqtt]'")
+
+
+def test_a_check_that_fails_hides_no_other(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a fault of ours")
+
+    monkeypatch.setattr(flowing, "scan", broken)
+    findings = examine(workspace.folder, datetime.now(UTC))
+    (spool,) = [each for each in findings if each.check == "spool"]
+    assert (spool.level, "ZeroDivisionError" in spool.found) == (Level.UNKNOWN, True)
+    assert "hangers" in {each.check for each in findings}
+
+
+def test_looking_changes_nothing(workspace: Workspace) -> None:
+    make_baseline(workspace)
+    put(workspace.spool / "a.csv", "x")
+
+    def state() -> dict[str, bytes]:
+        files = [path for path in workspace.folder.rglob("*") if path.is_file()]
+        return {str(p): p.read_bytes() for p in files if not p.name.endswith(("-shm", "-wal"))}
+
+    before = state()
+    examine(workspace.folder, datetime.now(UTC))
+    assert state() == before

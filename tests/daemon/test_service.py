@@ -1,0 +1,161 @@
+"""The daemon as a service of systemd: its unit, and the signs of life that it gives."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from shm.errors import UsageError
+from shm.resources import service_unit
+from shm.store import Workspace
+from shm_daemon import Bell, run
+from shm_daemon.heartbeat import longest_wait_s, tell_systemd
+from shm_daemon.unit import unit_text
+from tests.helpers.flows import threads
+from tests.helpers.workspaces import make_workspace
+
+SYSTEMD = shutil.which("systemd-analyze")
+needs_systemd = pytest.mark.skipif(SYSTEMD is None, reason="systemd-analyze is not installed")
+
+
+def verified(unit: Path) -> tuple[int, str]:
+    assert SYSTEMD is not None
+    ended = subprocess.run(
+        [SYSTEMD, "verify", unit], capture_output=True, text=True, check=False, timeout=60
+    )
+    return ended.returncode, ended.stdout + ended.stderr
+
+
+@needs_systemd
+@pytest.mark.parametrize("name", ["shm.service", "shm-dask-worker.service"])
+def test_the_units_pass_systemds_own_check(name: str) -> None:
+    assert verified(service_unit().with_name(name)) == (0, "")
+
+
+@needs_systemd
+def test_the_printed_unit_passes_too_with_our_paths(tmp_path: Path) -> None:
+    unit = tmp_path / "shm.service"
+    unit.write_text(unit_text(tmp_path, Path("/opt/arch"), ["--web", "--port", "8400"]))
+    assert verified(unit) == (0, "")
+    lines = unit.read_text().splitlines()
+    assert "ExecStart=/usr/bin/env shm daemon --web --port 8400" in lines
+    assert f"ReadWritePaths={tmp_path}" in lines
+    assert "Environment=PATH=/opt/arch/bin:/usr/local/bin:/usr/bin:/bin" in lines
+    assert f"User={tmp_path.owner()}" in lines
+
+
+def test_what_our_readers_confine_themselves_with_is_let_through() -> None:
+    """Landlock is in none of systemd's own groups of calls."""
+    allowed = service_unit().read_text()
+    for call in ("landlock_create_ruleset", "landlock_add_rule", "landlock_restrict_self"):
+        assert call in allowed
+
+
+def test_a_workspace_in_a_home_stays_visible(tmp_path: Path) -> None:
+    assert "\nProtectHome=true\n" in unit_text(tmp_path, Path("/opt/shm"))
+    assert "\nProtectHome=read-only\n" in unit_text(tmp_path, Path("/home/ann/shm"))
+
+
+def test_a_path_that_would_have_to_be_quoted_is_refused(tmp_path: Path) -> None:
+    odd = tmp_path / "my bridge\nExecStartPre=rm"
+    odd.mkdir()
+    with pytest.raises(UsageError, match="quoted"):
+        unit_text(odd, Path("/opt/shm"))
+
+
+@pytest.fixture
+def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    """Where systemd would listen."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+        line.bind(str(tmp_path / "notify"))
+        line.settimeout(10)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        yield line
+
+
+def hear(systemd: socket.socket) -> list[str]:
+    return systemd.recv(4096).decode().splitlines()
+
+
+def hear_until(systemd: socket.socket, word: str) -> list[str]:
+    """What is told in the first message that holds a word."""
+    end = time.monotonic() + 20
+    while word not in (said := hear(systemd)):
+        assert time.monotonic() < end, f"{word} never came"
+    return said
+
+
+def test_the_daemon_says_that_it_is_ready_lives_and_ends(
+    tmp_path: Path, systemd: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though it scans its spool once an hour, it gives a sign thrice in the watchdog's time."""
+    monkeypatch.setenv("WATCHDOG_USEC", "600000")
+    workspace = make_workspace(tmp_path / "bridge", settings={"spool_scan_seconds": 3600.0})
+    bell = Bell()
+    thread = threading.Thread(
+        target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": threads}
+    )
+    thread.start()
+    try:
+        first = hear(systemd)
+        assert {"READY=1", "WATCHDOG=1", f"STATUS=watching {workspace.spool}"} <= set(first)
+        for _ in range(5):
+            assert "WATCHDOG=1" in hear(systemd)
+    finally:
+        bell.stop()
+        thread.join(20)
+    assert "STOPPING=1" in hear_until(systemd, "STOPPING=1")
+
+
+def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socket) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    bell = Bell()
+    with workspace.lock():
+        thread = threading.Thread(
+            target=run,
+            args=(workspace,),
+            kwargs={"bell": bell, "make_executor": threads, "standby": True},
+        )
+        thread.start()
+        try:
+            said = hear_until(systemd, "READY=1")
+            assert "WATCHDOG=1" in said
+            assert any(line.startswith("STATUS=standing by") for line in said)
+        finally:
+            bell.stop()
+            thread.join(20)
+
+
+def test_a_daemon_that_fails_says_that_it_ends(
+    workspace: Workspace, systemd: socket.socket
+) -> None:
+    workspace.database.unlink()
+    with pytest.raises(Exception, match="no store"):
+        run(workspace, make_executor=threads)
+    assert "STOPPING=1" in hear(systemd)
+
+
+def test_nobody_listening_does_no_harm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "nobody"))
+    tell_systemd("READY=1")
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    tell_systemd("READY=1")
+    monkeypatch.setenv("WATCHDOG_USEC", "nonsense")
+    assert longest_wait_s() == float("inf")
+
+
+def test_an_abstract_name_is_understood(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+        line.bind(b"\0shm-test-notify-%d" % time.monotonic_ns())
+        line.settimeout(5)
+        name = line.getsockname().decode()
+        monkeypatch.setenv("NOTIFY_SOCKET", f"@{name[1:]}")
+        tell_systemd("READY=1")
+        assert hear(line) == ["READY=1"]

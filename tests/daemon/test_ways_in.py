@@ -1,0 +1,109 @@
+"""Web interface and messages beside a daemon: what dies there stops nobody, and is not lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+import pytest
+
+from shm.documents import dump, modes_document
+from shm.errors import UsageError
+from shm.store import Stage, Workspace
+from shm_daemon.web.address import Address
+from shm_daemon.web.beside import web_beside
+from tests.helpers.brokers import a_broker
+from tests.helpers.daemons import ROOT, quick_daemons, until_serving
+from tests.helpers.workspaces import make_workspace, modelled_test
+
+ALONE = """
+import sys, time
+from shm.store import Workspace
+from shm_daemon.web.address import Address
+from shm_daemon.web.beside import web_beside
+with web_beside(Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2]))):
+    time.sleep(300)
+"""
+
+
+def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def answers(port: int) -> bool:
+    try:
+        httpx.get(f"http://127.0.0.1:{port}/health", timeout=5, trust_env=False)
+    except httpx.HTTPError:
+        return False
+    return True
+
+
+def servers_of(workspace: Workspace) -> list[int]:
+    """Processes that serve the workspace's web interface."""
+    mark = f"shm_daemon.web\0{workspace.folder}".encode()
+    found = []
+    for folder in Path("/proc").iterdir():
+        try:
+            command = (folder / "cmdline").read_bytes() if folder.name.isdigit() else b""
+        except OSError:
+            continue
+        if mark in command:
+            found.append(int(folder.name))
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc")
+def test_a_web_interface_that_dies_comes_again_and_ends_with_its_daemon(
+    workspace: Workspace,
+) -> None:
+    taken = socket.create_server(("127.0.0.1", 0))
+    port = taken.getsockname()[1]
+    command = [sys.executable, "-c", ALONE, str(workspace.folder), str(port)]
+    environment = {**os.environ, "PYTHONPATH": ".:daemon"}
+    with taken, subprocess.Popen(command, cwd=ROOT, env=environment) as owner:
+        try:
+            until(lambda: servers_of(workspace))
+            until(lambda: not servers_of(workspace))  # it could not have the port
+            taken.close()
+            until(lambda: answers(port))
+            assert owner.poll() is None
+        finally:
+            owner.kill()
+    until(lambda: not servers_of(workspace))
+
+
+def test_it_does_not_open_to_others_without_a_token(workspace: Workspace) -> None:
+    with pytest.raises(UsageError, match="no token"), web_beside(workspace, Address("0.0.0.0")):
+        pass
+
+
+def test_messages_outlast_killed_daemons_and_each_is_stored_once(tmp_path: Path) -> None:
+    messages, kills = 8, 2
+    with a_broker() as broker:
+        workspace = make_workspace(tmp_path / "bridge", settings={"mqtt_url": broker.url})
+        hanger = workspace.bridge.hangers[0]
+        with quick_daemons(workspace.folder) as daemons:
+            until_serving(daemons.begin(), workspace.folder)
+            time.sleep(1.0)  # the broker knows us from now on
+            for number in range(messages):
+                test = modelled_test(f"t{number}", hanger, day=number)
+                content = dump(modes_document([test])).encode()
+                broker.publish(f"shm/test-bridge/3/t{number}.modes.json", content)
+                if number % 3 == 2 and number // 3 < kills:
+                    pid = int((workspace.folder / "shm.lock").read_text())
+                    assert daemons.kill(pid) == -signal.SIGKILL
+                    until_serving(daemons.begin(), workspace.folder)
+            with workspace.store() as store:
+                until(lambda: store.stage_counts()[Stage.DONE] == messages)
+                assert sum(store.stage_counts().values()) == messages
+            daemons.kill(int((workspace.folder / "shm.lock").read_text()))

@@ -1,0 +1,70 @@
+"""The clock jumps back, files come by the thousand, the file system tells nothing."""
+
+from __future__ import annotations
+
+import os
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.store import Stage, Workspace
+from shm_daemon import run
+from shm_daemon.spool import FileStabilityTracker, scan
+from tests.helpers import quick_update
+from tests.helpers.flows import Clock, a_flow, receive_all, threads
+from tests.helpers.workspaces import make_workspace, write_test
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    from shm.pipeline import steps
+
+    for verb in ("update", "refresh", "select"):
+        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    return make_workspace(tmp_path / "bridge")
+
+
+def test_a_clock_that_jumps_back_holds_nothing_up(workspace: Workspace) -> None:
+    clock = Clock()
+    with a_flow(workspace, clock=clock) as flow:
+        for day in range(3):
+            write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+            receive_all(flow)
+            clock.now -= timedelta(days=1)
+            flow.drain()
+        assert flow.store.stage_counts()[Stage.DONE] == 3
+        assert [test.test.id for test, _ in flow.store.history(3)] == ["t0", "t1", "t2"]
+        stages = [step.stage for step in flow.store.steps(3)]
+    assert stages == ["archived", "received", *2 * ["identified"], *2 * ["updated"],
+                      "watched", "done"]  # fmt: skip
+
+
+def test_ten_thousand_files_are_seen_at_once_and_come_in_the_order_of_their_age(
+    tmp_path: Path,
+) -> None:
+    for number in range(10_000):
+        (tmp_path / f"{number:05}.csv").write_bytes(b"1")
+    now = 0.0
+    tracker = FileStabilityTracker(2.0, lambda: now)
+    assert tracker.whole(scan(tmp_path)) == []
+    os.utime(tmp_path / "09999.csv", ns=(0, 0))
+    tracker.whole(scan(tmp_path))
+    now = 3.0
+    found = tracker.whole(scan(tmp_path))
+    assert len(found) == 10_000
+    assert found[0].name == "09999.csv"
+    assert tracker.watching
+
+
+def test_a_spool_of_which_the_file_system_tells_nothing_is_scanned(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def silent(*_: object, **__: object) -> None:
+        raise OSError("no such thing on a network mount")
+
+    monkeypatch.setattr("watchdog.observers.api.BaseObserver.schedule", silent)
+    write_test(workspace.spool / "t0.modes.json", workspace)
+    run(workspace, once=True, make_executor=threads)
+    with workspace.store() as store:
+        assert store.stage_counts()[Stage.DONE] == 1

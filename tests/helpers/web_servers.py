@@ -1,0 +1,49 @@
+"""The web interface behind a real server on a free port of this machine."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import httpx
+
+from shm.pipeline import utc_now
+from shm.store import Scope, Workspace
+from shm_daemon.web.address import Address
+from shm_daemon.web.app import make_app
+from shm_daemon.web.serving import make_server
+
+
+@dataclass(frozen=True)
+class Served:
+    """A running interface, and tokens that it takes."""
+
+    url: str
+    read_token: str
+    write_token: str
+
+    def client(self, token: str = "", **headers: str) -> httpx.Client:
+        """A caller with that token, or with none."""
+        if token:
+            headers["Authorization"] = f"Bearer {token}"
+        return httpx.Client(base_url=self.url, headers=headers, timeout=30, trust_env=False)
+
+
+@contextmanager
+def served(workspace: Workspace, address: Address | None = None) -> Iterator[Served]:
+    """Serves until the end of the block, on this machine only, as if it listened at `address`."""
+    with workspace.store() as store:
+        tokens = [store.create_token(scope, scope, utc_now()) for scope in Scope]
+    server = make_server(make_app(workspace, address), Address(port=0))
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        thread = threading.Thread(target=server.run, args=([listening],))
+        thread.start()
+        try:
+            yield Served(url, *tokens)
+        finally:
+            server.should_exit = True
+            thread.join()

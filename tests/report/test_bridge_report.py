@@ -1,0 +1,95 @@
+"""The report of a whole bridge, and what a hanger's report says of those beside it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+
+from shm.report import BridgeReport, HangerReport, Interval, bridge_json, bridge_page, bridge_text
+from shm.report.bridge.content import HangerLine
+from shm.report.bridge.tables import bar
+from shm.report.summary import Status, summary
+from shm.report.tables import neighbours
+from shm.values import Hanger
+from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
+from tests.report.outline import Outline
+
+NOW = datetime(2026, 5, 1, tzinfo=UTC)
+MOVED = {2: 16e3, 3: -34e3, 4: 17e3}
+
+
+@pytest.fixture(scope="module")
+def pattern() -> BridgePattern:
+    shifts = [HangerShift(i, i - 1, NOW, 700e3, MOVED.get(i, 0.0), 1.5e3) for i in range(1, 9)]
+    return bridge_pattern(shifts, range(1, 10))
+
+
+@pytest.fixture(scope="module")
+def report(hanger: Hanger, pattern: BridgePattern) -> BridgeReport:
+    tension = Interval(666e3, 660e3, 672e3)
+    lines = [
+        HangerLine(
+            replace(hanger, id=number),
+            Status.ALERT if number == 3 else Status.STEADY,
+            NOW,
+            tension,
+            "sudden: tension -4.9 %" if number == 3 else "",
+            open_alerts=int(number == 3),
+        )
+        for number in range(1, 9)
+    ]
+    untested = HangerLine(replace(hanger, id=9), None)
+    return BridgeReport("Arch", (*lines, untested), pattern, "", NOW, "0.1.0")
+
+
+def test_the_text_tells_states_shifts_and_the_explanation(report: BridgeReport) -> None:
+    told = bridge_text(report)
+    assert told.startswith("Arch: Alert\n")
+    flat = " ".join(told.split())
+    assert "Alert: 1 hanger (3); No change: 7 hangers; without a test: 1 hanger." in flat
+    assert "Hanger 3 has lost 34 kN" in flat
+    assert "<=====|......" in told
+    assert "-34.0 (-36.5 to -31.5)" in told
+    assert not re.search(r"\b(nan|None)\b", told)
+    assert max(map(len, told.splitlines())) <= 100
+
+
+def test_the_page_has_the_elevation_without_being_asked(report: BridgeReport) -> None:
+    page, parsed = bridge_page(report), Outline()
+    parsed.feed(page)
+    assert parsed.open == []
+    assert [tag for tag, _ in parsed.tags].count("svg") == 1
+    assert "Hanger 3 has lost 34 kN" in page
+    assert "&lt;===" not in page
+
+
+def test_without_a_pattern_the_hangers_are_told_and_why(report: BridgeReport) -> None:
+    few = replace(report, pattern=None, why_no_pattern="Nothing can be compared: too few.")
+    assert "compared: too few." in " ".join(bridge_text(few).split())
+    assert "<svg" not in bridge_page(few)
+    document = bridge_json(few)
+    assert document["pattern"] is None
+    assert document["hangers"][2]["status"] == "alert"
+    assert document["hangers"][8]["tension_n"] is None
+
+
+@pytest.mark.parametrize(
+    ("share", "drawn"),
+    [(0, "......|......"), (-1, "<=====|......"), (0.5, "......|==>..."), (0.01, "......|......")],
+)
+def test_a_bar_shows_a_share_of_the_largest_shift(share: float, drawn: str) -> None:
+    assert bar(share) == drawn
+
+
+def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
+    season: HangerReport, pattern: BridgePattern
+) -> None:
+    called = replace(season, is_called=True, neighbours=pattern)
+    table = neighbours(called)
+    assert [row[0] for row in table.rows] == ["1", "2", "3", "4", "5"]
+    assert "shm report --bridge" in table.note
+    assert "Over the bridge: Hanger 3 has lost 34 kN" in summary(called)
+    assert neighbours(season).rows == ()

@@ -1,0 +1,173 @@
+"""One process a store is active: the others are told, or wait until it ends, however it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from shm.errors import StoreBusy, StoreError
+from shm.store.active import active
+from tests.helpers.postgres import Databases
+
+
+def patient(limit_s: float = 20.0, pause_s: float = 0.02) -> Callable[[StoreError], bool]:
+    """Waits a little at each try, as long as a test may take."""
+    end = time.monotonic() + limit_s
+
+    def wait(error: StoreError) -> bool:
+        assert error.retry_after_s is not None
+        time.sleep(pause_s)
+        return time.monotonic() < end
+
+    return wait
+
+
+def test_only_one_is_active_and_the_other_is_told_who(location: str | Path, tmp_path: Path) -> None:
+    file = tmp_path / "shm.lock"
+    with active(location, file, None) as lock:
+        assert lock.held()
+        with (
+            pytest.raises(StoreBusy, match=f"process {os.getpid()}") as caught,
+            active(location, file, None),
+        ):
+            pytest.fail("two were active")
+        assert caught.value.retry_after_s == 1.0
+        assert lock.held()  # the try has not cost it
+    with active(location, file, None):
+        assert not lock.held()
+
+
+def test_who_gives_up_waiting_is_told_why(location: str | Path, tmp_path: Path) -> None:
+    told: list[StoreError] = []
+
+    def twice(error: StoreError) -> bool:
+        told.append(error)
+        return len(told) < 2
+
+    file = tmp_path / "shm.lock"
+    with (
+        active(location, file, None),
+        pytest.raises(StoreBusy, match="already ingests"),
+        active(location, file, twice),
+    ):
+        pytest.fail("two were active")
+    assert len(told) == 2
+
+
+def test_a_standby_takes_over_when_the_active_one_ends(
+    location: str | Path, tmp_path: Path
+) -> None:
+    file, waiting, over = tmp_path / "shm.lock", threading.Event(), threading.Event()
+
+    def wait(error: StoreError) -> bool:
+        waiting.set()
+        return patient()(error)
+
+    def stand_by() -> None:
+        with active(location, file, wait) as lock:
+            assert lock.held()
+            over.set()
+
+    standby = threading.Thread(target=stand_by)
+    with active(location, file, None):
+        standby.start()
+        assert waiting.wait(10)
+        assert not over.is_set()
+    assert over.wait(10)
+    standby.join()
+
+
+def _be_active(location: str | Path, file: Path, ready: multiprocessing.synchronize.Event) -> None:
+    with active(location, file, None):
+        ready.set()
+        multiprocessing.Event().wait()
+
+
+def test_a_standby_takes_over_within_seconds_of_a_kill(
+    location: str | Path, tmp_path: Path
+) -> None:
+    file, context = tmp_path / "shm.lock", multiprocessing.get_context("spawn")
+    ready = context.Event()
+    process = context.Process(target=_be_active, args=(location, file, ready))
+    process.start()
+    assert ready.wait(60)
+    with pytest.raises(StoreBusy, match=f"process {process.pid}"), active(location, file, None):
+        pytest.fail("two were active")
+    process.kill()
+    began = time.monotonic()
+    with active(location, file, patient()):
+        assert time.monotonic() - began < 5.0
+    process.join()
+
+
+def test_who_loses_the_connection_is_no_longer_active(
+    server: str, postgresql: Databases, tmp_path: Path
+) -> None:
+    file = tmp_path / "shm.lock"
+    with active(server, file, None) as lock:
+        assert postgresql.cut_connections(server) == 1
+        assert not lock.held()
+        with active(server, file, None) as other:
+            assert other.held()
+            assert not lock.held()
+
+
+def test_who_is_cut_off_while_waiting_goes_on_waiting(
+    server: str, postgresql: Databases, tmp_path: Path
+) -> None:
+    told: list[StoreError] = []
+
+    def wait(error: StoreError) -> bool:
+        told.append(error)
+        if len(told) == 1:
+            assert postgresql.cut_connections(server) == 2
+        time.sleep(0.02)
+        return len(told) < 10
+
+    with active(server, tmp_path / "a", None), active(server, tmp_path / "b", wait) as lock:
+        assert lock.held()
+    assert {type(error) for error in told} <= {StoreBusy, StoreError}
+    assert type(told[1]) is StoreError
+
+
+def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
+    told: list[StoreError] = []
+
+    def once(error: StoreError) -> bool:
+        told.append(error)
+        return len(told) < 2
+
+    nowhere = f"postgresql://shm@/shm?host={tmp_path}"
+    with (
+        pytest.raises(StoreError, match="cannot be reached"),
+        active(nowhere, tmp_path / "shm.lock", once),
+    ):
+        pytest.fail("nobody can be active")
+    assert [error.retry_after_s for error in told] == [5.0, 5.0]
+    assert not any(isinstance(error, StoreBusy) for error in told)
+
+
+def test_a_database_that_is_missing_is_not_waited_for(
+    postgresql: Databases, tmp_path: Path
+) -> None:
+    with (
+        pytest.raises(StoreError, match="createdb"),
+        active(postgresql.url("nowhere"), tmp_path / "shm.lock", patient()),
+    ):
+        pytest.fail("nobody can be active")
+
+
+def test_who_finds_the_lock_file_removed_is_no_longer_active(sqlite: Path, tmp_path: Path) -> None:
+    file = tmp_path / "shm.lock"
+    with active(sqlite, file, None) as lock:
+        file.unlink()
+        assert not lock.held()
+        with active(sqlite, file, None) as other:
+            assert other.held()
+            assert not lock.held()

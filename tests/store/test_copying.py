@@ -1,0 +1,96 @@
+"""Copies of a store, and the check of one: both hold the same afterwards, or nothing changed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+
+from shm.errors import StoreError, UsageError
+from shm.store import Store, copying
+from shm.store.backups import copy_store
+from shm.store.checking import check_store
+from shm.store.tables import posteriors
+from tests.helpers.contents import held, quiet
+from tests.helpers.nouns import NOW, a_file
+from tests.store.make_released_database import fill
+
+
+def test_a_copy_holds_the_same_in_either_kind_and_is_numbered_on(
+    filled: Store, empty: str | Path
+) -> None:
+    copied = copy_store(filled, empty, quiet)
+    assert copied == held(filled)
+    assert sum(each.rows for each in copied) > 20
+    with Store.open(empty) as copy:
+        assert held(copy) == copied
+        assert np.array_equal(latest_tension_n(copy), latest_tension_n(filled))
+        newest = copy.recordings()[-1].id
+        assert copy.receive(a_file(9), NOW).recording.id == newest + 1
+
+
+def latest_tension_n(store: Store) -> np.ndarray:
+    return store.history(3)[-1][1].tension_n
+
+
+def test_a_copy_goes_only_into_an_empty_store(file_store: Store, empty: str | Path) -> None:
+    fill(file_store)
+    with Store.create(empty) as other:
+        other.receive(a_file(7), NOW)
+        before = held(other)
+        with pytest.raises(UsageError, match="rows already"):
+            copy_store(file_store, empty, quiet)
+        assert held(other) == before
+
+
+def test_a_copy_that_differs_is_undone(
+    file_store: Store, empty: str | Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(file_store)
+    Store.create(empty).close()
+    written = copying._write
+
+    def altered(connection: sa.Connection, table: sa.Table, rows: copying.Rows) -> None:
+        written(connection, table, rows)
+        if table is posteriors:
+            connection.execute(sa.update(posteriors).values(log_evidence=0.5))
+
+    monkeypatch.setattr(copying, "_write", altered)
+    with pytest.raises(StoreError, match="differs from the store in posteriors;"):
+        copy_store(file_store, empty, quiet)
+    with Store.open(empty) as copy:
+        assert sum(each.rows for each in held(copy)) == 0
+
+
+def test_one_changed_digit_changes_the_checksum_of_its_table_alone(filled: Store) -> None:
+    before = held(filled)
+    with filled.writing() as connection:
+        connection.execute(
+            sa.update(posteriors)
+            .where(posteriors.c.id == 1)
+            .values(log_evidence=posteriors.c.log_evidence + 1e-12)
+        )
+    changed = [b.table for b, a in zip(before, held(filled), strict=True) if a != b]
+    assert changed == ["posteriors"]
+
+
+def test_a_sound_store_has_no_troubles(filled: Store) -> None:
+    checked = check_store(filled, quiet)
+    assert checked.troubles == ()
+    assert checked.tables == held(filled)
+
+
+def test_a_page_that_was_overwritten_is_found(file_store: Store, sqlite: Path) -> None:
+    fill(file_store)
+    file_store.close()
+    with sqlite.open("r+b") as file:
+        file.seek(8 * 4096)
+        file.write(b"\xff" * 4096)
+    with Store.open(sqlite) as store:
+        try:
+            troubles = check_store(store, quiet).troubles
+        except StoreError as error:
+            troubles = (str(error),)
+    assert any("damaged" in trouble for trouble in troubles)

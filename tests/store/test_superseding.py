@@ -1,0 +1,168 @@
+"""Doing work again: what it replaces stays with its lineage, and nothing shows it by mistake."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import pytest
+
+from shm.errors import NothingThere, UsageError
+from shm.store import Baseline, IdentifiedTest, KeptWatch, Lineage, Stage, Store, StoredTest
+from shm.values import Selection
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test, an_alert
+
+OLD, NEW = Lineage("0" * 64, "1" * 64, "0.1.0"), Lineage("0" * 64, "1" * 64, "0.2.0")
+LATER = NOW + timedelta(days=400)
+
+
+def identified(store: Store, number: int, lineage: Lineage = OLD, name: str = "") -> StoredTest:
+    recording = store.receive(a_file(number), NOW).recording
+    item = IdentifiedTest(a_test(name or f"t{number}", days=number))
+    store.identified(recording.id, [item], lineage, NOW)
+    return next(test for test in store.tests() if test.recording_id == recording.id)
+
+
+def with_baseline(store: Store) -> Baseline:
+    first = identified(store, 1)
+    store.selected(3, [first], Selection((a_posterior(),), (1.0,)), OLD, NOW)
+    baseline = store.baseline(3)
+    assert baseline is not None
+    return baseline
+
+
+def watched(store: Store, test: StoredTest, baseline: Baseline, seed: int = 1) -> None:
+    name = test.test.id
+    lineage = OLD if seed == 1 else NEW
+    store.updated(test, a_posterior("beam1", (name,), seed=seed), lineage, NOW)
+    state = KeptWatch("a key", test.time, b"state")
+    store.watched(test, baseline, a_watched_test(name), None, [], NOW, state)
+
+
+def test_identifying_again_keeps_the_old_result_beside_the_new_one(store: Store) -> None:
+    baseline = with_baseline(store)
+    second = identified(store, 2)
+    watched(store, second, baseline)
+    rerun = store.again(second.recording_id, Stage.IDENTIFIED, LATER)
+    assert (rerun.tests, rerun.posteriors, rerun.watches, rerun.of_baseline) == (("t2",), 1, 1, ())
+    assert rerun.recording.stage is Stage.RECEIVED
+    assert [test.test.id for test in store.tests(3)] == ["t1"]
+    assert store.waiting_tests() == ()
+    assert [test.test.id for test, _ in store.history(3)] == ["t1"]
+    assert (store.drifts(3), store.watches(3)) == ((), ())
+
+    again = identified(store, 2, NEW)
+    assert again.test.id == "t2"
+    assert again.id != second.id
+    watched(store, again, baseline, seed=2)
+    former, present = store.former_tests(again.recording_id)
+    assert (former.superseded_at, present.superseded_at) == (LATER, None)
+    assert (former.lineage, present.lineage) == (OLD, NEW)
+    assert [made.superseded_at for made in former.posteriors] == [LATER]
+    assert [made.lineage.version for made in present.posteriors] == ["0.2.0"]
+    assert store.posterior(3, "t2").seed == 2
+    assert len(store.posteriors(3)) == 2
+    assert [drift.test for drift in store.drifts(3)] == ["t2"]
+    assert store.events("again")[0].recording_id == second.recording_id
+
+
+@pytest.mark.parametrize(
+    ("stage", "stands", "posteriors"),
+    [(Stage.UPDATED, Stage.IDENTIFIED, 1), (Stage.WATCHED, Stage.UPDATED, 0)],
+)
+def test_a_test_is_sent_back_to_the_stage_before(
+    store: Store, stage: Stage, stands: Stage, posteriors: int
+) -> None:
+    baseline = with_baseline(store)
+    second = identified(store, 2)
+    watched(store, second, baseline)
+    rerun = store.again(second.recording_id, stage, LATER, "t2")
+    assert (rerun.posteriors, rerun.watches) == (posteriors, 1)
+    assert store.test(second.id).stage is stands
+    assert rerun.recording.stage is stands
+    assert [test.id for test in store.waiting_tests()] == [second.id]
+    if stage is Stage.UPDATED:
+        store.updated(second, a_posterior("beam1", ("t2",), seed=2), NEW, LATER)
+    store.watched(second, baseline, a_watched_test("t2"), None, [], LATER)
+    assert len(store.watches(3)) == len(store.drifts(3)) == 1
+    assert store.recording(second.recording_id).stage is Stage.DONE
+
+
+def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) -> None:
+    baseline = with_baseline(store)
+    first = store.tests(3)[0]
+    rerun = store.again(first.recording_id, Stage.IDENTIFIED, LATER)
+    assert (rerun.of_baseline, rerun.posteriors) == (("t1",), 0)
+    anew = identified(store, 1, NEW)
+    store.updated(anew, a_posterior(seed=2), NEW, LATER, to_watch=False)
+    assert store.test(anew.id).stage is Stage.WATCHED
+    kept = store.baseline(3)
+    assert kept is not None
+    assert kept.id == baseline.id
+    assert [test.id for test in store.tests_of(kept)] == [first.id]
+    assert [posterior.seed for _, posterior in store.history(3)] == [2]
+
+
+def test_a_test_of_a_changed_name_keeps_it(store: Store) -> None:
+    identified(store, 1, name="t")
+    second = identified(store, 2, name="t")
+    store.again(second.recording_id, Stage.IDENTIFIED, LATER)
+    assert identified(store, 2, name="t").test.id == second.test.id != "t"
+
+
+def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: Store) -> None:
+    baseline = with_baseline(store)
+    second = identified(store, 2)
+    watched(store, second, baseline)
+    assert store.kept_watch(baseline) == KeptWatch("a key", second.time, b"state")
+    store.again(second.recording_id, Stage.WATCHED, LATER)
+    assert store.kept_watch(baseline) is None
+
+
+def test_a_refused_file_may_be_tried_again(store: Store) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    store.refuse(recording.id, {"message": "no rate."}, NOW)
+    assert store.again(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
+    assert [each.id for each in store.waiting_recordings(5)] == [recording.id]
+
+
+@pytest.mark.parametrize("stage", [Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED])
+def test_what_has_not_come_so_far_cannot_be_done_again(store: Store, stage: Stage) -> None:
+    recording = store.receive(a_file(1), NOW).recording
+    with pytest.raises(UsageError, match="not come so far"):
+        store.again(recording.id, stage, LATER)
+    assert store.events() == ()
+
+
+def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Store) -> None:
+    test = identified(store, 1)
+    assert store.recording_named("1") == (test.recording_id, None)
+    assert store.recording_named("t1") == (test.recording_id, "t1")
+    with pytest.raises(NothingThere, match="no recording and no test 't9'"):
+        store.recording_named("t9")
+    recording = store.receive(a_file(2), NOW).recording
+    store.identified(recording.id, [IdentifiedTest(a_test("t1", hanger=4))], OLD, NOW)
+    with pytest.raises(UsageError, match="2 hangers"):
+        store.recording_named("t1")
+
+
+def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
+    baseline = with_baseline(store)
+    second = identified(store, 2)
+    store.updated(second, a_posterior("beam1", ("t2",)), OLD, NOW)
+    store.watched(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
+    for delivery in store.deliveries():
+        store.delivered(delivery, LATER)
+    steps = store.steps(second.recording_id)
+    assert [step.stage for step in steps if step.test is None] == [
+        "archived", "received", "identified", "updated", "done"
+    ]  # fmt: skip
+    assert [(step.stage, step.at) for step in steps if step.test == "t2"] == [
+        ("identified", NOW), ("updated", NOW), ("watched", NOW), ("notified", LATER)
+    ]  # fmt: skip
+
+
+def test_a_refusal_is_a_step_of_the_file_and_of_its_tests(store: Store) -> None:
+    test = identified(store, 1)
+    store.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
+    refused = [s.test for s in store.steps(test.recording_id) if s.stage == Stage.REFUSED]
+    assert refused == [None, "t1"]

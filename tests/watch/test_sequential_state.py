@@ -1,0 +1,109 @@
+"""The state of a watch that is kept between two tests, and what makes it void."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, UsageError
+from shm.values import Reading, WatchedTest
+from shm.watch.options import WatchOptions
+from shm.watch.sequential import Watcher, WatchState, watch_over
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.synthetic_readings import PLANES_ALONE, SPRING_STEP, History
+
+OPTIONS = WatchOptions(baseline_tests=4)
+WATCHER = Watcher(PLANES_ALONE, HANGER_3, OPTIONS)
+
+
+def readings(tests: int = 26) -> list[Reading]:
+    """With a change that is called on the way, and tests without a temperature."""
+    step = [-0.04, -SPRING_STEP, 0.0]
+    history = History(PLANES_ALONE, tests, change_at=14, step=step, temperatures_missing=0.3)
+    softened = np.array([-1e-4, 1e-4, 1e-4])
+    return [
+        each if np.isfinite(each.temperature_c) else replace(each, per_kelvin=softened)
+        for each in history.readings(3)
+    ]
+
+
+def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]:
+    """Each test of a watch that knows of the earlier ones by bytes alone."""
+    state, begun = WATCHER.begin(given[: OPTIONS.baseline_tests])
+    tests = list(begun.tests)
+    for reading in given[OPTIONS.baseline_tests :]:
+        kept = WatchState.from_bytes(state.to_bytes())
+        again = Watcher(PLANES_ALONE, HANGER_3, OPTIONS)
+        state, found = again.after(kept, reading)
+        tests.append(found)
+    return state, tests
+
+
+def test_a_watch_from_kept_states_is_bit_for_bit_that_of_one_pass() -> None:
+    given = readings()
+
+    once = watch_over(given, PLANES_ALONE, HANGER_3, OPTIONS)
+    _, tests = by_kept_states(given)
+
+    assert once.calls
+    assert [repr(each) for each in tests] == [repr(each) for each in once.tests]
+
+
+def test_a_state_knows_how_far_it_has_come_and_what_was_told() -> None:
+    given = readings(8)
+    state, _ = by_kept_states(given)
+
+    kept = WatchState.from_bytes(replace(state, told='{"beyond": "Zürich"}').to_bytes())
+
+    assert kept.tests == 8
+    assert kept.last_time == given[-1].time
+    assert kept.told == '{"beyond": "Zürich"}'
+
+
+def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> None:
+    tension, *others = PLANES_ALONE
+    limits = replace(HANGER_3.thresholds, tension_shift_fraction=0.1)
+    watchers = [
+        WATCHER,
+        Watcher(PLANES_ALONE, HANGER_3, replace(OPTIONS, limit_years=20)),
+        Watcher((tension,), HANGER_3, OPTIONS),
+        Watcher((replace(tension, values=tension.values * 2), *others), HANGER_3, OPTIONS),
+    ]
+
+    for one, other in itertools.combinations(watchers, 2):
+        assert one.key != other.key
+    stricter = Watcher(PLANES_ALONE, replace(HANGER_3, thresholds=limits), OPTIONS)
+    assert stricter.key == WATCHER.key
+
+
+def test_a_state_of_another_watch_or_an_older_test_is_refused() -> None:
+    given = readings(8)
+    state, _ = by_kept_states(given)
+    early, _ = WATCHER.begin(given[:2])
+    other = Watcher(PLANES_ALONE, HANGER_3, replace(OPTIONS, limit_years=20))
+
+    with pytest.raises(BadInput, match="later"):
+        WATCHER.after(state, given[3])
+    with pytest.raises(UsageError, match="not of this hanger"):
+        other.after(state, given[-1])
+    with pytest.raises(UsageError, match="not of this hanger"):
+        WATCHER.after(early, given[2])
+    with pytest.raises(UsageError, match="baseline has 4"):
+        WATCHER.begin(given)
+
+
+@pytest.mark.parametrize("content", [b"", b"not a state", b"PK\x03\x04 broken"])
+def test_content_that_is_no_state_is_refused(content: bytes) -> None:
+    with pytest.raises(BadInput, match="cannot be read"):
+        WatchState.from_bytes(content)
+
+
+def test_a_state_cut_short_is_refused() -> None:
+    state, _ = WATCHER.begin(readings(4))
+    content = state.to_bytes()
+
+    with pytest.raises(BadInput, match="cannot be read"):
+        WatchState.from_bytes(content[: len(content) // 2])
