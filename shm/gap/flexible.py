@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from shm.gap.contract import Design, NoiseNode, Observations
-from shm.gap.noise import nodes
+from shm.gap.noise import nodes, same_mode
 from shm.gap.repeated import Repeated
 from shm.values import FloatArray
 
@@ -119,9 +119,18 @@ def _patterns(design: Design) -> list[FloatArray]:
 
 def _over_orders(design: Design) -> list[FloatArray]:
     """Correlations (F, F) between modes: none, smooth over the order in one plane or in both."""
-    order, plane = design.frequency_order, design.frequency_plane
-    same_plane = (plane[:, None] == plane).astype(float)
+    patterns = [same_mode(design), smooth_over_orders(design)]
+    several = np.ptp(design.frequency_plane) > 0
+    return [*patterns, _smooth(design)] if several else patterns
+
+
+def smooth_over_orders(design: Design) -> FloatArray:
+    """Correlations (F, F) that fall with the difference of the orders, in each plane."""
+    plane = design.frequency_plane
+    return np.asarray((plane[:, None] == plane) * _smooth(design))
+
+
+def _smooth(design: Design) -> FloatArray:
+    order = design.frequency_order
     apart = (order[:, None] - order) / SMOOTH_ORDERS
-    smooth = np.exp(-(apart**2) / 2)
-    patterns = [same_plane * (order[:, None] == order), same_plane * smooth]
-    return [*patterns, smooth] if np.ptp(plane) > 0 else patterns
+    return np.asarray(np.exp(-(apart**2) / 2))

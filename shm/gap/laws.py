@@ -19,6 +19,7 @@ from scipy.special import logsumexp
 
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
 from shm.gap.fit import scattered
+from shm.gap.flexible import smooth_over_orders
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
@@ -28,7 +29,8 @@ from shm.values import FloatArray, IntArray
 FRACTIONS = ((0.003, 0.15), (0.03, 0.15), (0.1, 0.13), (0.2, 0.08), (0.4, 0.04))
 """By how much an effect's law is off mode by mode, each with its prior probability."""
 FRACTIONS_ON_THE_WHOLE = ((0.01, 0.05), (0.03, 0.05), (0.1, 0.05))
-"""The same of what the effect does to the modes of a test and plane on the whole."""
+"""The same of what the effect does to the modes of a test and plane on the whole, as likely from
+mode to mode as smooth over the orders."""
 EXACT = 0.3
 """The prior probability that it is not off at all."""
 SHOWN = 3.0
@@ -59,15 +61,13 @@ def by_its_laws(
     """
     others = _changes(problem, fit)
     shift = fit.predicted - baseline.predicted
-    whole = _on_the_whole(problem.design, shift)
-    allowances = [(fraction * shift, share) for fraction, share in FRACTIONS]
-    allowances += [(fraction * whole, share) for fraction, share in FRACTIONS_ON_THE_WHOLE]
+    allowances = _allowances(problem.design, shift)
     exact = _linear(problem, fit, fit.noise, fit.slopes)
     wide = np.column_stack([fit.slopes, others])
     off = [
-        _linear(problem, fit, _allowed(problem.design, fit, error), wide) for error, _ in allowances
+        _linear(problem, fit, _allowed(fit, error, alike), wide) for error, alike, _ in allowances
     ]
-    share = np.array([share for _, share in allowances])
+    share = np.array([share for *_, share in allowances])
     weight = np.log(share) + np.array([each.log_evidence for each in off])
     of_exact = np.log(EXACT) + exact.log_evidence
     gain = float(np.logaddexp(of_exact, logsumexp(weight)) - exact.log_evidence)
@@ -94,6 +94,19 @@ def _otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
             yield replace(hypothesis, effects=tuple(effects))
 
 
+def _allowances(design: Design, shift: FloatArray) -> list[tuple[FloatArray, FloatArray, float]]:
+    """By how much data are off (data,), how frequencies go together (F, F), prior probabilities."""
+    whole, each = _on_the_whole(design, shift), same_mode(design)
+    return [
+        *((fraction * shift, each, share) for fraction, share in FRACTIONS),
+        *(
+            (fraction * whole, alike, share / 2)
+            for fraction, share in FRACTIONS_ON_THE_WHOLE
+            for alike in (each, smooth_over_orders(design))
+        ),
+    ]
+
+
 def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:
     """Root mean squares of a shift (data,) over each test and plane, and over each shape."""
     count = design.frequencies
@@ -114,13 +127,12 @@ def _root_mean_square(group: IntArray, values: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(mean)[group])
 
 
-def _allowed(design: Design, fit: Fit, off: FloatArray) -> Covariance:
-    """The errors of a fit with those of a law that is `off` (data,)."""
-    count = design.frequencies
-    together = np.outer(off[:count], off[:count]) * same_mode(design)
+def _allowed(fit: Fit, off: FloatArray, alike: FloatArray) -> Covariance:
+    """The errors of a fit with those of a law that is `off` (data,), `alike` (F, F)."""
+    count = len(alike)
     return replace(
         fit.noise,
-        frequency=fit.noise.frequency + together,
+        frequency=fit.noise.frequency + np.outer(off[:count], off[:count]) * alike,
         shape=fit.noise.shape + off[count:] ** 2,
     )
 

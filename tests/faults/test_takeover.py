@@ -13,7 +13,7 @@ from tests.helpers.postgres import Databases
 from tests.helpers.takeovers import kill_a_worker_then_the_active_daemon
 from tests.helpers.workspaces import make_workspace
 
-FILES = 6
+FILES = 4
 
 
 @pytest.mark.slow
