@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from shm.documents import format_time
 from shm.errors import BadInput, ShmError
 from shm.read import sidecar_path
-from shm.store.archive import MODES_SUFFIX, checksum, safe_name, suffix_of
+from shm.store.archive import MODES_SUFFIX, checksum, safe_name, suffix_of, sync
 
 _LEFT_ALONE = (".part", ".tmp", ".filepart", ".toml")
 _LEFTOVER_S = 86400.0
@@ -106,7 +106,7 @@ class Incoming:
             if self._lies_there(target, sidecar):
                 return Landed(target, self.sha256, self.size_bytes)
             if self._placed(target, sidecar):
-                _sync_folder(self._spool)
+                sync(self._spool)
                 return Landed(target, self.sha256, self.size_bytes)
         raise AssertionError("there is always one more place")
 
@@ -218,11 +218,3 @@ def _sweep(folder: Path) -> None:
                 left.unlink()
         except FileNotFoundError:
             continue
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

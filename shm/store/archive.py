@@ -127,8 +127,8 @@ class Archive:
             final.parent.mkdir(exist_ok=True)
             temporary.chmod(0o444)
             temporary.rename(final)
-            _sync_folder(final.parent)
-            _sync_folder(self.folder)
+            sync(final.parent)
+            sync(self.folder)
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def _copy_whole(source: Path, target: Path) -> None:
     temporary.unlink(missing_ok=True)
     _copy_hashed(source, temporary)
     temporary.rename(target)
-    _sync_folder(target.parent)
+    sync(target.parent)
 
 
 def _write_whole(text: str, target: Path) -> None:
@@ -193,11 +193,12 @@ def _write_whole(text: str, target: Path) -> None:
         file.flush()
         os.fsync(file.fileno())
     temporary.rename(target)
-    _sync_folder(target.parent)
+    sync(target.parent)
 
 
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
+def sync(path: Path) -> None:
+    """Forces a file, or a folder's list of names, to disk."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

@@ -5,7 +5,6 @@ A backup is one SQLite file, whichever kind the store is of, so that it opens ev
 
 from __future__ import annotations
 
-import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -18,6 +17,7 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere, SchemaOutdated, StoreError, UsageError
 from shm.store import schema
+from shm.store.archive import sync
 from shm.store.checking import check_store
 from shm.store.copying import TableContent, Tell, contents, copy_rows, delete_rows, row_counts
 from shm.store.database import BUSY_SECONDS, Database, make_engine
@@ -181,14 +181,6 @@ def _snapshot(source: Path, target: Path, tell: Tell) -> None:
 def _into_place(temporary: Path, file: Path) -> None:
     with closing(sqlite3.connect(temporary)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")  # one file, readable from anywhere
-    _sync(temporary)
+    sync(temporary)
     temporary.rename(file)
-    _sync(file.parent)
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync(file.parent)
