@@ -9,7 +9,7 @@ INSTALL := $(UV) --no-deps --no-build-isolation --editable .
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint bench bench-peers docs lock clean
+.PHONY: demo test lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -33,6 +33,12 @@ bench-peers: .venv/development
 	$(BIN)/python tests/benchmarks/peers.py --resume --write-docs
 
 docs: .venv/development
+	$(BIN)/python docs/build.py --quick
+	$(BIN)/sphinx-build --quiet -W --keep-going -b html -d build/manual-doctrees docs build/manual
+	@echo "The manual: build/manual/index.html"
+
+# Computes the tables of docs/validation.md, docs/gap.md and README.md anew: minutes.
+tables: .venv/development
 	$(BIN)/python docs/build.py
 
 # Compiles the pinned files anew from pyproject.toml; hashes only, no host names.

@@ -1,7 +1,7 @@
-"""Makes the generated pages: commands, settings, effects, and the tables of validation and gap.
+"""Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
-python docs/build.py            # all, the tables included (two minutes)
-python docs/build.py --quick    # without the tables
+python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
+python docs/build.py            # the computed tables too (`make tables`): validation, gap, README
 
 The blind trial takes hours; its page is filled from one that was solved by docs/blind_page.py.
 The real measurements are not in this repository; docs/real_cases_page.py fills their page in two
@@ -10,9 +10,12 @@ minutes where they are.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import sys
+from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 
 import rich_click as click
@@ -20,6 +23,7 @@ import rich_click as click
 from docs.effects_page import effects_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
+from shm.models.registry import MODELS
 from shm.settings import TABLE, Setting
 from shm_cli.main import VERBS, cli
 from shm_cli.validate import compared, markdown
@@ -84,11 +88,49 @@ def _range(row: Setting) -> str:
     return " ".join(text for text in bounds if text)
 
 
+def classes_table() -> str:
+    """The model classes of docs/physics.md: what they are, their parameters and ranges."""
+    head = ("class", "what it is", "parameters, each with its range")
+    rows = [
+        (f"[`{name}`](#{_HEADINGS[name]})", model.title.partition(": ")[2], _ranges(model.bounds))
+        for name, model in MODELS.items()
+    ]
+    return markdown(head, rows)
+
+
+def examples() -> str:
+    """The programs of docs/examples for docs/api.md, each with what its docstring says first."""
+    parts = []
+    for path in sorted((DOCS / "examples").glob("*.py")):
+        said = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").strip()
+        link = f"[examples/{path.name}](examples/{path.name})"
+        shown = f"```{{literalinclude}} examples/{path.name}\n:language: python\n```"
+        title = path.stem.replace("_", " ").capitalize()
+        parts.append(f"### {title}\n\n{link}: {said.splitlines()[0]}\n\n{shown}")
+    return "\n" + "\n\n".join(parts) + "\n"
+
+
+_BEAMS = {"beam1": "beam1-clamped-ends", "beam2": "beam2-ends-on-rotational-springs"}
+_HEADINGS = defaultdict(lambda: "s1-s2-solid0-solid1-solid2-three-dimensional", _BEAMS)
+
+
+def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
+    """Parameters with the same range are named together."""
+    alike: dict[tuple[float, float], list[str]] = {}
+    for name, both in bounds.items():
+        alike.setdefault(both, []).append(f"`{name}`")
+    return "; ".join(
+        f"{', '.join(names)} {low:g} to {high:g}" for (low, high), names in alike.items()
+    )
+
+
 def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
+    fill_in(DOCS / "physics.md", "classes", classes_table())
+    fill_in(DOCS / "api.md", "examples", examples())
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)

@@ -1,19 +1,148 @@
-"""shm: the tension of bridge hangers from hammer tests, with its uncertainty, unattended."""
+"""Tension of bridge hangers from hammer tests, with its uncertainty, unattended.
+
+In a notebook, from a recording to the tension and what limits it::
+
+    import shm
+
+    hanger = shm.load_hanger("H.toml")
+    test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
+    posterior = shm.update(test, hanger, model="beam2", seed=1)
+    posterior.tension_n.mean(), posterior.tension_n.std()      # N
+    choice = shm.select(test, hanger)                          # which model class, how surely
+    diagnosis = shm.diagnose(test, hanger)                     # why model and measurement differ
+    shm.plot.tension(posterior, hanger)                        # a matplotlib figure
+    shm.export.datatree(posterior)                             # what ArviZ reads
+
+- A hanger: `load_hanger` (from TOML), `round_bar` (from its diameter), `Hanger` (from all figures).
+- The steps: `read`, `identify`, `update`, `select`, `diagnose`; `simulate` makes a recording whose
+  truth is known (a `PlantedEffect` is part of it); `load_modes` takes modal tests that were
+  identified before, or elsewhere.
+- `Store` reads what a workspace keeps of years of tests.
+- `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF.
+- The nouns that flow between the steps are frozen dataclasses: `Recording`, `FrequencyResponse`,
+  `Identification`, `ModalTest`, `Mode`, `AddedMass`, `Posterior`, `Selection`, `Diagnosis`.
+- What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
+
+SI units throughout (N, m, kg, s, Hz), temperatures in deg C, unknown numbers NaN. The same seed
+gives the same result. `read`, `identify`, `update` and `simulate` are packages too: call the name
+for the step, import from it what else it holds (`from shm.identify import IdentifyOptions`).
+"""
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shm.gap import diagnose as diagnose
+    from inspect import Signature
+
+    from shm import export as export
+    from shm import plot as plot
+    from shm.api import Store as Store
+    from shm.api import diagnose as diagnose
+    from shm.api import identify as identify
+    from shm.api import load_hanger as load_hanger
+    from shm.api import load_modes as load_modes
+    from shm.api import read as read
+    from shm.api import round_bar as round_bar
+    from shm.api import select as select
+    from shm.api import simulate as simulate
+    from shm.api import update as update
+    from shm.errors import ShmError as ShmError
+    from shm.identify import Identification as Identification
+    from shm.simulate import PlantedEffect as PlantedEffect
+    from shm.values import AddedMass as AddedMass
+    from shm.values import Diagnosis as Diagnosis
+    from shm.values import FrequencyResponse as FrequencyResponse
+    from shm.values import Hanger as Hanger
+    from shm.values import ModalTest as ModalTest
+    from shm.values import Mode as Mode
+    from shm.values import Posterior as Posterior
+    from shm.values import Recording as Recording
+    from shm.values import Selection as Selection
 
 __version__ = "0.1.0"
 
+_STEPS_AND_PACKAGES = ("identify", "read", "simulate", "update")
+_HOMES = {
+    "shm.api": (
+        "Store", "diagnose", "load_hanger", "load_modes", "round_bar", "select",
+    ),
+    "shm.errors": ("ShmError",),
+    "shm.identify": ("Identification",),
+    "shm.simulate": ("PlantedEffect",),
+    "shm.values": (
+        "AddedMass", "Diagnosis", "FrequencyResponse", "Hanger", "ModalTest", "Mode", "Posterior",
+        "Recording", "Selection",
+    ),
+}  # fmt: skip
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_MODULES = ("export", "plot", *_STEPS_AND_PACKAGES)
 
-def __getattr__(name: str) -> Any:
-    """`shm.diagnose` is loaded when it is asked for, so that `import shm` stays cheap."""
-    if name != "diagnose":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from shm.gap import diagnose
+__all__ = sorted([*_HOME, *_MODULES])
 
-    return diagnose
+
+class _StepAndPackage(ModuleType):
+    """A package that is also the step of its name: `shm.identify(...)`.
+
+    A package and a function of one name would hide each other, by the order of the imports.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return _step(self)(*arguments, **options)
+
+    @property
+    def __signature__(self) -> Signature:
+        from inspect import signature
+
+        return signature(_step(self))
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        return f"{_step(self).__doc__}\nAs a package: {vars(self)['__doc__']}"
+
+
+def _step(package: ModuleType) -> FunctionType:
+    step: FunctionType = getattr(import_module("shm.api"), package.__name__.removeprefix("shm."))
+    return step
+
+
+class _Shm(ModuleType):
+    """This package; it hears of each sub-package as it is imported, whoever imports it."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in _STEPS_AND_PACKAGES and type(value) is ModuleType:
+            value.__class__ = _StepAndPackage
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Shm
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """What is asked for is loaded then, so that `import shm` stays cheap."""
+        if name in _MODULES:
+            return import_module(f"shm.{name}")
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__", "__doc__", "__file__", "__name__", "__path__"]
+
+
+def _show_in_notebook() -> None:
+    """Where a notebook is what imports us, its shell learns to show our values."""
+    running = getattr(sys.modules.get("IPython"), "get_ipython", None)
+    shell = running() if running else None
+    if shell is not None:
+        from shm.notebook import load_ipython_extension
+
+        load_ipython_extension(shell)
+
+
+_show_in_notebook()

@@ -29,6 +29,7 @@ from shm.values import (
     Posterior,
     Selection,
     ShapePoint,
+    Summary,
 )
 
 MODES_SCHEMA = "shm.modes/1"
@@ -290,15 +291,7 @@ def _time(text: Any, label: str, file: str | Path) -> datetime | None:
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
     """Mean, standard deviation, quantiles and most probable value of samples (samples,)."""
-    q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
-    return {
-        "mean": float(samples.mean()),
-        "sd": float(samples.std(ddof=1)),
-        "q05": float(q05),
-        "q50": float(q50),
-        "q95": float(q95),
-        "map": float(most_probable),
-    }
+    return {**asdict(Summary.of(samples)), "map": float(most_probable)}
 
 
 def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.words import model_class
 from shm.store import Store, StoredAdoption
+from shm_cli import completers
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -29,9 +30,22 @@ _who_option = click.option("--who", show_default="the user's name", help="For th
 
 @click.command()
 @hanger_option(required=True)
-@click.option("--effect", "effects", multiple=True, required=True, help="May be given twice.")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    required=True,
+    shell_complete=completers.effects,
+    help="May be given twice.",
+)
 @click.option("--at", multiple=True, show_default="likeliest of the diagnosis", help="Where.")
-@click.option("--baseline", default="", show_default="of the diagnosis", help="A model class.")
+@click.option(
+    "--baseline",
+    default="",
+    show_default="of the diagnosis",
+    shell_complete=completers.models,
+    help="A model class.",
+)
 @_why_option
 @_who_option
 @json_option

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import textwrap
 import time
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
@@ -13,14 +12,15 @@ import rich_click as click
 from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
-from shm.report.table import WIDTH
 from shm.values import Alert
+from shm_cli import completers
 from shm_cli.acknowledge import acknowledge, acknowledgement_row, acknowledgement_words
 from shm_cli.common import (
     hanger_option,
     json_option,
     open_workspace,
     opened_store,
+    paragraph,
     show,
     show_table,
     table,
@@ -48,7 +48,14 @@ command.add_command(acknowledge)
 
 
 @command.command()
-@click.option("--hook", "name", required=True, metavar="NAME", help="A hook of bridge.toml.")
+@click.option(
+    "--hook",
+    "name",
+    required=True,
+    metavar="NAME",
+    shell_complete=completers.hooks,
+    help="A hook of bridge.toml.",
+)
 @json_option
 @click.pass_context
 def test(ctx: click.Context, name: str, as_json: bool) -> None:
@@ -133,7 +140,7 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         )
     show_table(made)
     for stored in alerts:
-        click.echo(f"\n{textwrap.fill(f'{stored.id}. {stored.alert.message}', WIDTH)}")
+        click.echo("\n" + paragraph(f"{stored.id}. {stored.alert.message}"))
 
 
 def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any]:

@@ -76,8 +76,9 @@ def prune(
 
 @command.command("fetch")
 @click.argument("which", metavar="ID")
+@json_option
 @click.pass_context
-def fetch_command(ctx: click.Context, which: str) -> None:
+def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
     """Bring the raw file of a recording (by number) or test (by name) back from its copy.
 
     \b
@@ -85,11 +86,14 @@ def fetch_command(ctx: click.Context, which: str) -> None:
     """
     with opened_store(ctx) as (workspace, store):
         recording = store.recording(store.recording_named(which)[0])
-        if workspace.archive.holds(recording.file):
-            click.echo(f"{recording.file.file_name} is in the archive.")
-            return
-        folder = fetch(store, workspace.archive, recording)
-    click.echo(f"{recording.file.file_name} is back in the archive, from {folder}.")
+        held = workspace.archive.holds(recording.file)
+        folder = None if held else fetch(store, workspace.archive, recording)
+    if as_json:
+        come_from = None if folder is None else str(folder)
+        show({"recording": recording.id, "file": recording.file.file_name, "from": come_from})
+        return
+    where = "in the archive" if held else f"back in the archive, from {folder}"
+    click.echo(f"{recording.file.file_name} is {where}.")
 
 
 @dataclass(frozen=True)

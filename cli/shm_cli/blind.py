@@ -71,8 +71,15 @@ def blind() -> None:
     help="Cases hold modal tests, or recordings that are still to be identified, or half of each.",
 )
 @_jobs_option
+@json_option
 def make(
-    directory: Path, cases: int, seed: int | None, key: Path | None, way: str, jobs: int
+    directory: Path,
+    cases: int,
+    seed: int | None,
+    key: Path | None,
+    way: str,
+    jobs: int,
+    as_json: bool,
 ) -> None:
     """Make a trial: hangers with hidden causes, and a key that is kept apart.
 
@@ -88,6 +95,10 @@ def make(
     ways = [each for each in WAYS if way in ("both", each)]
     with _told("making") as told:
         made = make_trial(directory, key, cases, seed=seed, ways=ways, jobs=jobs, told=told)
+    if as_json:
+        told_of = {"directory": str(directory), "cases": len(made.cases), "key": str(key)}
+        show({**told_of, "key_sha256": made.key_sha256})
+        return
     _show_made(made, directory, key)
 
 
@@ -120,7 +131,8 @@ _PLANTED = {
     "catalogue. The key tells which; no process that diagnoses sees it.",
 )
 @_jobs_option
-def solve(directory: Path, left_out: Path | None, jobs: int) -> None:
+@json_option
+def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> None:
     """Diagnose all cases of a trial, and seal the answers with their SHA-256.
 
     Each case is diagnosed in a process that can open nothing but the cases, so not the key. Each
@@ -144,7 +156,21 @@ def solve(directory: Path, left_out: Path | None, jobs: int) -> None:
         with _told("solving without the true effect") as told:
             solved = solve_left_out(trial, without, jobs=jobs, told=told)
         seal = trial.seal("left_out")
+    if as_json:
+        show(_solved_document(solved, seal))
+        return
     _say_solved(solved, seal)
+
+
+def _solved_document(solved: SolvedRound, seal: Path) -> dict[str, object]:
+    failed = [{"case": each.case, "why": each.failure} for each in solved.failed]
+    return {
+        "answers": len(solved.answers),
+        "earlier": solved.earlier,
+        "failed": failed,
+        "seal": str(seal),
+        "sha256": solved.sha256,
+    }
 
 
 def _say_solved(solved: SolvedRound, seal: Path) -> None:

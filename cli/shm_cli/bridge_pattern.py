@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 
 import rich_click as click
@@ -11,8 +10,7 @@ from shm.pipeline.bridge_reporting import stored_pattern
 from shm.report import pattern_json
 from shm.report.bridge.tables import pattern_tables
 from shm.report.figures.bridge_shift import bridge_illustration
-from shm.report.table import WIDTH, laid_out
-from shm_cli.common import json_option, opened_store, show
+from shm_cli.common import json_option, opened_store, paragraph, show, show_texts
 
 
 @click.command("bridge")
@@ -44,6 +42,6 @@ def command(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
         show(pattern_json(pattern))
         return
     for each in pattern_tables(pattern, bars=True):
-        click.echo(laid_out(each))
+        show_texts(each)
     for sentence in (pattern.sentence, *pattern.remarks):
-        click.echo(textwrap.fill(sentence, WIDTH))
+        click.echo(paragraph(sentence))

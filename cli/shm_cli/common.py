@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import rich_click as click
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
+from rich.measure import Measurement
+from rich.padding import Padding
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    SpinnerColumn,
     TextColumn,
+    TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.table import Table
@@ -24,9 +31,14 @@ from shm.documents import dump, load_modes
 from shm.errors import NothingThere, UsageError
 from shm.update import METHODS
 from shm.values import Hanger, ModalTest
+from shm_cli import completers
 
 if TYPE_CHECKING:
+    from shm.report.table import Table as Texts
     from shm.store import Store, Workspace
+
+_WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
+_READABLE = 100
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -67,7 +79,13 @@ log_file_option = click.option(
 def hanger_option(required: bool = False) -> Callable[[F], F]:
     """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
     return click.option(
-        "--hanger", "hanger_id", type=int, required=required, metavar="N", help="Hanger number."
+        "--hanger",
+        "hanger_id",
+        type=int,
+        required=required,
+        metavar="N",
+        shell_complete=completers.hangers,
+        help="Hanger number.",
     )
 
 
@@ -85,13 +103,47 @@ def show(document: object) -> None:
 
 
 def show_table(table: Table) -> None:
-    """Prints a table on stdout."""
+    """Prints a table on stdout; one that the terminal is too narrow for as a list a row."""
     console = Console(highlight=False)
-    if not sys.stdout.isatty():
-        console.width = max(console.width, 120)
+    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+        console.width = max(console.width, _WIDTH_OF_A_FILE)
     console.print(table.title, style="bold", soft_wrap=True, markup=False)
     table.title = None
-    console.print(table)
+    unbounded = console.options.update(max_width=_BEYOND_ANY)
+    narrowest = Measurement.get(console, unbounded, table).minimum
+    console.print(table if narrowest <= console.width else _as_lists(table))
+
+
+def _as_lists(table: Table) -> Group:
+    """Each row as lines `heading  value`, empty values left out, an empty line between rows."""
+    headings = [str(column.header) for column in table.columns]
+    rows = zip(*(column.cells for column in table.columns), strict=True)
+    return Group(*(Padding(_listed(headings, row), (0, 0, 1, 0)) for row in rows))
+
+
+def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
+    listed = Table.grid(padding=(0, 2, 0, 0), pad_edge=False)
+    listed.add_column(style="bold", no_wrap=True)
+    listed.add_column(overflow="fold")
+    named = [(heading, cell) for heading, cell in zip(headings, cells, strict=True) if cell]
+    for heading, cell in named:
+        listed.add_row(heading, cell)
+    return listed
+
+
+def show_texts(texts: Texts) -> None:
+    """Prints a table of a report, and its note."""
+    made = table(texts.title, *texts.headings)
+    for row in texts.rows:
+        made.add_row(*row)
+    show_table(made)
+    if texts.note:
+        click.echo(paragraph(texts.note))
+
+
+def paragraph(text: str) -> str:
+    """A text in lines that fit the terminal, and are not too long to read."""
+    return textwrap.fill(text, min(_READABLE, shutil.get_terminal_size((_READABLE, 24)).columns))
 
 
 def table(title: str, *columns: str) -> Table:
@@ -190,6 +242,7 @@ def _fraction_bar() -> Progress:
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
+        TextColumn("time left"),
         TimeRemainingColumn(),
         console=console,
         disable=not console.is_terminal,
@@ -203,7 +256,29 @@ def counting_bar() -> Progress:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
+        TextColumn("time left"),
         TimeRemainingColumn(),
         console=console,
         disable=not console.is_terminal,
     )
+
+
+@contextmanager
+def waiting(label: str) -> Iterator[None]:
+    """A turning sign and the time gone, on stderr, where nobody can tell how much is left."""
+    console = Console(stderr=True)
+    with Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as sign:
+        sign.add_task(label, total=None)
+        yield
+
+
+def drawing() -> AbstractContextManager[None]:
+    """What is shown while figures and pages are written."""
+    return waiting("drawing the figures")

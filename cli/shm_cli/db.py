@@ -15,7 +15,16 @@ from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import CheckedArchive, archived_names, check_archive, check_store
 from shm.store.copying import TableContent
-from shm_cli.common import json_option, open_workspace, progress_bar, show, show_table, table
+from shm_cli.common import (
+    counting_bar,
+    json_option,
+    open_workspace,
+    progress_bar,
+    show,
+    show_table,
+    table,
+    waiting,
+)
 
 _copies_option = click.option(
     "--archive",
@@ -36,16 +45,28 @@ def command() -> None:
 
 
 @command.command()
+@json_option
 @click.pass_context
-def upgrade(ctx: click.Context) -> None:
+def upgrade(ctx: click.Context, as_json: bool) -> None:
     """Bring the store to the schema of this version; make its tables where a server has none.
+
+    Then what the reports show of older tests is summed up once more, hanger by hanger. That may be
+    stopped and begun again.
 
     \b
     Example: shm --workspace arch db upgrade
     """
     workspace = open_workspace(ctx)
     with workspace.lock():
-        Store.upgrade(workspace.location)
+        with waiting("upgrading the store"):
+            Store.upgrade(workspace.location)
+        with workspace.store() as store, counting_bar() as bar:
+            hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
+            made = sum(store.keep_summaries(hanger) for hanger in hangers)
+            location = store.location
+    if as_json:
+        show({"store": location, "upgraded": True, "summed_up": made})
+        return
     click.echo("The store has the present schema.")
 
 

@@ -13,11 +13,19 @@ from shm.pipeline.bridge_reporting import latest_drifts
 from shm.pipeline.reporting import hanger_states
 from shm.report.shifts import shift_cells
 from shm.report.states import NOTHING_WATCHED
-from shm.report.table import laid_out
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.values import Drift
 from shm_cli.bridge_pattern import command as bridge
-from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
+from shm_cli.common import (
+    hanger_option,
+    json_option,
+    opened_store,
+    paragraph,
+    show,
+    show_table,
+    show_texts,
+    table,
+)
 from shm_cli.rebaseline import rebaseline
 
 if TYPE_CHECKING:
@@ -69,12 +77,11 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
     if shown:
         _show(shown)
     for each in anew:
-        click.echo(
-            f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has come "
-            "in after that baseline was set."
-        )
+        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
+        click.echo(paragraph(f"{said}come in after that baseline was set."))
     if states.temperature_coefficients:
-        click.echo(f"\n{laid_out(temperature_table(states)).rstrip()}")
+        click.echo()
+        show_texts(temperature_table(states))
 
 
 command.add_command(rebaseline)

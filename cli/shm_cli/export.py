@@ -2,51 +2,70 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import UsageError
-from shm.store import samples_npz, samples_table
-from shm.values import Posterior
-from shm_cli.common import hanger_option, opened_store
+from shm import export
+from shm.errors import BadInput
+from shm.values import Hanger, ModalTest, Posterior
+from shm_cli.common import hanger_option, json_option, opened_store, show
 
 
 @click.command()
 @hanger_option(required=True)
 @click.option("--test", metavar="ID", help="A test; the latest if left out.")
 @click.option(
-    "--out", required=True, type=click.Path(dir_okay=False, path_type=Path), metavar="FILE.csv|.npz"
+    "--format",
+    "form",
+    type=click.Choice(list(export.FORMATS)),
+    show_default="the suffix of FILE",
+    help="Table of samples (csv, npz), the document of `shm update` with its draws (json), or what "
+    "ArviZ and xarray read (netcdf, needs shm[export]).",
 )
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.csv|.nc|.json|.npz",
+    help="Where to write.",
+)
+@json_option
 @click.pass_context
-def command(ctx: click.Context, hanger_id: int, test: str | None, out: Path) -> None:
+def command(
+    ctx: click.Context,
+    hanger_id: int,
+    test: str | None,
+    form: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
     """Posterior samples for other programs.
 
-    One column a parameter, then tension_n and log_likelihood; equally weighted rows.
+    One column a parameter, then tension_n and log_likelihood; equally weighted rows. NetCDF adds
+    the measured frequencies and the likelihood of each, with units.
 
     \b
     Example: shm export --hanger 3 --out hanger3.csv
     """
-    if out.suffix not in _WRITERS:
-        raise UsageError(f"{out.name}: unknown suffix.", remedy="Use .csv or .npz.")
+    export.check_format(out, form)
     with opened_store(ctx) as (workspace, store):
-        workspace.bridge.hanger(hanger_id)
+        hanger = workspace.bridge.hanger(hanger_id)
         posterior = store.posterior(hanger_id, test)
-    _WRITERS[out.suffix](posterior, out)
+        tests = [store.test_named(hanger_id, name).test for name in posterior.tests]
+    _write(posterior, out, form, tests, hanger)
+    if as_json:
+        show({"file": str(out), "model": posterior.model, "samples": len(posterior.samples)})
+        return
     click.echo(f"Wrote {len(posterior.samples)} samples of {posterior.model} to {out}.", err=True)
 
 
-def _write_csv(posterior: Posterior, path: Path) -> None:
-    names, rows = samples_table(posterior)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(names)
-        writer.writerows(rows.tolist())
-
-
-def _write_npz(posterior: Posterior, path: Path) -> None:
-    path.write_bytes(samples_npz(posterior))
-
-
-_WRITERS = {".csv": _write_csv, ".npz": _write_npz}
+def _write(
+    posterior: Posterior, out: Path, form: str | None, tests: list[ModalTest], hanger: Hanger
+) -> None:
+    """With the likelihood of each measurement where that is still to be had."""
+    try:
+        export.write(posterior, out, form, tests=tests, hanger=hanger)
+    except BadInput as changed:
+        click.echo(f"Without the likelihood of each measurement: {changed}", err=True)
+        export.write(posterior, out, form)

@@ -21,10 +21,12 @@ from shm.report import (
     diagnosis_text,
 )
 from shm.values import Diagnosis, Hanger, ModalTest
+from shm_cli import completers
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
+    drawing,
     hanger_file_option,
     hanger_option,
     json_option,
@@ -57,12 +59,14 @@ def command() -> None:
     metavar="NAME",
     default=_DEFAULT.baseline,
     show_default=True,
+    shell_complete=completers.models,
     help="The model class whose gap is diagnosed.",
 )
 @click.option(
     "--without",
     multiple=True,
     metavar="EFFECT",
+    shell_complete=completers.effects,
     help="Take an effect out of the catalogue; may be given again.",
 )
 @click.option(
@@ -125,7 +129,9 @@ def diagnose(
     else:
         tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
         sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
-    _write(sheet, html, figures)
+    if html is not None or figures is not None:
+        with drawing():
+            _write(sheet, html, figures)
     if as_json:
         show(diagnosis_json(sheet))
     else:

@@ -19,6 +19,7 @@ from shm.settings import Settings
 from shm.values import Hanger
 from shm_cli.common import (
     counting_bar,
+    drawing,
     hanger_file_option,
     hanger_option,
     json_option,
@@ -155,7 +156,8 @@ def command(
             for group in bar.track(groups, description="identifying")
         ]
     _refuse_several_hangers(sheets)
-    _write(sheets, out, html, figures)
+    with drawing():
+        _write(sheets, out, html, figures)
     if as_json:
         show(_document(sheets))
     else:

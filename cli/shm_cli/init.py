@@ -9,6 +9,7 @@ from pathlib import Path
 import rich_click as click
 
 from shm.store import Workspace
+from shm_cli.common import json_option, show
 
 
 @click.command()
@@ -21,8 +22,11 @@ from shm.store import Workspace
     help="Copy this description instead of the commented one.",
 )
 @click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
+@json_option
 @click.pass_context
-def command(ctx: click.Context, folder: Path | None, config: Path | None, name: str | None) -> None:
+def command(
+    ctx: click.Context, folder: Path | None, config: Path | None, name: str | None, as_json: bool
+) -> None:
     """Make a workspace for a bridge.
 
     It is a folder: bridge.toml (describe your hangers there), shm.db, spool/ (drop recordings
@@ -34,9 +38,11 @@ def command(ctx: click.Context, folder: Path | None, config: Path | None, name: 
     workspace = Workspace.initialise(folder or Path(ctx.obj), config)
     if name is not None:
         _rename(Path(workspace.bridge.source), name)
-    click.echo(
-        f"Made {workspace.folder}. Describe the bridge in {workspace.folder / 'bridge.toml'}."
-    )
+    description = workspace.folder / "bridge.toml"
+    if as_json:
+        show({"workspace": str(workspace.folder), "description": str(description)})
+        return
+    click.echo(f"Made {workspace.folder}. Describe the bridge in {description}.")
 
 
 def _rename(path: Path, name: str) -> None:

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 import rich_click as click
 from rich.console import Console
@@ -15,6 +16,9 @@ from rich.markup import escape
 from shm import __version__
 from shm.errors import ShmError
 from shm.resources import one_thread_a_process
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 UNEXPECTED = 1
 _LISTING = "shm_cli.listing"
@@ -36,7 +40,10 @@ VERBS: dict[str, Verb] = {
         "Take recordings in, look into them with --peek, or do one again with --again.",
     ),
     "daemon": Verb("shm_cli.daemon", "Watch the spool and do the whole job, unattended."),
-    "web": Verb("shm_cli.web", "Upload, states, alerts, health and metrics over HTTP."),
+    "web": Verb(
+        "shm_cli.web",
+        "The dashboard and its API: pages for people, upload, alerts, health and metrics.",
+    ),
     "token": Verb("shm_cli.token", "Who may read and write over the network."),
     "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
@@ -55,6 +62,9 @@ VERBS: dict[str, Verb] = {
     ),
     "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
+    "completion": Verb(
+        "shm_cli.completion", "Print the script that completes `shm` in bash or zsh."
+    ),
 }
 
 
@@ -72,6 +82,10 @@ class Verbs(click.RichGroup):
         command: click.Command = import_module(VERBS[cmd_name].module).command
         _take_workspace(command)
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        ctx.meta[_LISTING] = True
+        return super().shell_complete(ctx, incomplete)
 
     def format_help(self, ctx: click.RichContext, formatter: click.RichHelpFormatter) -> None:  # type: ignore[override]
         ctx.meta[_LISTING] = True

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import rich_click as click
 
@@ -13,25 +16,28 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
+from shm.report.period import period_since
 from shm_cli.common import hanger_option, opened_store
 
-_SHEET_WRITERS: dict[str, Callable[[report.TestSheet], str]] = {
-    "text": report.test_text,
-    "html": report.test_page,
-    "json": lambda sheet: dump(report.test_json(sheet)),
-}
-_FORMS = {".html": "html", ".htm": "html", ".json": "json"}
-_WRITERS: dict[str, Callable[[report.HangerReport], str]] = {
+_SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
+_Writers = dict[str, Callable[[Any], str | bytes]]
+_OF_HANGER: _Writers = {
     "text": report.text,
     "html": report.html,
+    "pdf": report.pdf,
     "json": lambda content: dump(report.json(content)),
 }
-
-
-_BRIDGE_WRITERS: dict[str, Callable[[report.BridgeReport], str]] = {
+_OF_BRIDGE: _Writers = {
     "text": report.bridge_text,
     "html": report.bridge_page,
+    "pdf": report.bridge_pdf,
     "json": lambda content: dump(report.bridge_json(content)),
+}
+_OF_TEST: _Writers = {
+    "text": report.test_text,
+    "html": report.test_page,
+    "pdf": report.test_pdf,
+    "json": lambda sheet: dump(report.test_json(sheet)),
 }
 
 
@@ -41,10 +47,15 @@ _BRIDGE_WRITERS: dict[str, Callable[[report.BridgeReport], str]] = {
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["text", "html", "json"]),
+    type=click.Choice(["text", "html", "pdf", "json"]),
     show_default="by the suffix of --out, else text",
 )
 @click.option("--test", "test_id", metavar="ID", help="Of one of its tests: how it was identified.")
+@click.option(
+    "--since",
+    metavar="WHEN",
+    help="Only the period since a date (2026-03-01) or over a span (90d, 12w, 6m, 1y).",
+)
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option(
     "--out",
@@ -59,39 +70,65 @@ def command(
     of_bridge: bool,
     form: str | None,
     test_id: str | None,
+    since: str | None,
     as_json: bool,
     out: Path | None,
 ) -> None:
     """What an engineer files about a hanger, or the bridge.
 
     Tension with its interval, against nominal and baseline; what changed, how it goes with the
-    temperature, what the hangers beside it did; predicted and measured frequencies; the trend; the
-    frequency response with its modes. HTML holds the figures. With --test, how one test was
-    identified: hits, quality, stabilisation, shapes. With --bridge, all hangers: their state, who
-    lost and who gained tension, and what explains it.
+    temperature, what the hangers beside it did; predicted and measured frequencies; what the model
+    does not explain; what to do next. HTML and PDF hold the figures. With --since, the tests,
+    alerts and trend of a period, and what changed in it against its start. With --test, how one
+    test was identified: hits, quality, stabilisation, shapes. With --bridge, all hangers: their
+    state, who lost and who gained tension, and what explains it.
 
     \b
-    Example: shm report --hanger 3 --out hanger3.html
+    Example: shm report --hanger 3 --since 90d --out hanger3.pdf
     Example: shm report --bridge --out bridge.html
     """
-    _refuse_unclear(hanger_id, of_bridge, test_id)
-    form = "json" if as_json else form or _FORMS.get(out.suffix if out else "", "text")
+    _refuse_unclear(hanger_id, of_bridge, test_id, since)
+    form = "json" if as_json else form or _SUFFIXES.get(out.suffix.lower() if out else "", "text")
+    _refuse_pdf_on_a_terminal(form, out)
+    now = utc_now()
+    period = period_since(since, now) if since else None
     with opened_store(ctx) as (workspace, store):
         if hanger_id is None:
-            written = _BRIDGE_WRITERS[form](bridge_report(workspace, store, utc_now()))
+            written = _OF_BRIDGE[form](bridge_report(workspace, store, now, period))
         elif test_id is None:
-            written = _WRITERS[form](hanger_report(workspace, store, hanger_id, utc_now()))
+            written = _OF_HANGER[form](hanger_report(workspace, store, hanger_id, now, period))
         else:
-            written = _SHEET_WRITERS[form](test_sheet(workspace, store, hanger_id, test_id))
-    if out is None:
-        click.echo(written.rstrip())
-    else:
-        out.write_text(written, encoding="utf-8")
+            sheet = test_sheet(workspace, store, hanger_id, test_id)
+            written = _OF_TEST[form](replace(sheet, generated_at=now))
+    _write(written, out)
+
+
+def _write(written: str | bytes, out: Path | None) -> None:
+    if out is not None:
+        out.write_bytes(written if isinstance(written, bytes) else written.encode())
         click.echo(f"Wrote {out}.", err=True)
+    elif isinstance(written, bytes):
+        click.echo(written, nl=False)
+    else:
+        click.echo(written.rstrip())
 
 
-def _refuse_unclear(hanger_id: int | None, of_bridge: bool, test_id: str | None) -> None:
+def _refuse_unclear(
+    hanger_id: int | None, of_bridge: bool, test_id: str | None, since: str | None
+) -> None:
     if (hanger_id is None) != of_bridge:
         raise UsageError("of what?", remedy="Give either --hanger N or --bridge.")
     if of_bridge and test_id is not None:
         raise UsageError("a test is of one hanger.", remedy="Give --hanger N with --test.")
+    if test_id is not None and since is not None:
+        raise UsageError("one test has no period.", remedy="Give either --test or --since.")
+
+
+def _refuse_pdf_on_a_terminal(form: str, out: Path | None) -> None:
+    if form == "pdf" and out is None and on_a_terminal():
+        raise UsageError("a PDF cannot be shown in a terminal.", remedy="Give --out FILE.pdf.")
+
+
+def on_a_terminal() -> bool:
+    """Whether a person looks at what is written."""
+    return sys.stdout.isatty()

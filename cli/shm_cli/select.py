@@ -12,6 +12,7 @@ from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
 from shm.update import UpdateOptions, select
 from shm.values import Selection
+from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -32,7 +33,12 @@ from shm_cli.update import modes_argument
 
 @click.command()
 @modes_argument
-@click.option("--models", show_default="the setting `models`", help="Classes, separated by commas.")
+@click.option(
+    "--models",
+    show_default="the setting `models`",
+    shell_complete=completers.models,
+    help="Classes, separated by commas.",
+)
 @hanger_option()
 @hanger_file_option
 @seed_option

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -29,8 +30,10 @@ from shm_cli.common import (
     counting_bar,
     hanger_file_option,
     hanger_option,
+    json_option,
     one_hanger,
     seed_option,
+    show,
 )
 from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
 
@@ -145,6 +148,7 @@ class Chosen(TypedDict):
     "--out", required=True, type=click.Path(file_okay=False, path_type=Path), metavar="DIR"
 )
 @seed_option
+@json_option
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -157,6 +161,7 @@ def command(
     seed: int,
     campaign: bool,
     lacking: tuple[str, ...],
+    as_json: bool,
     **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
@@ -175,9 +180,10 @@ def command(
     if campaign:
         effects = [effect_of(text) for text in chosen["effects"]]
         state = _state(hanger, chosen)
-        for path in write_campaign(hanger, state, effects, lacking, chosen["sensors"], seed, out):
-            click.echo(path)
+        sensors = chosen["sensors"]
+        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out), as_json)
         return
+    written = []
     with counting_bar() as bar:
         for week in bar.track(range(tests), description="simulating"):
             time = start + timedelta(weeks=week)
@@ -185,7 +191,16 @@ def command(
             name = f"hanger{hanger.id}_{time:%Y%m%dT%H%M%S}.{form}"
             recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
-            click.echo(out / name)
+            written.append(out / name)
+    _tell(written, as_json)
+
+
+def _tell(written: Sequence[Path], as_json: bool) -> None:
+    if as_json:
+        show({"files": [str(path) for path in written]})
+        return
+    for path in written:
+        click.echo(path)
 
 
 def _refuse_what_does_not_go_together(

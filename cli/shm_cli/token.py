@@ -25,8 +25,9 @@ def command() -> None:
     show_default=True,
     help="`write` may upload and acknowledge, and read.",
 )
+@json_option
 @click.pass_context
-def create(ctx: click.Context, name: str, scope: str) -> None:
+def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
     """Make a token and print it, this once.
 
     It goes into the header `Authorization: Bearer TOKEN`. Only its checksum is kept: where it is
@@ -40,6 +41,9 @@ def create(ctx: click.Context, name: str, scope: str) -> None:
 
     with opened_store(ctx) as (_, store):
         secret = store.create_token(name, Scope(scope), utc_now())
+    if as_json:
+        show({"name": name, "scope": scope, "token": secret})
+        return
     click.echo(secret)
     click.echo(f"Token {name} may {scope}. It is not shown again.", err=True)
 
@@ -71,8 +75,9 @@ def list_tokens(ctx: click.Context, as_json: bool) -> None:
 
 @command.command()
 @click.argument("name")
+@json_option
 @click.pass_context
-def revoke(ctx: click.Context, name: str) -> None:
+def revoke(ctx: click.Context, name: str, as_json: bool) -> None:
     """End a token, at once.
 
     \b
@@ -82,4 +87,7 @@ def revoke(ctx: click.Context, name: str) -> None:
 
     with opened_store(ctx) as (_, store):
         store.revoke_token(name, utc_now())
+    if as_json:
+        show({"name": name, "revoked": True})
+        return
     click.echo(f"Token {name} is revoked.")

@@ -10,6 +10,7 @@ from shm.documents import posterior_document, summary
 from shm.models import build
 from shm.update import UpdateOptions, update
 from shm.values import Posterior
+from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -35,7 +36,13 @@ modes_argument = click.argument(
 
 @click.command()
 @modes_argument
-@click.option("--model", default="beam2", show_default=True, help="The model class.")
+@click.option(
+    "--model",
+    default="beam2",
+    show_default=True,
+    shell_complete=completers.models,
+    help="The model class.",
+)
 @hanger_option()
 @hanger_file_option
 @seed_option

@@ -28,11 +28,12 @@ def command(
     key: Path | None,
     log_file: Path | None,
 ) -> None:
-    """Upload, states, alerts, health and metrics over HTTP.
+    """The dashboard and its API: pages for people, upload, alerts, health and metrics.
 
-    Only this machine can reach it unless --host says otherwise; then all but /health needs a token
-    of `shm token create`. Writing always needs one. Runs beside the daemon, or with it as
-    `shm daemon --web`.
+    Open the address that it prints in a browser. Only this machine can reach it unless --host says
+    otherwise; then all but /health needs a token of `shm token create`, which a person gives once
+    at /sign-in. Writing (uploads, acknowledging alerts) always needs one. Runs beside the daemon,
+    or with it as `shm daemon --web`.
 
     \b
     Example: shm --workspace arch web --port 8400
@@ -41,6 +42,7 @@ def command(
     from shm_daemon.web.address import Address
     from shm_daemon.web.serving import serve
 
-    workspace = open_workspace(ctx)
+    workspace, address = open_workspace(ctx), Address(host, port)
     begin_logging(workspace.settings, log_file)
-    serve(workspace, Address(host, port), certificate, key)
+    click.echo(f"The dashboard: {address.page(certificate is not None)}  (Ctrl+C ends it)")
+    serve(workspace, address, certificate, key)

@@ -53,7 +53,7 @@ def diagnose(
     UsageError for a model class, effect, test or order that is not there.
 
     Example:
-        >>> diagnosis = shm.diagnose(tests, hanger, GapOptions(baseline="beam1"))
+        >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")
         >>> diagnosis.leading.effect
         'point_mass'
     """

@@ -3,37 +3,128 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import shm
 from shm.errors import NothingThere
+from shm.pipeline.origins import settings_words, software
 from shm.report import Interval
-from shm.report.bridge.content import BridgeReport, HangerLine
+from shm.report.bridge.content import BridgeReport, Course, HangerLine
+from shm.report.period import Period
 from shm.report.states import called_words
 from shm.report.summary import status_of
-from shm.store import Baseline, Store, StoredWatch, Workspace
-from shm.values import NAN, Drift, Hanger
-from shm.watch.neighbours import BridgePattern, bridge_pattern, shifts_of
+from shm.store import Baseline, BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
+from shm.values import NAN, TENSION, Drift, Hanger
+from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
 
-def bridge_report(workspace: Workspace, store: Store, generated_at: datetime) -> BridgeReport:
-    """All that the store knows of a bridge; raises NothingThere before any test is through."""
+def bridge_report(
+    workspace: Workspace, store: Store, generated_at: datetime, period: Period | None = None
+) -> BridgeReport:
+    """All that the store knows of a bridge, and what lies in a `period`.
+
+    Raises NothingThere before any test is through, and where none lies in the period.
+    """
     hangers = workspace.bridge.hangers
-    alerts = [alert for alert in store.alerts() if alert.acknowledgement is None]
-    lines = tuple(
-        _line(store, hanger, sum(each.alert.hanger == hanger.id for each in alerts))
-        for hanger in hangers
-    )
+    lines = hanger_lines(workspace, store)
     if all(line.tension_n is None for line in lines):
         raise NothingThere(
             "no test of any hanger has been through updating yet.",
             remedy="Take recordings in with `shm ingest FILE`, or see `shm status`.",
         )
+    courses = _courses(store, hangers, period) if period else {}
+    if period and not any(course.tests for course in courses.values()):
+        latest = store.latest_trends(hangers)
+        newest = max(latest.values(), key=lambda point: point.time)
+        raise NothingThere(
+            f"no test of any hanger lies in the period {period}.",
+            remedy=f"The latest is {newest.test} of hanger {newest.hanger}, "
+            f"{newest.time:%Y-%m-%d}: ask for a longer period.",
+        )
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
-        workspace.bridge.name, lines, pattern, why_not, generated_at, shm.__version__
+        workspace.bridge.name,
+        tuple(replace(line, course=courses.get(line.hanger.id)) for line in lines),
+        pattern,
+        why_not,
+        generated_at,
+        shm.__version__,
+        period,
+        {"software": software()},
+        settings_words(workspace.settings),
     )
+
+
+def hanger_lines(workspace: Workspace, store: Store) -> tuple[HangerLine, ...]:
+    """Each hanger in a line, in their order along the bridge, without samples."""
+    hangers = workspace.bridge.hangers
+    kept = _Kept.of(store, hangers)
+    return tuple(kept.line(hanger) for hanger in hangers)
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What the store says of all hangers, asked in a few queries without any samples."""
+
+    latest: Mapping[int, TrendPoint]
+    baselines: Mapping[int, BaselineGlance]
+    watches: Mapping[int, StoredWatch]
+    called: Sequence[StoredWatch]
+    open_alerts: Mapping[int, int]
+
+    @classmethod
+    def of(cls, store: Store, hangers: Sequence[Hanger]) -> _Kept:
+        return cls(
+            store.latest_trends(hangers),
+            store.baselines_in_force(hangers),
+            store.latest_watches(),
+            store.called_watches(),
+            store.open_alert_counts(),
+        )
+
+    def line(self, hanger: Hanger) -> HangerLine:
+        opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
+        if point is None:
+            return HangerLine(hanger, None, open_alerts=opened)
+        baseline = self.baselines.get(hanger.id)
+        drifts = self.watches[hanger.id].watched.drifts if hanger.id in self.watches else ()
+        called = [each.watched.change for each in self.called if each.hanger == hanger.id]
+        return HangerLine(
+            hanger,
+            status_of(
+                drifts,
+                hanger,
+                is_first=baseline is None or point.test in baseline.tests,
+                is_called=bool(called),
+            ),
+            point.time,
+            Interval.of_summary(point.tension_n),
+            "; ".join(called_words(change) for change in called),
+            opened,
+            next((each for each in drifts if each.quantity == TENSION), None),
+            point.test,
+            point.model,
+            baseline_tension_n=Interval.of_summary(baseline.tension_n) if baseline else None,
+        )
+
+
+def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:
+    """What became of each hanger in the period."""
+    raised = Counter(each.alert.hanger for each in store.alerts() if period.holds(each.alert.time))
+    return {
+        hanger.id: _course(store.trend(hanger, period.since), raised[hanger.id])
+        for hanger in hangers
+    }
+
+
+def _course(points: Sequence[TrendPoint], alerts: int) -> Course:
+    if len(points) < 2:
+        return Course(len(points), alerts)
+    first, last = (Interval.of_summary(points[at].tension_n) for at in (0, -1))
+    return Course(len(points), alerts, last.since(first))
 
 
 def _pattern_or_why(store: Store, order: Sequence[int]) -> tuple[BridgePattern | None, str]:
@@ -41,30 +132,6 @@ def _pattern_or_why(store: Store, order: Sequence[int]) -> tuple[BridgePattern |
         return stored_pattern(store, order), ""
     except NothingThere as reason:
         return None, f"Over the bridge nothing can be compared: {reason.message}"
-
-
-def _line(store: Store, hanger: Hanger, open_alerts: int) -> HangerLine:
-    history = store.history(hanger.id)
-    if not history:
-        return HangerLine(hanger, None, open_alerts=open_alerts)
-    latest, posterior = history[-1]
-    baseline = store.baseline(hanger.id, posterior.model)
-    watches = _watches(store, baseline)
-    called = [each.watched.change for each in watches if each.watched.change.called]
-    is_first = baseline is None or baseline.posterior.tests == posterior.tests
-    return HangerLine(
-        hanger,
-        status_of(
-            latest_drifts(store, hanger.id, posterior.model),
-            hanger,
-            is_first=is_first,
-            is_called=bool(called),
-        ),
-        latest.time,
-        Interval.of_samples(posterior.tension_n),
-        "; ".join(called_words(change) for change in called),
-        open_alerts,
-    )
 
 
 def latest_drifts(store: Store, hanger: int, model: str | None = None) -> tuple[Drift, ...]:
@@ -85,18 +152,31 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
 
     Raises NothingThere where fewer than three of them can be compared.
     """
-    baselines = {hanger: store.baseline(hanger) for hanger in order}
-    watched = {hanger: _watches(store, baseline) for hanger, baseline in baselines.items()}
-    drifts = {
-        hanger: [drift for watch in watches for drift in watch.watched.drifts]
-        for hanger, watches in watched.items()
-    }
+    return bridge_pattern(hanger_shifts(store, order), order)
+
+
+def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]:
+    """The latest known shift of each hanger that has one, in their `order` along the bridge."""
+    latest = store.latest_watches()
+    compared = [hanger for hanger in order if hanger in latest]
+    baselines = {hanger: store.baseline(hanger) for hanger in compared}
+    drifts = {hanger: _known_drifts(store, latest[hanger], baselines) for hanger in compared}
     changes = {
-        hanger: watches[-1].watched.temperature_c - _before_c(store, baselines[hanger])
-        for hanger, watches in watched.items()
-        if watches
+        hanger: latest[hanger].watched.temperature_c - _before_c(store, baselines[hanger])
+        for hanger in compared
     }
-    return bridge_pattern(shifts_of(drifts, order, temperature_changes_k=changes), order)
+    return shifts_of(drifts, order, temperature_changes_k=changes)
+
+
+def _known_drifts(
+    store: Store, latest: StoredWatch, baselines: Mapping[int, Baseline | None]
+) -> Sequence[Drift]:
+    """Those of the latest test; of all, where its shift of the tension is not known."""
+    drifts = latest.watched.drifts
+    if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
+        return drifts
+    watches = _watches(store, baselines[latest.hanger])
+    return [drift for watch in watches for drift in watch.watched.drifts]
 
 
 def _before_c(store: Store, baseline: Baseline | None) -> float:

@@ -27,7 +27,7 @@ from shm.store import (
     WaitingTest,
     Workspace,
 )
-from shm.values import Alert, Hanger, Posterior, WatchedTest
+from shm.values import Alert, Hanger, Posterior, Selection, WatchedTest
 
 DELIVERIES = 16
 _DELIVERIES_A_HOOK = 4
@@ -162,9 +162,12 @@ class Jobs:
         samples, seed, lineage = update_terms(hanger, names, tests, settings)
         plain = [test.test for test in tests]
         run = partial(run_step, "select_model", plain, hanger, names, samples, seed)
-        return Step(
-            run, lambda found: self.store.selected(hanger.id, tests, found, lineage, self.clock())
-        )
+
+        def keep(found: Selection) -> None:
+            self.store.selected(hanger.id, tests, found, lineage, self.clock())
+            self.store.keep_summaries(hanger)
+
+        return Step(run, keep)
 
     def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
         test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id, model)
@@ -178,6 +181,7 @@ class Jobs:
         def keep(found: Posterior) -> None:
             now, to_watch = self.clock(), not makes_baseline
             self.store.updated(test, found, lineage, now, to_watch=to_watch)
+            self.store.keep_summaries(hanger)
 
         return Step(run, keep)
 

@@ -11,13 +11,16 @@ from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import stored_pattern
+from shm.pipeline.origins import IDENTIFY_SETTINGS, settings_words, test_lineage
 from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
 from shm.read.apart import read_test
-from shm.report import HangerReport, TestSheet, trend_row
+from shm.report import HangerReport, TestSheet
+from shm.report.content import trend_row_of
+from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredAlert, StoredTest, Workspace
+from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.neighbours import BridgePattern
@@ -25,52 +28,92 @@ from shm.watch.wording import watch_words
 
 
 def hanger_report(
-    workspace: Workspace, store: Store, hanger_id: int, generated_at: datetime
+    workspace: Workspace,
+    store: Store,
+    hanger_id: int,
+    generated_at: datetime,
+    period: Period | None = None,
 ) -> HangerReport:
     """All that the store knows of a hanger, for its report; its states over time take a second.
 
-    Raises BadInput for an unknown hanger, NothingThere before its first test is through.
+    Of a `period`, tests, trend and alerts are those that lie in it. Raises BadInput for an unknown
+    hanger, NothingThere before its first test is through and where none lies in the period.
     """
     hanger = workspace.bridge.hanger(hanger_id)
-    history = store.history(hanger_id)
-    if not history:
-        raise NothingThere(
-            f"no test of hanger {hanger_id} has been through updating yet.",
-            remedy="Take recordings in with `shm ingest FILE`, or see `shm status`.",
-        )
-    latest, posterior = history[-1]
-    selection, baseline = store.selection(hanger_id), store.baseline(hanger_id, posterior.model)
-    diagnosis, watch = store.latest_diagnosis(hanger_id), gap_watch(store, hanger_id)
-    watched = _watched_against(store, baseline)
-    is_called = any(each.change.called for each in watched)
-    alerts = store.alerts(hanger_id)
+    now = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
+    latest = store.test_named(hanger_id, now.latest.id)
+    return replace(
+        now,
+        alerts=tuple(each for each in now.alerts if period is None or period.holds(each.time)),
+        frequency_response=store.frequency_response(latest),
+        states=hanger_states(
+            workspace, store, hanger, store.baseline(hanger_id, now.posterior.model)
+        ),
+        neighbours=_neighbours(workspace, store) if now.is_called else None,
+        period=period,
+    )
+
+
+def hanger_now(
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    trend: Sequence[TrendPoint],
+    generated_at: datetime,
+) -> HangerReport:
+    """A hanger at the last of its `trend`, at least one; without what takes more than a blink.
+
+    Those are its frequency response, its states over time and what moved over the bridge.
+    """
+    latest = store.test_named(hanger.id, trend[-1].test)
+    posterior = store.posterior(hanger.id, latest.test.id)
+    selection, baseline = store.selection(hanger.id), store.baseline(hanger.id, posterior.model)
+    diagnosis, watch = store.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
+    watched, alerts = _watched_against(store, baseline), store.alerts(hanger.id)
     return HangerReport(
         bridge=workspace.bridge.name,
         hanger=hanger,
-        tests=tuple(stored.test for stored, _ in history),
+        tests=(latest.test,),
         posterior=posterior,
         generated_at=generated_at,
         version=shm.__version__,
-        trend=tuple(trend_row(each, stored.test, hanger) for stored, each in history),
+        trend=tuple(trend_row_of(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
         drifts=_drifts(watched, latest.test.id),
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
-        frequency_response=store.frequency_response(latest),
         quality=latest.quality,
         diagnosis=diagnosis.diagnosis if diagnosis else None,
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
-        states=hanger_states(workspace, store, hanger, baseline),
-        is_called=is_called,
-        neighbours=_neighbours(workspace, store) if is_called else None,
-        lineage={
-            "input_sha256": latest.lineage.input_sha256,
-            "settings_sha256": latest.lineage.settings_sha256,
-            "version": latest.lineage.version,
-        },
+        is_called=any(each.change.called for each in watched),
+        lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
+        settings=settings_words(workspace.settings),
     )
+
+
+def _trend(store: Store, hanger: Hanger, period: Period | None) -> tuple[TrendPoint, ...]:
+    points = store.trend(hanger, period.since if period else None)
+    if points:
+        return points
+    latest = store.latest_trends([hanger]).get(hanger.id)
+    if latest is None:
+        raise NothingThere(
+            f"no test of hanger {hanger.id} has been through updating yet.",
+            remedy="Take recordings in with `shm ingest FILE`, or see `shm status`.",
+        )
+    raise NothingThere(
+        f"no test of hanger {hanger.id} lies in the period {period}.",
+        remedy=f"Its latest is {latest.test} of {latest.time:%Y-%m-%d}: ask for a longer period.",
+    )
+
+
+def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
+    if baseline is None:
+        return {}
+    tests = ", ".join(baseline.posterior.tests)
+    return {"baseline": f"{tests}; set {baseline.set_at:%Y-%m-%d} by {baseline.who}"}
 
 
 def _drifts(watched: Sequence[WatchedTest], test: str) -> tuple[Drift, ...]:
@@ -119,7 +162,7 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
     Raises NothingThere for an unknown test and for one whose modes a file gave.
     """
     hanger = workspace.bridge.hanger(hanger_id)
-    stored = _stored_test(store, hanger_id, name)
+    stored = store.test_named(hanger_id, name)
     recording = store.recording(stored.recording_id)
     if store.frequency_response(stored) is None and not stored.quality:
         raise NothingThere(
@@ -127,20 +170,21 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
             remedy="Ask for a test that was identified here.",
         )
     with workspace.archive.opened(recording.file) as path:
-        records = read_test(path, read_limits(workspace.settings))
+        read = read_test(path, read_limits(workspace.settings))
+    # The file is read through a passing link, whose name would tell nobody anything.
+    records = [replace(each, source=recording.file.file_name) for each in read]
     options = identify_options(workspace.settings, workspace.bridge)
     found = identify(records, options, test_id=name, hanger=hanger)
     if identify_lineage(recording, hanger_id, workspace) != stored.lineage:
         note = "identified anew: settings, description or version differ from those of the store"
         found = replace(found, notes=(*found.notes, note))
-    return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
-
-
-def _stored_test(store: Store, hanger_id: int, name: str) -> StoredTest:
-    tests = {stored.test.id: stored for stored in store.tests(hanger_id)}
-    if name not in tests:
-        latest = ", ".join(list(tests)[-3:]) or "none"
-        raise NothingThere(
-            f"no test {name} of hanger {hanger_id} is stored.", remedy=f"The latest: {latest}."
-        )
-    return tests[name]
+    return TestSheet(
+        found,
+        records,
+        hanger,
+        (options.band_low_hz, options.band_high_hz),
+        bridge=workspace.bridge.name,
+        lineage=test_lineage(store, stored),
+        settings=settings_words(workspace.settings, IDENTIFY_SETTINGS),
+        version=shm.__version__,
+    )

@@ -1,8 +1,8 @@
 """Reports of a hanger, sheets of one hammer test, gap diagnoses, scores of a blind trial.
 
 Nothing here reads a store or writes a file: `HangerReport`, `TestSheet` (by which a person checks a
-test), `DiagnosisSheet` or `TrialScore` in, terminal text, one HTML file, a JSON document or figures
-out. Only this room opens matplotlib and jinja2.
+test), `BridgeReport`, `DiagnosisSheet` or `TrialScore` in, terminal text, one HTML file, PDF bytes,
+a JSON document or figures out. Only this room opens matplotlib, jinja2 and reportlab.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from shm.report.diagnosis.text import diagnosis_text
 from shm.report.document import json
 from shm.report.figures import Illustration, illustrations
 from shm.report.page import html
+from shm.report.paper import bridge_pdf, pdf, test_pdf
 from shm.report.quality import quality_table
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.document import test_json
@@ -47,6 +48,7 @@ __all__ = [
     "advice",
     "bridge_json",
     "bridge_page",
+    "bridge_pdf",
     "bridge_text",
     "diagnosis_figures",
     "diagnosis_json",
@@ -56,12 +58,14 @@ __all__ = [
     "illustrations",
     "json",
     "pattern_json",
+    "pdf",
     "quality_table",
     "status",
     "summary",
     "test_figures",
     "test_json",
     "test_page",
+    "test_pdf",
     "test_text",
     "text",
     "trend_row",

@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import Protocol
 
 import numpy as np
 
+from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.values import (
     NAN,
@@ -23,6 +25,7 @@ from shm.values import (
     PredictedFrequency,
     QualityCheck,
     Selection,
+    Summary,
 )
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
@@ -50,6 +53,11 @@ class Interval:
         """From a mean and a standard deviation, taken as normal."""
         return cls(mean, mean - NORMAL_90 * sd, mean + NORMAL_90 * sd)
 
+    @classmethod
+    def of_summary(cls, summary: Summary) -> Interval:
+        """From what was kept of samples."""
+        return cls(summary.mean, summary.q05, summary.q95)
+
     def scaled(self, factor: float) -> Interval:
         """The same quantity in a unit 1/`factor` as large."""
         return Interval(self.mean * factor, self.low * factor, self.high * factor)
@@ -57,6 +65,18 @@ class Interval:
     @property
     def width(self) -> float:
         return self.high - self.low
+
+    def since(self, then: Interval) -> Interval:
+        """The relative change from `then`, of two independent estimates: widths in squares."""
+        ratio = self.mean / then.mean
+        half = math.hypot(self.width, ratio * then.width) / 2 / abs(then.mean)
+        return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
+
+    def less(self, then: Interval) -> Interval:
+        """The difference from `then`, of two independent estimates: widths in squares."""
+        half = math.hypot(self.width, then.width) / 2
+        shift = self.mean - then.mean
+        return Interval(shift, shift - half, shift + half)
 
 
 @dataclass(frozen=True)
@@ -90,6 +110,35 @@ def trend_row(posterior: Posterior, test: ModalTest, hanger: Hanger) -> TrendRow
     )
 
 
+class Numbers(Protocol):
+    """One test in the history of a hanger in numbers, as the store keeps it."""
+
+    @property
+    def test(self) -> str: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def taken_at(self) -> datetime | None: ...
+    @property
+    def temperature_c(self) -> float: ...
+    @property
+    def tension_n(self) -> Summary: ...
+    @property
+    def stiffness(self) -> Mapping[str, Summary]: ...
+
+
+def trend_row_of(kept: Numbers) -> TrendRow:
+    """The row of one test from its numbers, without its samples."""
+    return TrendRow(
+        test=kept.test,
+        model=kept.model,
+        tension_n=Interval.of_summary(kept.tension_n),
+        stiffness={name: Interval.of_summary(each) for name, each in kept.stiffness.items()},
+        time=kept.taken_at,
+        temperature_c=kept.temperature_c,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class HangerReport:
     """All that a report of one hanger says.
@@ -102,7 +151,8 @@ class HangerReport:
     says in a sentence how the gap has gone since an effect was adopted, `drift_watch` what the
     sequential test has called since the baseline, `is_called` whether it has. `states` are empty
     where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
-    nothing is called.
+    nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
+    `settings` are those that decide the numbers, each with its unit.
     """
 
     bridge: str
@@ -126,6 +176,8 @@ class HangerReport:
     states: StatesOverTime = NOTHING_WATCHED
     is_called: bool = False
     neighbours: BridgePattern | None = None
+    period: Period | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def latest(self) -> ModalTest:

@@ -10,6 +10,7 @@ from shm.report.bridge.document import pattern_json
 from shm.report.content import HangerReport
 from shm.report.diagnosis.document import diagnosis_json
 from shm.report.diagnosis.part import diagnosed
+from shm.report.period import period_json
 from shm.report.summary import advice, status, summary
 from shm.report.temperatures import temperature_documents
 from shm.values import FrequencyResponse
@@ -41,7 +42,9 @@ def json(data: HangerReport) -> dict[str, Any]:
         "drift_watch": data.drift_watch,
         "temperature_coefficients": temperature_documents(data.states),
         "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
+        "period": period_json(data.period),
         "lineage": dict(data.lineage),
+        "settings": dict(data.settings),
         "version": data.version,
         "generated_at": data.generated_at,
     }

@@ -16,6 +16,9 @@ def quality_table(checks: Sequence[QualityCheck], title: str = "Quality") -> Tab
         ("check", "verdict", "figure", "limit", "what was found", "what to do"),
         tuple(_row(check) for check in checks),
         marks=tuple(check.verdict for check in checks),
+        note="Figures without a unit are counts or ratios. Limits are given: they have no interval."
+        if checks
+        else "",
     )
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from shm.report import words
 from shm.report.content import Interval
-from shm.values import TENSION, Drift
+from shm.values import NAN, TENSION, Drift
 
 _UNMOVED = 0.01
 _LARGEST_FACTOR = 1e3
@@ -12,6 +14,9 @@ _LARGEST_FACTOR = 1e3
 
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
     """Quantity, shift, 90 % interval, threshold, probability beyond it."""
+    if not math.isfinite(row.shift_mean + row.shift_sd):
+        unknown = ("not known", "not known", threshold_cell(row), words.probability(NAN))
+        return (words.quantity(row.quantity), *unknown)
     interval = Interval.normal(row.shift_mean, row.shift_sd)
     # Nearly all of the probability is that nothing has changed: a spread about 0 has no width.
     unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2

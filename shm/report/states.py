@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 
+from shm.report.period import Period
 from shm.values import (
     NAN,
     TENSION,
@@ -45,6 +46,14 @@ class QuantityOverTime:
     def is_tension(self) -> bool:
         return self.name == TENSION
 
+    def at(self, chosen: BoolArray) -> QuantityOverTime:
+        """The same at the `chosen` tests, shape (n,)."""
+        bands = (self.read, self.filtered, self.smoothed)
+        read, filtered, smoothed = (
+            Band(band.low[chosen], band.middle[chosen], band.high[chosen]) for band in bands
+        )
+        return replace(self, read=read, filtered=filtered, smoothed=smoothed)
+
 
 @dataclass(frozen=True)
 class CalledChange:
@@ -71,6 +80,20 @@ class StatesOverTime:
     quantities: tuple[QuantityOverTime, ...]
     changes: tuple[CalledChange, ...] = ()
     temperature_coefficients: tuple[TemperatureCoefficient, ...] = ()
+
+    def within(self, period: Period | None) -> StatesOverTime:
+        """Those at the tests of a period, and the changes that may have begun in it."""
+        if period is None:
+            return self
+        inside = np.array([period.holds(time) for time in self.times], bool)
+        return replace(
+            self,
+            times=tuple(time for time in self.times if period.holds(time)),
+            temperatures_c=self.temperatures_c[inside],
+            outlier=self.outlier[inside],
+            quantities=tuple(each.at(inside) for each in self.quantities),
+            changes=tuple(each for each in self.changes if each.began_by >= period.since),
+        )
 
 
 NOTHING_WATCHED = StatesOverTime((), np.empty(0), NAN, np.empty(0, bool), ())

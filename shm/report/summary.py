@@ -10,11 +10,16 @@ import numpy as np
 
 from shm.report import words
 from shm.report.content import HangerReport, Interval
+from shm.report.diagnosis.content import after
+from shm.report.diagnosis.summary import next_step, verdict
+from shm.report.diagnosis.tensions import tension_unit
 from shm.report.shifts import shift_cells, threshold_cell
-from shm.values import TENSION, Drift, Hanger, PredictedFrequency
+from shm.report.states import CalledChange
+from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
 
 _CONVERGED_R_HAT = 1.1
 _WATCH_PROBABILITY = 0.5
+_WORTH_DIAGNOSING_PERCENT = 0.5
 
 
 class Status(Enum):
@@ -55,8 +60,10 @@ def summary(data: HangerReport) -> str:
         _against_nominal(data),
         _against_baseline(data),
         _change(data),
+        in_period(data),
         _over_the_bridge(data),
         _model(data),
+        _gap(data),
         *advice(data),
     )
     return " ".join(sentence for sentence in sentences if sentence)
@@ -64,11 +71,9 @@ def summary(data: HangerReport) -> str:
 
 def advice(data: HangerReport) -> tuple[str, ...]:
     """What to do next, most urgent first; never empty."""
-    found = [_urgent(data), _quality(data), _sampling(data), _width(data)]
-    found = [text for text in found if text]
-    if math.isnan(data.latest.temperature_c):
-        found.append("Record the temperature with the next test: it moves the tension.")
-    return tuple(found) or ("Nothing needs doing before the next planned test.",)
+    made = (_urgent, _quality, _sampling, _width, _diagnose, _thermometer)
+    found = tuple(told for make in made if (told := make(data)))
+    return found or ("Nothing needs doing before the next planned test.",)
 
 
 def tension_change(data: HangerReport) -> Interval | None:
@@ -80,11 +85,35 @@ def tension_change(data: HangerReport) -> Interval | None:
     if then is None:
         return None
     for drift in data.drifts:
-        if drift.quantity == "tension":
+        if drift.quantity == TENSION and math.isfinite(drift.shift_mean + drift.shift_sd):
             return Interval.normal(drift.shift_mean, drift.shift_sd)
-    shift = (now.mean - then.mean) / then.mean
-    half = math.hypot(now.width, now.mean / then.mean * then.width) / 2 / then.mean
-    return Interval(shift, shift - half, shift + half)
+    return now.since(then)
+
+
+def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
+    """The tension in percent of the nominal one; None where the hanger has none."""
+    nominal_n = hanger.nominal_tension_n
+    return tension_n.scaled(100 / nominal_n) if nominal_n > 0 else None
+
+
+def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
+    """Predicted over measured frequency less one of each measured mode, in percent.
+
+    The interval is that of prediction and measurement together; of the prediction alone where the
+    measurement came without a standard deviation.
+    """
+    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
+    return [
+        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
+        for each in data.predicted
+        if math.isfinite(each.measured_hz)
+    ]
+
+
+def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
+    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
+    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
+    return off.scaled(100 / each.measured_hz)
 
 
 def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
@@ -108,6 +137,8 @@ def _tension(data: HangerReport) -> str:
 
 def _against_nominal(data: HangerReport) -> str:
     nominal = data.hanger.nominal_tension_n
+    if not nominal > 0:
+        return "It has no nominal tension to compare with."
     shift = data.tension_n.scaled(1 / nominal)
     fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
     return f"Against the nominal {nominal / 1e3:.0f} kN that is {words.signed_percent(fraction)}."
@@ -117,12 +148,13 @@ def _against_baseline(data: HangerReport) -> str:
     then, change = data.baseline_tension_n, tension_change(data)
     if then is None or change is None or data.baseline is None:
         return "There is no earlier test to compare with: this one is the baseline."
-    tension = words.mean(words.kilonewtons(then))
-    tests = _tests(data.baseline.tests)
-    return f"Against the baseline of {tension} kN ({tests}) it is {words.signed_percent(change)}."
+    tension = words.with_interval(words.kilonewtons(then), "kN")
+    tests = told_tests(data.baseline.tests)
+    return f"Against the baseline, {tests} with {tension}, it is {words.signed_percent(change)}."
 
 
-def _tests(tests: tuple[str, ...]) -> str:
+def told_tests(tests: tuple[str, ...]) -> str:
+    """`test t001`, `5 tests`."""
     return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
 
 
@@ -155,16 +187,67 @@ def _shift(drift: Drift) -> str:
     )
 
 
+def in_period(data: HangerReport) -> str:
+    """What lay in the period of the report, and what changed in it against its start."""
+    if data.period is None:
+        return ""
+    tests = words.counted(len(data.trend), "test")
+    raised = words.counted(len(data.alerts), "alert")
+    called = words.listed([each.words for each in _called_in(data)] or ["no change was called"])
+    return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
+
+
+def _called_in(data: HangerReport) -> tuple[CalledChange, ...]:
+    return data.states.within(data.period).changes
+
+
+def _course(data: HangerReport) -> str:
+    if len(data.trend) < 2:
+        return "with one test in it nothing in it can be compared"
+    first, last = data.trend[0], data.trend[-1]
+    change = words.signed_percent(last.tension_n.since(first.tension_n))
+    return f"from its first test ({first.test}) to its last the tension moved by {change}"
+
+
 def _model(data: HangerReport) -> str:
-    residuals = residuals_percent(data.predicted)
-    if not residuals:
+    misfits = misfits_percent(data)
+    if not misfits:
         return f"{_chosen(data)}."
-    rms = float(np.sqrt(np.mean(np.square(residuals))))
-    count = "one measured mode" if len(residuals) == 1 else f"{len(residuals)} measured modes"
+    worst, off = max(misfits, key=lambda each: abs(each[1].mean))
+    count = "one measured mode" if len(misfits) == 1 else f"{len(misfits)} measured modes"
     return (
-        f"{_chosen(data)}; over {count} it misses the frequencies by {rms:.2f} % (rms), "
-        f"at most by {max(map(abs, residuals)):.2f} %."
+        f"{_chosen(data)}; over {count} it misses the frequencies by {_rms_percent(data):.2f} % "
+        f"(rms), at most {worst.plane} {worst.order} by {words.mean(off, signed=True)} % "
+        f"(90 % interval {words.span(off, signed=True)} %)."
     )
+
+
+def _rms_percent(data: HangerReport) -> float:
+    """Root mean square of the misfits; NaN where no mode was measured."""
+    residuals = residuals_percent(data.predicted)
+    return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
+
+
+def _gap(data: HangerReport) -> str:
+    """What the model does not explain, as far as that was diagnosed."""
+    if data.diagnosis is None:
+        return "Why it misses them was not diagnosed."
+    told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data.diagnosis)]
+    return " ".join([part for part in told if part] + [data.gap_watch] * bool(data.gap_watch))
+
+
+def _diagnosed_on(diagnosis: Diagnosis) -> str:
+    return f"Diagnosis of the gap on {told_tests(diagnosis.tests)}:"
+
+
+def _allowing(diagnosis: Diagnosis) -> str:
+    """The tension with the cause, or allowing for the unknown."""
+    tension_n, what = diagnosis.tension_after_n, after(diagnosis)
+    if not what or math.isnan(tension_n.mean):
+        return ""
+    unit = tension_unit(diagnosis)
+    told = words.with_interval(unit.interval(tension_n), unit.name)
+    return f"{what.capitalize()} the tension is {told}."
 
 
 def _chosen(data: HangerReport) -> str:
@@ -229,3 +312,21 @@ def _width(data: HangerReport) -> str:
         f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
         f"to see smaller shifts."
     )
+
+
+def _diagnose(data: HangerReport) -> str:
+    """The next step against the gap between model and measurement."""
+    if data.diagnosis is not None:
+        return next_step(data.diagnosis)
+    if not _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+        return ""
+    return (
+        "Learn what the model does not explain, and what that does to the tension "
+        f"(`shm gap diagnose --hanger {data.hanger.id}`)."
+    )
+
+
+def _thermometer(data: HangerReport) -> str:
+    if math.isfinite(data.latest.temperature_c):
+        return ""
+    return "Record the temperature with the next test: it moves the tension."

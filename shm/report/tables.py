@@ -9,39 +9,60 @@ from dataclasses import replace
 from shm.report import words
 from shm.report.bridge.tables import shift_table
 from shm.report.content import HangerReport, Interval, TrendRow
+from shm.report.origin import origin, settings
 from shm.report.quality import quality_table
-from shm.report.shifts import shift_cells
-from shm.report.summary import tension_change
+from shm.report.shifts import factor, shift_cells
+from shm.report.summary import misfits_percent, of_nominal, tension_change, told_tests
 from shm.report.table import Table
 from shm.report.temperatures import temperature_table
-from shm.values import Alert, Mode, Posterior, PredictedFrequency
+from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 
 
 def tables(data: HangerReport) -> tuple[Table, ...]:
     """All tables that this report can fill, in reading order."""
-    return tuple(table for table in (make(data) for make in _TABLES) if table.rows)
+    return (*numbers(data), *origins(data))
+
+
+def numbers(data: HangerReport) -> tuple[Table, ...]:
+    """What was found, as far as there is any of it."""
+    return tuple(table for table in (make(data) for make in _NUMBERS) if table.rows)
+
+
+def origins(data: HangerReport) -> tuple[Table, ...]:
+    """What it was found from."""
+    return tuple(table for table in (origin(data), settings(data.settings)) if table.rows)
 
 
 def tension(data: HangerReport) -> Table:
-    nominal_n = data.hanger.nominal_tension_n
-    rows = [_tension_row("now", data.tension_n, nominal_n)]
+    rows = [_tension_row("now", data.tension_n, data.hanger)]
     if data.baseline_tension_n is not None:
-        rows.append(_tension_row("baseline", data.baseline_tension_n, nominal_n))
+        rows.append(_tension_row("baseline", data.baseline_tension_n, data.hanger))
     if (fraction := tension_change(data)) is not None:
         change = fraction.scaled(100)
         rows.append(
-            ("change since baseline, %", words.mean(change, True), words.span(change, True), "")
+            (
+                "change since baseline", f"{words.mean(change, True)} %",
+                f"{words.span(change, True)} %", "",
+            )
+        )  # fmt: skip
+    nominal_n = data.hanger.nominal_tension_n
+    if nominal_n > 0:
+        rows.append(
+            ("nominal (as designed)", f"{nominal_n / 1e3:.1f} kN", "given, no interval", "100 %")
         )
-    rows.append(("nominal (as designed)", f"{nominal_n / 1e3:.1f}", "given, no interval", "100.0"))
     return Table(
-        "Tension", ("tension", "mean, kN", "90 % interval, kN", "% of nominal"), tuple(rows)
+        "Tension", ("tension", "mean", "90 % interval", "of nominal (90 % interval)"), tuple(rows)
     )
 
 
-def _tension_row(label: str, tension_n: Interval, nominal_n: float) -> tuple[str, ...]:
-    kilonewtons = words.kilonewtons(tension_n)
-    share = 100 * tension_n.mean / nominal_n
-    return (label, words.mean(kilonewtons), words.span(kilonewtons), f"{share:.1f}")
+def _tension_row(label: str, tension_n: Interval, hanger: Hanger) -> tuple[str, ...]:
+    kilonewtons, share = words.kilonewtons(tension_n), of_nominal(tension_n, hanger)
+    return (
+        label,
+        f"{words.mean(kilonewtons)} kN",
+        f"{words.span(kilonewtons)} kN",
+        f"{words.with_span(share)} %" if share else "no nominal",
+    )
 
 
 def drift(data: HangerReport) -> Table:
@@ -76,19 +97,31 @@ def neighbours(data: HangerReport) -> Table:
 
 def frequencies(data: HangerReport) -> Table:
     measured = {(mode.plane, mode.order): mode for mode in data.latest.modes}
+    misfits = {(mode.plane, mode.order): off for mode, off in misfits_percent(data)}
     return Table(
         "Frequencies",
-        ("plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % interval, Hz", "off, %"),
-        tuple(
-            _frequency_row(mode, measured.get((mode.plane, mode.order))) for mode in data.predicted
+        (
+            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % interval, Hz",
+            "off, % (90 % interval)",
         ),
-        note="Predicted by the posterior of the model class; off: predicted over measured.",
-    )
+        tuple(
+            _frequency_row(
+                mode,
+                measured.get((mode.plane, mode.order)),
+                misfits.get((mode.plane, mode.order)),
+            )
+            for mode in data.predicted
+        ),
+        note="Predicted by the posterior of the model class, with what its parameters leave open. "
+        "sd: standard deviation of the measurement. Off: predicted over measured, less one, with "
+        "the interval of both; where the sd is not known, with that of the prediction.",
+    )  # fmt: skip
 
 
-def _frequency_row(predicted: PredictedFrequency, measured: Mode | None) -> tuple[str, ...]:
+def _frequency_row(
+    predicted: PredictedFrequency, measured: Mode | None, off: Interval | None
+) -> tuple[str, ...]:
     interval = Interval.normal(predicted.mean_hz, predicted.sd_hz)
-    off = 100 * (predicted.mean_hz / predicted.measured_hz - 1)
     sd = measured.frequency_sd_hz if measured else math.nan
     return (
         predicted.plane,
@@ -97,7 +130,7 @@ def _frequency_row(predicted: PredictedFrequency, measured: Mode | None) -> tupl
         words.number(sd, ".4f"),
         f"{interval.mean:.3f}",
         f"{interval.low:.3f} to {interval.high:.3f}",
-        words.number(off, "+.2f", "not measured"),
+        words.with_span(off, signed=True) if off else "not measured",
     )
 
 
@@ -111,6 +144,8 @@ def parameters(data: HangerReport) -> Table:
         f"Parameters of the model class {words.model_class(posterior.model)}",
         ("name", "meaning", "mean", "90 % interval", "most probable"),
         tuple(_parameter_row(posterior, name) for name in posterior.names),
+        note="Ratios and fractions have no unit; of the most probable set the interval is that of "
+        "its row.",
     )
 
 
@@ -127,15 +162,16 @@ def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
 
 
 def models(data: HangerReport) -> Table:
-    pairs = (
-        zip(data.selection.posteriors, data.selection.probabilities, strict=True)
-        if data.selection
-        else ()
-    )
+    chosen = data.selection
+    pairs = list(zip(chosen.posteriors, chosen.probabilities, strict=True)) if chosen else []
     return Table(
         "Model classes",
-        ("model", "probability", "log evidence", "sd", "tension, kN", "90 % interval, kN"),
+        ("model", "probability", "log evidence", "its sd", "tension, kN", "90 % interval, kN"),
         tuple(_model_row(posterior, share) for posterior, share in pairs),
+        note=f"Compared on {told_tests(pairs[0][0].tests)}, all classes held equally probable "
+        "before. Evidence in natural logarithms, with the standard deviation of its sampling."
+        if pairs
+        else "",
     )
 
 
@@ -151,9 +187,65 @@ def _model_row(posterior: Posterior, share: float) -> tuple[str, ...]:
     )
 
 
-def history(data: HangerReport) -> Table:
+def period(data: HangerReport) -> Table:
+    """The period's last test beside its first; empty where there is no period, or one test."""
+    if data.period is None or len(data.trend) < 2:
+        return Table("The period", (), ())
+    first, last = data.trend[0], data.trend[-1]
     return Table(
-        "Tests, latest first",
+        f"In the period {data.period}",
+        ("what", "at its first test", "at its last test", "change (90 % interval)"),
+        (
+            ("test", first.test, last.test, words.counted(len(data.trend), "test")),
+            ("time", words.moment(first.time), words.moment(last.time), _days(first, last)),
+            (
+                "temperature", words.temperature(first.temperature_c),
+                words.temperature(last.temperature_c), _kelvins(first, last),
+            ),
+            _tension_course(first.tension_n, last.tension_n),
+            *(
+                _stiffness_course(name, first.stiffness[name], last.stiffness[name])
+                for name in last.stiffness
+                if name in first.stiffness
+            ),
+        ),
+        note="By these two tests alone, taken as independent of one another; the swing with the "
+        "temperature is in the change. The intervals of stiffness are of log10.",
+    )  # fmt: skip
+
+
+def _days(first: TrendRow, last: TrendRow) -> str:
+    if first.time is None or last.time is None:
+        return "not known"
+    return words.counted((last.time - first.time).days, "day")
+
+
+def _kelvins(first: TrendRow, last: TrendRow) -> str:
+    kelvins = words.number(last.temperature_c - first.temperature_c, "+z.1f")
+    return f"{kelvins} K" if kelvins != "not known" else kelvins
+
+
+def _tension_course(first: Interval, last: Interval) -> tuple[str, ...]:
+    change = last.since(first).scaled(100)
+    both = (f"{words.with_span(words.kilonewtons(each))} kN" for each in (first, last))
+    return ("tension", *both, f"{words.with_span(change, signed=True)} %")
+
+
+def _stiffness_course(name: str, first: Interval, last: Interval) -> tuple[str, ...]:
+    change = last.less(first)
+    mean, low, high = (factor(each) for each in (change.mean, change.low, change.high))
+    return (
+        f"{words.quantity(name)}, log10 of N m/rad",
+        words.with_span(first),
+        words.with_span(last),
+        f"{mean} times ({low} to {high} times)",
+    )
+
+
+def history(data: HangerReport) -> Table:
+    within = f" in the period {data.period}" if data.period else ""
+    return Table(
+        f"Tests{within}, latest first",
         ("time", "test", "temperature", "model", "tension, kN", "90 % interval, kN"),
         tuple(_history_row(row) for row in reversed(data.trend)),
     )
@@ -173,8 +265,9 @@ def _history_row(row: TrendRow) -> tuple[str, ...]:
 
 
 def alerts(data: HangerReport) -> Table:
+    within = f" in the period {data.period}" if data.period else ""
     return Table(
-        "Alerts, latest first",
+        f"Alerts{within}, latest first",
         ("time", "test", "message", "acknowledged"),
         tuple(_alert_row(row, data.acknowledged) for row in reversed(data.alerts)),
     )
@@ -184,36 +277,9 @@ def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
     return (words.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
 
 
-def origin(data: HangerReport) -> Table:
-    posterior, test = data.posterior, data.latest
-    amplitude = f"{words.number(test.amplitude, '.3g', 'not recorded')}"
-    facts = {
-        "test": f"{test.id}, {words.moment(test.time)}",
-        "temperature": words.temperature(test.temperature_c),
-        "hit level over reference level": amplitude,
-        "added mass": _added_mass(data),
-        "modes identified": f"{len(test.modes)}",
-        "tests in this posterior": ", ".join(posterior.tests),
-        "posterior samples": f"{len(posterior.samples)} (effective "
-        f"{words.number(posterior.effective_sample_size, '.0f')})",
-        "R-hat (1 is settled)": words.number(posterior.r_hat, ".3f"),
-        "model evaluations": f"{posterior.evaluations}",
-        "random seed": f"{posterior.seed}",
-        "computing time": f"{words.number(posterior.seconds, '.1f')} s",
-        **data.lineage,
-        "shm version": data.version,
-        "report made": words.moment(data.generated_at),
-    }
-    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
-
-
-def _added_mass(data: HangerReport) -> str:
-    mass = data.latest.added_mass
-    return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end" if mass else "none"
-
-
-_TABLES: tuple[Callable[[HangerReport], Table], ...] = (
+_NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
     tension,
+    period,
     drift,
     alerts,
     neighbours,
@@ -223,5 +289,4 @@ _TABLES: tuple[Callable[[HangerReport], Table], ...] = (
     models,
     parameters,
     history,
-    origin,
 )

@@ -22,7 +22,8 @@ def text(data: HangerReport) -> str:
 
 def _head(data: HangerReport) -> str:
     name = words.hanger_name(data.hanger.id, data.hanger.name)
-    return headed(f"{name}, {data.bridge}: {status(data).value}", summary(data))
+    within = f", {data.period}" if data.period else ""
+    return headed(f"{name}, {data.bridge}{within}: {status(data).value}", summary(data))
 
 
 def _table(table: Table) -> str:

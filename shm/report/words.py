@@ -49,20 +49,25 @@ def with_interval(interval: Interval, unit: str) -> str:
     """`655 kN (90 % interval 640 to 671 kN)`."""
     places, space = decimals(interval.width), unit and f" {unit}"
     return (
-        f"{interval.mean:.{places}f}{space} (90 % interval "
-        f"{interval.low:.{places}f} to {interval.high:.{places}f}{space})"
+        f"{interval.mean:z.{places}f}{space} (90 % interval "
+        f"{interval.low:z.{places}f} to {interval.high:z.{places}f}{space})"
     )
 
 
 def span(interval: Interval, signed: bool = False) -> str:
     """`640 to 671`, for a table whose heading names the unit."""
     places, sign = decimals(interval.width), "+" if signed else ""
-    return f"{interval.low:{sign}.{places}f} to {interval.high:{sign}.{places}f}"
+    return f"{interval.low:{sign}z.{places}f} to {interval.high:{sign}z.{places}f}"
 
 
 def mean(interval: Interval, signed: bool = False) -> str:
     """The mean with the decimals that its interval deserves."""
-    return f"{interval.mean:{'+' if signed else ''}.{decimals(interval.width)}f}"
+    return f"{interval.mean:{'+' if signed else ''}z.{decimals(interval.width)}f}"
+
+
+def with_span(interval: Interval, signed: bool = False) -> str:
+    """`650 (640 to 671)`, for a table whose heading names unit and interval."""
+    return f"{mean(interval, signed)} ({span(interval, signed)})"
 
 
 def signed_percent(fraction: Interval) -> str:

@@ -2,7 +2,14 @@
 
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
-from shm.store.export import samples_npz, samples_table
+from shm.store.glances import (
+    BaselineGlance,
+    EventKind,
+    HangerEvent,
+    Numbers,
+    TestRow,
+    TrendPoint,
+)
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
     Acknowledgement,
@@ -43,14 +50,18 @@ __all__ = [
     "Adoption",
     "Archive",
     "Baseline",
+    "BaselineGlance",
     "Delivery",
     "DeliveryState",
     "Event",
+    "EventKind",
     "FormerPosterior",
     "FormerTest",
+    "HangerEvent",
     "IdentifiedTest",
     "KeptWatch",
     "Lineage",
+    "Numbers",
     "Outcome",
     "Quarantine",
     "Receipt",
@@ -69,9 +80,9 @@ __all__ = [
     "StoredTest",
     "StoredToken",
     "StoredWatch",
+    "TestRow",
+    "TrendPoint",
     "WaitingTest",
     "WatchedName",
     "Workspace",
-    "samples_npz",
-    "samples_table",
 ]

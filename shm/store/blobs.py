@@ -97,13 +97,13 @@ def test_from_document(document: Mapping[str, Any], hanger: int) -> ModalTest:
 
 def quality_from(entry: Mapping[str, Any]) -> QualityCheck:
     """A quality figure back from its document."""
-    numbers = {name: _number(entry[name]) for name in ("value", "limit")}
+    numbers = {name: number(entry[name]) for name in ("value", "limit")}
     return QualityCheck(**{**entry, **numbers})
 
 
 def foreign_from(entry: Mapping[str, Any]) -> ForeignMode:
     """What was set aside, back from its document."""
-    numbers = {name: _number(entry[name]) for name in ("frequency_hz", "damping_ratio")}
+    numbers = {name: number(entry[name]) for name in ("frequency_hz", "damping_ratio")}
     return ForeignMode(**{**entry, **numbers})
 
 
@@ -119,7 +119,7 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
     """A posterior, complete with samples, back from its document and bytes."""
     arrays = unpack(blob)
     values: dict[str, Any] = {name: document[name] for name in _POSTERIOR_PLAIN}
-    values |= {name: _number(document[name]) for name in _POSTERIOR_NUMBERS}
+    values |= {name: number(document[name]) for name in _POSTERIOR_NUMBERS}
     values |= {name: arrays[name] for name in _POSTERIOR_ARRAYS}
     return Posterior(
         names=tuple(document["parameters"]),
@@ -135,13 +135,14 @@ def _predicted(entry: Mapping[str, Any]) -> PredictedFrequency:
     return PredictedFrequency(
         plane=entry["plane"],
         order=entry["order"],
-        mean_hz=_number(frequency["mean"]),
-        sd_hz=_number(frequency["sd"]),
-        measured_hz=_number(entry["measured_hz"]),
+        mean_hz=number(frequency["mean"]),
+        sd_hz=number(frequency["sd"]),
+        measured_hz=number(entry["measured_hz"]),
     )
 
 
-def _number(value: float | None) -> float:
+def number(value: float | None) -> float:
+    """A number of a document, where null is what is not known."""
     return NAN if value is None else float(value)
 
 
@@ -172,14 +173,14 @@ def watch_from(
     return WatchedTest(
         test=test,
         time=time,
-        temperature_c=_number(document["temperature_c"]),
+        temperature_c=number(document["temperature_c"]),
         drifts=tuple(drifts),
         change=_change(document["change"]),
     )
 
 
 def _change(entry: Mapping[str, Any]) -> Change:
-    numbers = {name: _number(entry[name]) for name in _CHANGE_NUMBERS}
+    numbers = {name: number(entry[name]) for name in _CHANGE_NUMBERS}
     return Change(
         began_after=parse_time(entry["began_after"]),
         began_by=parse_time(entry["began_by"]),
@@ -189,14 +190,14 @@ def _change(entry: Mapping[str, Any]) -> Change:
 
 
 def _moved(entry: Mapping[str, Any]) -> Moved:
-    numbers = {name: _number(entry[name]) for name in _MOVED_NUMBERS}
+    numbers = {name: number(entry[name]) for name in _MOVED_NUMBERS}
     others = {name: tuple(entry[name]) for name in ("alike", "together") if name in entry}
     return Moved(**{**entry, **numbers, **others})
 
 
 def _drift(entry: Mapping[str, Any]) -> Drift:
     values = {field.name: entry[field.name] for field in fields(Drift)}
-    numbers = {name: _number(values[name]) for name in _DRIFT_NUMBERS}
+    numbers = {name: number(values[name]) for name in _DRIFT_NUMBERS}
     return Drift(**{**values, **numbers, "time": parse_time(entry["time"])})
 
 

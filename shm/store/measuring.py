@@ -13,7 +13,7 @@ from shm.store.files import in_force
 from shm.store.rows import DeliveryState, Stage
 from shm.store.tables import acknowledgements, alerts, deliveries, recordings, steps, tests
 
-_ENDED = (Stage.DONE, Stage.REFUSED)
+_ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Measuring(Database):
 
     def oldest_waiting(self) -> datetime | None:
         """When the oldest recording came in that is not through yet; None where all are."""
-        query = sa.select(recordings.c.received_at).where(recordings.c.stage.not_in(_ENDED))
+        query = sa.select(recordings.c.received_at).where(recordings.c.stage.in_(_ON_THE_WAY))
         with self.reading() as connection:
             row = connection.execute(query.order_by(recordings.c.id).limit(1)).first()
         return None if row is None else row.received_at
@@ -57,7 +57,7 @@ class Measuring(Database):
         query = (
             sa.select(recordings, reached)
             .outerjoin(steps, steps.c.recording_id == recordings.c.id)
-            .where(recordings.c.stage.not_in(_ENDED))
+            .where(recordings.c.stage.in_(_ON_THE_WAY))
             .group_by(recordings.c.id)
             .order_by(recordings.c.id)
         )

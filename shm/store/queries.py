@@ -40,14 +40,16 @@ from shm.store.tables import (
 )
 from shm.values import FrequencyResponse, Posterior, Selection
 
-_tests = sa.select(tests, recordings.c.sha256).join(recordings)
+# All but the frequency response, which may be as large as all else together a hundredfold.
+_columns = (column for column in tests.columns if column is not tests.c.frequency_response)
+plain_tests = sa.select(*_columns, recordings.c.sha256).join(recordings)
 _undone = adoptions.c.undone_at.is_not(None)
 _undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
 # holds, or it was adopted and that was undone. And those of baselines set anew: their tests have
 # a posterior each, which must still show what moved between them.
-_hidden = sa.union(
+hidden = sa.union(
     sa.select(selection_entries.c.posterior_id).where(
         (selection_entries.c.rank > 0) != selection_entries.c.selection_id.in_(_undone_selections)
     ),
@@ -127,14 +129,14 @@ class Queries(Database):
 
     def test(self, test_id: int) -> StoredTest:
         """One test by its row number; raises NothingThere."""
-        found = self._tests(_tests.where(tests.c.id == test_id))
+        found = self._tests(plain_tests.where(tests.c.id == test_id))
         if not found:
             raise NothingThere(f"no test {test_id}.", remedy="See `shm status`.")
         return found[0]
 
     def tests(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
         """The tests of a hanger, or of all, by time; those refused are left out."""
-        query = _tests.where(tests.c.stage != Stage.REFUSED, in_force(tests))
+        query = plain_tests.where(tests.c.stage != Stage.REFUSED, in_force(tests))
         if hanger is not None:
             query = query.where(tests.c.hanger == hanger)
         return self._tests(query.order_by(tests.c.time, tests.c.id))
@@ -146,7 +148,9 @@ class Queries(Database):
             .join(baselines, baselines.c.posterior_id == posterior_tests.c.posterior_id)
             .where(baselines.c.id == baseline.id)
         )
-        return self._tests(_tests.where(tests.c.id.in_(made)).order_by(tests.c.time, tests.c.id))
+        return self._tests(
+            plain_tests.where(tests.c.id.in_(made)).order_by(tests.c.time, tests.c.id)
+        )
 
     def frequency_response(self, test: StoredTest) -> FrequencyResponse | None:
         """What the modes of a test were identified from; None where a file gave the modes."""
@@ -171,9 +175,12 @@ class Queries(Database):
         query = _shown(hanger)
         if test is not None:
             query = query.where(posteriors.c.id.in_(_of_test(hanger, test)))
-        latest = query.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
+        # First which one, then its samples: else those of all would be sorted.
+        named = query.with_only_columns(posteriors.c.id)
+        latest = named.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
+        chosen = sa.select(posteriors).where(posteriors.c.id == latest.scalar_subquery())
         with self.reading() as connection:
-            row = connection.execute(latest).one_or_none()
+            row = connection.execute(chosen).one_or_none()
         if row is None:
             what = f"hanger {hanger}" + (f", test {test}" if test else "")
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
@@ -188,7 +195,7 @@ class Queries(Database):
         newest = (
             sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
             .join(posteriors)
-            .where(posteriors.c.id.not_in(_hidden), in_force(posteriors))
+            .where(posteriors.c.id.in_(_shown(hanger).with_only_columns(posteriors.c.id)))
             .group_by(posterior_tests.c.test_id)
         )
         stored = {row.id: row.posterior for row in self.posteriors(hanger)}
@@ -276,6 +283,23 @@ def _in_force(hanger: int) -> sa.ColumnElement[bool]:
     return baselines.c.id.not_in(_undone_baselines) & (posteriors.c.model == model)
 
 
+def baselines_now() -> sa.Select[Any]:
+    """The numbers of the newest baselines of all hangers, each in its class in force."""
+    newest = sa.select(sa.func.max(selections.c.id)).group_by(selections.c.hanger)
+    held = newest.where(selections.c.id.not_in(_undone_selections))
+    return (
+        sa.select(sa.func.max(baselines.c.id))
+        .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
+        .join(
+            selections,
+            (selections.c.hanger == baselines.c.hanger)
+            & (selections.c.model == posteriors.c.model),
+        )
+        .where(selections.c.id.in_(held), baselines.c.id.not_in(_undone_baselines))
+        .group_by(baselines.c.hanger)
+    )
+
+
 def baseline_in_force(hanger: int) -> sa.Select[Any]:
     """The number of the newest baseline of a hanger in the class in force."""
     query = sa.select(baselines.c.id).join(posteriors).where(baselines.c.hanger == hanger)
@@ -284,7 +308,7 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
 
 def _shown(hanger: int) -> sa.Select[Any]:
     return sa.select(posteriors).where(
-        posteriors.c.hanger == hanger, posteriors.c.id.not_in(_hidden), in_force(posteriors)
+        posteriors.c.hanger == hanger, posteriors.c.id.not_in(hidden), in_force(posteriors)
     )
 
 

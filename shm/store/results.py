@@ -147,6 +147,8 @@ def _test_values(
         "notes": list(item.notes),
         "quality": [asdict(check) for check in item.quality],
         "set_aside": [asdict(mode) for mode in item.set_aside],
+        "taken_at": item.test.time,
+        "temperature_c": item.test.temperature_c,
     }
 
 

@@ -16,21 +16,21 @@ from shm.store.adopting import Adopting
 from shm.store.archive_copies import ArchiveCopies
 from shm.store.database import make_engine
 from shm.store.files import Files
+from shm.store.listing import Listing
 from shm.store.measuring import Measuring
-from shm.store.queries import Queries
 from shm.store.results import Results
 from shm.store.stepping import Stepping
 from shm.store.superseding import Superseding
 from shm.store.tokens import Tokens
+from shm.store.trends import Trends
 from shm.store.upkeep import Upkeep
-from shm.store.watching import Watching
 
 
 class Store(
     Files,
     Results,
-    Queries,
-    Watching,
+    Listing,
+    Trends,
     Acknowledging,
     Adopting,
     Stepping,

@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0005"
+SCHEMA = "0006"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -46,10 +46,20 @@ def _superseded_at() -> sa.Column[Any]:
     return sa.Column("superseded_at", UtcTime)
 
 
+def _in_force(name: str, *columns: str) -> sa.Index:
+    # `superseded_at` stands behind the samples or the frequency response of a row, which may be a
+    # hundred pages of the file: an index of what is in force spares reading past them.
+    where = sa.text("superseded_at IS NULL")
+    return sa.Index(name, *columns, sqlite_where=where, postgresql_where=where)
+
+
 def _unique_where(condition: str, table: str, *columns: str) -> sa.Index:
     where = sa.text(f"{condition} IS NULL")
     name = f"uq_{table}_{'_'.join(columns)}"
     return sa.Index(name, *columns, unique=True, sqlite_where=where, postgresql_where=where)
+
+
+_OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
 
 # A raw file that was received. `arrival` marks the spool entry it came as, so that a receipt cut
@@ -70,7 +80,9 @@ recordings = sa.Table(
     sa.Column("reason", Document),
 )
 
-# One modal test. `time` is the test's own or, where it has none, the time of receipt.
+# One modal test. `time` is the test's own or, where it has none, the time of receipt. What is
+# asked of all tests at once, `taken_at` and `temperature_c`, stands beside the long
+# document that has it.
 tests = sa.Table(
     "tests",
     metadata,
@@ -89,7 +101,10 @@ tests = sa.Table(
     *_lineage(),
     sa.Column("identified_at", UtcTime, nullable=False),
     _superseded_at(),
+    sa.Column("taken_at", UtcTime),
+    sa.Column("temperature_c", Number),
     _unique_where("superseded_at", "tests", "hanger", "name"),
+    _in_force("ix_tests_in_force", *_OF_TESTS),
     sa.Index(None, "recording_id"),
 )
 
@@ -109,6 +124,17 @@ posteriors = sa.Table(
     *_lineage(),
     sa.Column("updated_at", UtcTime, nullable=False),
     _superseded_at(),
+    _in_force("ix_posteriors_in_force", "hanger", "time", "model"),
+)
+
+# A posterior in numbers, so that years of tests are shown without their samples. `key` tells which
+# description of the hanger turned the samples into stiffness; a row may be thrown away at will.
+summaries = sa.Table(
+    "summaries",
+    metadata,
+    sa.Column("posterior_id", sa.ForeignKey("posteriors.id"), primary_key=True),
+    sa.Column("key", sa.String(64), nullable=False),
+    sa.Column("document", Document, nullable=False),
 )
 
 posterior_tests = sa.Table(
@@ -171,7 +197,8 @@ drifts = sa.Table(
     _unique_where("superseded_at", "drifts", "test_id", "baseline_id", "quantity"),
 )
 
-# What the sequential test says after one test; the shifts of the quantities stand in `drifts`.
+# What the sequential test says after one test, and whether it has called a change; the shifts of
+# the quantities stand in `drifts`.
 watches = sa.Table(
     "watches",
     metadata,
@@ -181,8 +208,10 @@ watches = sa.Table(
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
+    sa.Column("called", sa.Boolean, nullable=False, server_default=sa.false()),
     _superseded_at(),
     _unique_where("superseded_at", "watches", "test_id", "baseline_id"),
+    _in_force("ix_watches_in_force", "hanger", "baseline_id", "time", "called"),
 )
 
 # What the watch has made of all tests up to `last_test_time`, so that the next one is not compared
@@ -296,7 +325,7 @@ steps = sa.Table(
     _to("recordings"),
     _to("tests", nullable=True),
     sa.Column("stage", sa.String(16), nullable=False),
-    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("at", UtcTime, nullable=False, index=True),
     sa.Column("version", sa.String(32)),
     sa.Index(None, "recording_id"),
     sa.Index(None, "test_id"),

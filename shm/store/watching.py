@@ -104,15 +104,25 @@ class Watching(Database):
         self, hanger: int | None = None, baseline_id: int | None = None
     ) -> tuple[StoredWatch, ...]:
         """What the watch said after each test, by time; of one hanger or baseline where named."""
-        name = tests.c.name.label("test")
-        query = sa.select(watches, name).join(tests).where(in_force(watches))
-        shifts = sa.select(drifts, name).join(tests).where(in_force(drifts)).order_by(drifts.c.id)
+        query = sa.select(watches.c.id).where(in_force(watches))
         if hanger is not None:
             query = query.where(watches.c.hanger == hanger)
-            shifts = shifts.where(drifts.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(watches.c.baseline_id == baseline_id)
-            shifts = shifts.where(drifts.c.baseline_id == baseline_id)
+        return self.watches_of(query)
+
+    def watches_of(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
+        """Watches that are `chosen` by their numbers, with their shifts, by time."""
+        name = tests.c.name.label("test")
+        query = sa.select(watches, name).join(tests).where(watches.c.id.in_(chosen))
+        same_test = watches.c.test_id == drifts.c.test_id
+        together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
+        shifts = (
+            sa.select(drifts, name)
+            .select_from(drifts.join(tests).join(watches, together))
+            .where(watches.c.id.in_(chosen), in_force(drifts))
+            .order_by(drifts.c.id)
+        )
         with self.reading() as connection:
             rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
             found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
@@ -250,6 +260,7 @@ def _watch_values(found: WatchedTest, test: StoredTest, baseline: Baseline) -> d
         "hanger": test.hanger,
         "time": found.time,
         "document": watch_document(found),
+        "called": found.change.called,
     }
 
 

@@ -23,6 +23,8 @@ from shm.values import FloatArray, Prior
 _EDGE = 1e-9
 _SHARE = 0.1
 _STEPS = 5
+_FELT = (-0.7, 1.3)
+"""log10 of how stiff a spring is that a mode feels, to EI p."""
 _LOG_10 = np.log(10)
 
 
@@ -99,6 +101,18 @@ class Coordinates:
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Places (n, d) from the folded prior."""
         return self.places(rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width))))
+
+    def draw_felt(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """The same with the springs of each pair as stiff as the bar, within a few times.
+
+        There a frequency tells how stiff they are. Of springs that are much stiffer or softer it
+        tells nothing, nor which way to go.
+        """
+        theta = rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width)))
+        columns = [column for pair in self._pairs for column in pair]
+        felt = np.log10(self._own) + rng.uniform(*_FELT, (n, len(columns)))
+        theta[:, columns] = felt.clip(self.prior.lower[columns], self.prior.upper[columns])
+        return self.places(theta)
 
     def _weaker(self, stronger: FloatArray, mixed: FloatArray) -> FloatArray:
         """log10 of the weaker spring, by Newton's steps."""

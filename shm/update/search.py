@@ -19,11 +19,12 @@ from shm.update.problem import Problem
 from shm.values import FloatArray, IntArray
 
 _STARTS = 40
+_FELT_STARTS = 40
 _KEPT = 12
 _PHASES = 3
 _STEPS = 8
 _LAST_STEPS = 80
-_FIRST_SIGMA = 0.02
+_FIRST_SIGMA, _FELT_SIGMA = 0.02, 0.001
 _APART = 0.1
 _DIFFERENCE = 1e-4
 _DAMPING = 1e-2
@@ -59,7 +60,9 @@ class Anchors:
 def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None) -> Anchors:
     """The best distinct optima of `problem`; with a hint half of the starts do."""
     z = hint.draw(_STARTS // 2, rng) if hint else problem.coordinates.draw_prior(_STARTS, rng)
-    sigma = np.full(len(z), _FIRST_SIGMA)
+    felt = problem.coordinates.draw_felt(_FELT_STARTS, rng)
+    sigma = np.repeat([_FIRST_SIGMA, _FELT_SIGMA], [len(z), len(felt)])
+    z = np.vstack([z, felt])
     for _ in range(_PHASES):
         z, sigma = _descend(problem, z, sigma, _STEPS)
     promising = _distinct(problem, problem.coordinates.fold(z))

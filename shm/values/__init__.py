@@ -67,6 +67,7 @@ from shm.values.posterior import (
     PredictedFrequency,
     Prior,
     Selection,
+    Summary,
 )
 from shm.values.recording import (
     AddedMass,
@@ -143,6 +144,7 @@ __all__ = [
     "Selection",
     "ShapePoint",
     "Shrinkage",
+    "Summary",
     "Support",
     "Supports",
     "TemperatureCoefficient",

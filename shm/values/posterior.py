@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
 
 from shm.values.kinds import FloatArray, Plane
 
@@ -14,6 +17,24 @@ class Prior:
     names: tuple[str, ...]
     lower: FloatArray
     upper: FloatArray
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One quantity of a posterior in numbers; `q05` and `q95` bound 90 % of it."""
+
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+
+    @classmethod
+    def of(cls, samples: FloatArray) -> Self:
+        """Of equally weighted draws, shape (samples,)."""
+        q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
+        spread = float(samples.std(ddof=1))
+        return cls(float(samples.mean()), spread, float(q05), float(q50), float(q95))
 
 
 @dataclass(frozen=True)

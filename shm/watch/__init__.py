@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from shm.models.ends import end_stiffness
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
 from shm.watch.options import WatchOptions
-from shm.watch.stiffness import end_stiffness
 from shm.watch.watching import (
     DatedTest,
     Newest,

@@ -99,7 +99,7 @@ def test_the_report_of_the_bridge_holds_the_elevation(arch: Workspace, tmp_path:
     ended = CliRunner().invoke(report, ["--bridge", "--out", str(page)], obj=str(arch.folder))
     assert ended.exit_code == 0, ended.output
     written = page.read_text()
-    assert written.count("<svg") == 1
+    assert written.count("<svg") == 2
     assert "Hanger 6 has lost 35 kN" in written
     told = CliRunner().invoke(report, ["--bridge", "--json"], obj=str(arch.folder)).stdout
     document = json.loads(told)

@@ -16,27 +16,11 @@ import rich_click as click
 import shm as package
 from shm.store import Workspace
 from shm_cli import main as command_line
-from shm_cli.main import VERBS, cli, run
+from shm_cli.main import VERBS, run
 from tests.cli.conftest import Shm
+from tests.helpers.command_lines import commands
 
-READING = (
-    "ingest", "identify", "predict", "update", "select", "report", "drift", "alerts",
-    "gap diagnose", "gap adopted",
-)  # fmt: skip
 PROGRAM = [sys.executable, "-c", "from shm_cli.main import main; main()"]
-
-
-def commands() -> list[tuple[str, click.Command]]:
-    """Every command as it is typed, members of groups too."""
-    found: list[tuple[str, click.Command]] = []
-    context = click.Context(cli)
-    for name in VERBS:
-        command = cli.get_command(context, name)
-        assert command is not None
-        found.append((name, command))
-        if isinstance(command, click.Group):
-            found += [(f"{name} {member}", each) for member, each in command.commands.items()]
-    return found
 
 
 def options_of(command: click.Command) -> set[str]:
@@ -48,21 +32,6 @@ def test_every_verb_of_the_list_exists(name: str) -> None:
     assert find_spec(VERBS[name].module) is not None
 
 
-def test_every_command_has_help_that_ends_with_an_example() -> None:
-    for name, command in commands():
-        last = (command.help or "").strip().splitlines()[-1].strip()
-        assert last.startswith("Example: shm "), name
-        assert f" {name} " in f"{last} ", name
-
-
-def test_every_example_uses_options_that_exist() -> None:
-    known = options_of(cli)
-    for name, command in commands():
-        example = (command.help or "").strip().splitlines()[-1].partition("Example:")[2]
-        used = {word for word in shlex.split(example) if word.startswith("--")}
-        assert used <= known | options_of(command), name
-
-
 def test_every_option_is_explained() -> None:
     for name, command in commands():
         for parameter in command.params:
@@ -71,11 +40,6 @@ def test_every_option_is_explained() -> None:
 
 
 _PLAIN = {"modes", "hits", "tests", "form", "out", "help"}
-
-
-@pytest.mark.parametrize("name", [*READING, "status"])
-def test_every_reading_verb_takes_json(name: str) -> None:
-    assert "--json" in options_of(dict(commands())[name])
 
 
 def test_the_list_of_verbs_says_what_each_verb_says_of_itself() -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from shm.store import Workspace
 from tests.cli.conftest import Shm
@@ -145,12 +147,31 @@ def test_posterior_samples_are_exported_alike_as_csv_and_npz(
     assert table[:, 3] == pytest.approx(table[:, 0] * 711e3)
 
 
+def test_an_export_for_arviz_adds_the_likelihood_unless_the_description_has_changed(
+    shm: Shm, bridge: Workspace, tmp_path: Path
+) -> None:
+    changed = tmp_path / "bridge"
+    shutil.copytree(bridge.folder, changed)
+    described = (changed / "bridge.toml").read_text()
+    (changed / "bridge.toml").write_text(described.replace("length_m = 12.0", "length_m = 11.0"))
+    call = ("export", "--hanger", 3, "--format", "netcdf", "--json", "--out", tmp_path / "s.dat")
+    for folder, group, said in (
+        (bridge.folder, {"log_likelihood", "posterior_predictive"}, ""),
+        (changed, set(), "Without the likelihood of each measurement"),
+    ):
+        ended = shm("--workspace", folder, *call)
+        assert (ended.code, said in ended.err) == (0, True)
+        with xarray.open_datatree(tmp_path / "s.dat", engine="h5netcdf") as tree:
+            assert tree["posterior"].sizes["draw"] == ended.document["samples"]
+            assert set(tree.children) & {"log_likelihood", "posterior_predictive"} == group
+
+
 def test_an_export_of_an_unknown_kind_is_a_usage_error(
     shm: Shm, bridge: Workspace, tmp_path: Path
 ) -> None:
     ended = shm("--workspace", bridge.folder, "export", "--hanger", 3, "--out", tmp_path / "s.xls")
     assert ended.code == 2
-    assert ".csv or .npz" in ended.err
+    assert ".csv, .nc, .json or .npz" in ended.err
 
 
 def test_an_old_store_is_mended_by_db_upgrade(shm: Shm, empty: Workspace) -> None:

@@ -34,12 +34,17 @@ CHECKS = [
 ]
 ROUTES = (
     "POST /api/recordings",
+    "GET /api/recordings",
     "GET /api/recordings/{key}",
     "GET /api/status",
     "GET /api/hangers",
     "GET /api/hangers/{hanger_id}",
     "GET /api/alerts",
     "POST /api/alerts/{alert_id}/acknowledgement",
+    "GET /api/bridge",
+    "GET /api/bridge/moved",
+    "GET /api/operation",
+    "GET /api/operation/examination",
     "GET /health",
     "GET /metrics",
 )

@@ -29,7 +29,7 @@ class Feed:
         else:
             name = f"{number:03}.modes.json"
             draft = self.workspace.folder / name
-            write_test(draft, self.workspace, day=number, tension=1 - number / 1000)
+            write_test(draft, self.workspace, day=number / 10, tension=1 - number / 1000)
             content = draft.read_bytes()
             draft.unlink()
         self.files[name] = content

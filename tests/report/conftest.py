@@ -7,8 +7,10 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from shm.report import HangerReport, trend_row
+from shm.report.figures.member import Illustration
 from shm.values import (
     Alert,
     Drift,
@@ -132,3 +134,11 @@ def bare(hanger: Hanger) -> HangerReport:
         "0.1.0",
         (trend_row(posterior, test, hanger),),
     )
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are drawn but not painted, which takes most of a report's time."""
+    painted = Illustration("blank", "", "", "", Figure((1, 1))).png(10)
+    monkeypatch.setattr(Illustration, "svg", lambda _: "<svg></svg>")
+    monkeypatch.setattr(Illustration, "png", lambda *_: painted)

@@ -29,6 +29,18 @@ def test_a_generated_page_is_what_the_code_makes(build: ModuleType, page: str) -
     assert (ROOT / "docs" / f"{page}.md").read_text() == made, "Run `make docs`."
 
 
+@pytest.mark.parametrize(
+    ("page", "name", "makes"),
+    [("physics", "classes", "classes_table"), ("api", "examples", "examples")],
+)
+def test_a_generated_part_of_a_page_is_what_the_code_makes(
+    build: ModuleType, page: str, name: str, makes: str
+) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    stands = text.split(f"<!-- {name} -->\n")[1].split(f"\n<!-- /{name} -->")[0]
+    assert stands == getattr(build, makes)(), "Run `make docs`."
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):

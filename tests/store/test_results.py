@@ -16,8 +16,6 @@ from shm.store import (
     Stage,
     Store,
     StoredTest,
-    samples_npz,
-    samples_table,
 )
 from shm.store.blobs import unpack
 from shm.values import AddedMass, Posterior, Selection
@@ -209,16 +207,6 @@ def test_what_was_never_updated_is_nothing_there(store: Store, test: str | None)
     assert store.baseline(3) is None
     with pytest.raises(NothingThere):
         store.test(1)
-
-
-def test_samples_are_exported_as_a_plain_table() -> None:
-    posterior = a_posterior()
-    names, table = samples_table(posterior)
-    assert names == ("theta_F", "theta_L", "sigma", "tension_n", "log_likelihood")
-    assert table.shape == (50, 5)
-    np.testing.assert_array_equal(table[:, 3], posterior.samples[:, 0] * 711e3)
-    arrays = unpack(samples_npz(posterior))
-    np.testing.assert_array_equal(arrays["tension_n"], posterior.tension_n)
 
 
 def test_a_pickled_blob_is_not_read() -> None:

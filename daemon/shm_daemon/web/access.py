@@ -1,22 +1,29 @@
-"""Who may do what: tokens and their scopes."""
+"""Who may do what: tokens and their scopes.
+
+A program sends its token in a header, a browser in the cookie that signing in gave it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
-from shm.store import Scope
+from shm.store import Scope, StoredToken
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.site import Site
 
+COOKIE = "shm_token"
+"""Holds the token of a person who has signed in at `/sign-in`."""
 _bearer = HTTPBearer(
     auto_error=False,
     description="`shm token create NAME --scope read|write` makes one. Reading from the machine "
-    "itself needs none while the interface listens there only.",
+    "itself needs none while the interface listens there only. A browser that has signed in sends "
+    "a cookie instead.",
 )
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
@@ -26,6 +33,7 @@ class Visitor:
     """Who asks: the name of the token, empty for this machine without one."""
 
     name: str
+    may_write: bool = False
 
 
 def site_of(request: Request) -> Site:
@@ -40,36 +48,75 @@ Credentials = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
 
 
 def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
-    """Lets in who may read: this machine where only it can come in, else a token."""
-    if credentials is None and not _is_at_home(request, site):
-        raise _nobody("Reading needs a token here.")
-    return _visitor(site, credentials, Scope.READ)
+    """Lets in who may read: this machine where only it can come in, else a token.
+
+    `frame.page` shows who it is.
+    """
+    if credentials is not None:
+        found = _visitor(site, credentials.credentials, Scope.READ)
+    elif _is_at_home(request, site):
+        found = _at_home(request, site)
+    else:
+        found = _visitor(site, _cookie(request, "Reading needs a token here."), Scope.READ)
+    request.state.visitor = found
+    return found
 
 
 def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
     """Lets in who may write: only with a token, from wherever."""
-    if credentials is None:
-        raise _nobody("Writing needs a token.")
-    return _visitor(site, credentials, Scope.WRITE)
+    if credentials is not None:
+        return _visitor(site, credentials.credentials, Scope.WRITE)
+    token = _cookie(request, "Writing needs a token.")
+    refuse_foreign(request)
+    return _visitor(site, token, Scope.WRITE)
 
 
 Reader = Annotated[Visitor, Depends(reading)]
 Writer = Annotated[Visitor, Depends(writing)]
 
 
-def _visitor(site: Site, credentials: HTTPAuthorizationCredentials | None, scope: Scope) -> Visitor:
-    if credentials is None:
-        return Visitor("")
-    token = site.store.token_of(credentials.credentials, utc_now())
+def refuse_foreign(request: Request) -> None:
+    """Raises Refused where a page of somebody else has a browser send this.
+
+    Browsers name the page's origin with whatever changes something; SameSite alone lets pages of
+    other ports of this machine through.
+    """
+    origin, host = request.headers.get("origin", ""), request.headers.get("host", "")
+    if not origin or urlsplit(origin).netloc.lower() != host.lower():
+        raise Refused(403, "This was sent by a page of another site.", "Send it from our page.")
+
+
+def token_in_force(site: Site, secret: str) -> StoredToken:
+    """The token of this secret; raises Refused where it is wrong or revoked."""
+    token = site.store.token_of(secret, utc_now())
     if token is None:
         raise _nobody("This token is wrong or revoked.")
+    return token
+
+
+def _visitor(site: Site, secret: str, scope: Scope) -> Visitor:
+    token = token_in_force(site, secret)
     if scope not in token.scopes:
         raise Refused(
             403,
             f"The token {token.name} may not {scope}.",
             f"Make one that may: `shm token create NAME --scope {scope}`.",
         )
-    return Visitor(token.name)
+    return Visitor(token.name, Scope.WRITE in token.scopes)
+
+
+def _at_home(request: Request, site: Site) -> Visitor:
+    """Here reading needs no token: a cookie that is out of date takes nothing away."""
+    secret = request.cookies.get(COOKIE)
+    token = site.store.token_of(secret, utc_now()) if secret else None
+    return Visitor(token.name, Scope.WRITE in token.scopes) if token else Visitor("")
+
+
+def _cookie(request: Request, otherwise: str) -> str:
+    secret = request.cookies.get(COOKIE)
+    if not secret:
+        raise _nobody(otherwise)
+    return secret
 
 
 def _is_at_home(request: Request, site: Site) -> bool:

@@ -21,6 +21,12 @@ class Address:
         """Whether only this machine can reach it."""
         return _is_loopback(self.host)
 
+    def page(self, is_https: bool = False) -> str:
+        """What a person opens in a browser; this machine's name where it listens everywhere."""
+        host = _machine() if self.host in ("0.0.0.0", "::") else self.host  # noqa: S104
+        named = f"[{host}]" if ":" in host else host
+        return f"http{'s' if is_https else ''}://{named}:{self.port}/"
+
     def answers_to(self, host_header: str, names: tuple[str, ...]) -> bool:
         """Whether a request with this `Host` is meant for us.
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 
 from shm.pipeline import utc_now
-from shm.store import Delivery, StoredAlert
+from shm.store import Delivery, Store, StoredAlert
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import answers
 from shm_daemon.web.models import Acknowledge, Alerts, AlertState
@@ -29,13 +31,9 @@ def alerts(
     open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
 ) -> Any:
     """All alerts, the oldest first, with their deliveries."""
-    deliveries = site.store.deliveries()
     found = site.store.alerts(hanger)
-    return {
-        "alerts": [
-            _row(alert, deliveries) for alert in found if alert.acknowledgement is None or not open
-        ]
-    }
+    chosen = [alert for alert in found if alert.acknowledgement is None or not open]
+    return {"alerts": alert_rows(site.store, chosen)}
 
 
 @router.post(
@@ -53,23 +51,37 @@ def acknowledge(
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
     noted = site.store.acknowledge(alert_id, who, told.why, utc_now())
-    return _row(noted, site.store.deliveries())
+    return alert_rows(site.store, [noted])[0]
 
 
-def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any]:
+def alert_rows(store: Store, alerts: Sequence[StoredAlert]) -> list[dict[str, Any]]:
+    """Alerts as documents, with what became of their deliveries."""
+    deliveries = defaultdict(list)
+    for each in store.deliveries() if alerts else ():
+        deliveries[each.alert.key].append(each)
+    return [_row(alert, deliveries[alert.alert.key]) for alert in alerts]
+
+
+def _row(stored: StoredAlert, deliveries: Sequence[Delivery]) -> dict[str, Any]:
     noted, alert = stored.acknowledgement, stored.alert
     return {
         "id": stored.id,
         "hanger": alert.hanger,
         "raised_at": stored.raised_at,
+        "test": alert.test,
         "test_at": alert.time,
+        "kinds": list(alert.kinds),
         "message": alert.message,
         "acknowledged": None
         if noted is None
         else {"who": noted.who, "why": noted.why, "at": noted.at},
         "deliveries": [
-            {"hook": each.hook, "state": each.state.value, "attempts": each.attempts}
+            {
+                "hook": each.hook,
+                "state": each.state.value,
+                "attempts": each.attempts,
+                "last_error": each.last_error,
+            }
             for each in deliveries
-            if each.alert.key == alert.key
         ],
     }

@@ -1,4 +1,7 @@
-"""What goes wrong, as answers: a status, and a document that says what is wrong and what to do."""
+"""What goes wrong, as answers: a status, what is wrong and what to do.
+
+A document where a document was asked for, a page where a page was.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from shm.errors import BadInput, NothingThere, ShmError, StoreError, UsageError
 from shm_daemon.landing import TooLarge
+from shm_daemon.web.frame import for_a_person, problem
 
 log = logging.getLogger(__name__)
 
@@ -74,20 +78,37 @@ def fault(
     return JSONResponse(Fault(message=message, remedy=remedy).model_dump(), status, headers)
 
 
-def _refused(request: Request, error: Exception) -> JSONResponse:
+def _told(
+    request: Request,
+    status: int,
+    message: str,
+    remedy: str = "",
+    headers: dict[str, str] | None = None,
+) -> Response:
+    if for_a_person(request):
+        return problem(request, status, message, remedy, headers)
+    return fault(status, message, remedy, headers)
+
+
+def _refused(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     headers = dict(error.headers) if error.headers else None
-    return fault(error.status_code, error.detail, getattr(error, "remedy", ""), headers)
+    remedy, message = getattr(error, "remedy", ""), error.detail
+    if message == "Not Found":  # as the framework says it
+        message = "There is no such page."
+    return _told(request, error.status_code, message, remedy, headers)
 
 
-def _invalid(request: Request, error: Exception) -> JSONResponse:
+def _invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = " ".join(str(part) for part in first["loc"])
-    return fault(422, f"{where}: {first['msg']}.", "See /openapi.json for what is expected.")
+    return _told(
+        request, 422, f"{where}: {first['msg']}.", "See /openapi.json for what is expected."
+    )
 
 
-def _known(request: Request, error: Exception) -> JSONResponse:
+def _known(request: Request, error: Exception) -> Response:
     assert isinstance(error, ShmError)
     status = next((code for kind, code in _STATUS if isinstance(error, kind)), 500)
     if error.retry_after_s is not None:
@@ -95,8 +116,8 @@ def _known(request: Request, error: Exception) -> JSONResponse:
     headers = {"Retry-After": f"{error.retry_after_s or 60:.0f}"} if status == 503 else None
     if status >= 500:
         log.error("%s", error)
-    return fault(status, error.message, error.remedy, headers)
+    return _told(request, status, error.message, error.remedy, headers)
 
 
-def _unknown(request: Request, error: Exception) -> JSONResponse:
-    return fault(500, "an internal error.", "The log of the web interface says more.")
+def _unknown(request: Request, error: Exception) -> Response:
+    return _told(request, 500, "an internal error.", "The log of the web interface says more.")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path
 
-from shm.documents import posterior_document
 from shm.errors import BadInput, NothingThere
-from shm.store import DeliveryState, Store, Workspace
+from shm.store import DeliveryState, Store, StoredWatch, TrendPoint, Workspace
 from shm.values import Hanger
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
@@ -49,8 +50,7 @@ def status(site: AtSite, _: Reader) -> Any:
 )
 def hangers(site: AtSite, _: Reader) -> Any:
     """Tension with its interval, shifts and open alerts of each hanger."""
-    workspace, store = site.workspace, site.store
-    return {"hangers": [_state(store, hanger) for hanger in workspace.bridge.hangers]}
+    return {"hangers": _states(site.store, site.workspace.bridge.hangers)}
 
 
 @router.get(
@@ -61,7 +61,7 @@ def hangers(site: AtSite, _: Reader) -> Any:
 )
 def hanger(site: AtSite, _: Reader, hanger_id: Number) -> Any:
     """Tension with its interval, shifts and open alerts of one hanger."""
-    return _state(site.store, described(site.workspace, hanger_id))
+    return _states(site.store, [described(site.workspace, hanger_id)])[0]
 
 
 def described(workspace: Workspace, hanger_id: int) -> Hanger:
@@ -77,36 +77,36 @@ def quarantined(workspace: Workspace) -> int:
     return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))
 
 
-def _state(store: Store, hanger: Hanger) -> dict[str, Any]:
-    tests, baseline = store.tests(hanger.id), store.baseline(hanger.id)
-    return {
-        "hanger": hanger.id,
-        "tests": len(tests),
-        "latest_test_at": tests[-1].time if tests else None,
-        "nominal_tension_n": hanger.nominal_tension_n,
-        "baseline_set_at": baseline.set_at if baseline else None,
-        "shifts": _shifts(store, hanger),
-        "open_alerts": sum(alert.acknowledgement is None for alert in store.alerts(hanger.id)),
-        **_tension(store, hanger),
-    }
-
-
-def _tension(store: Store, hanger: Hanger) -> dict[str, Any]:
-    try:
-        document = posterior_document(store.posterior(hanger.id))
-    except NothingThere:
-        return {"model": None, "tension_n": None}
-    return {"model": document["model"], "tension_n": document["tension_n"]}
-
-
-def _shifts(store: Store, hanger: Hanger) -> list[dict[str, Any]]:
-    """Those of the latest test that was compared with a baseline."""
-    drifts = store.drifts(hanger.id)
+def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
+    """Of many hangers in as many questions as of one."""
+    trends, baselines = store.latest_trends(hangers), store.baselines_in_force(hangers)
+    tests, watches, alerts = store.latest_tests(), store.latest_watches(), store.open_alert_counts()
     return [
-        {key: _known(getattr(drift, key)) for key in _SHIFT}
-        for drift in drifts
-        if drift.test == drifts[-1].test
+        {
+            "hanger": hanger.id,
+            "tests": tests[hanger.id].tests if hanger.id in tests else 0,
+            "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
+            "nominal_tension_n": hanger.nominal_tension_n,
+            "baseline_set_at": baselines[hanger.id].set_at if hanger.id in baselines else None,
+            "shifts": _shifts(watches.get(hanger.id)),
+            "open_alerts": alerts.get(hanger.id, 0),
+            **_tension(trends.get(hanger.id)),
+        }
+        for hanger in hangers
     ]
+
+
+def _tension(latest: TrendPoint | None) -> dict[str, Any]:
+    if latest is None:
+        return {"model": None, "tension_n": None}
+    summary = {**asdict(latest.tension_n), "map": latest.most_probable_tension_n}
+    return {"model": latest.model, "tension_n": summary}
+
+
+def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:
+    """Those of the latest test that was compared with the baseline in force."""
+    drifts = latest.watched.drifts if latest else ()
+    return [{key: _known(getattr(drift, key)) for key in _SHIFT} for drift in drifts]
 
 
 def _known(value: Any) -> Any:

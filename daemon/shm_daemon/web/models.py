@@ -31,6 +31,13 @@ class Uploaded(BaseModel):
     status_url: str = Field(description="Says how far it has come, once the daemon has taken it.")
 
 
+class TestLink(BaseModel):
+    """A test by its name, and where its page is."""
+
+    name: str
+    page: str
+
+
 class RecordingStatus(BaseModel):
     """A recording and how far it has come."""
 
@@ -41,7 +48,14 @@ class RecordingStatus(BaseModel):
     received_at: datetime
     stage: Literal["received", "identified", "updated", "watched", "done", "refused"]
     hanger: int | None
+    tests: list[TestLink] = Field(description="What came of it so far.")
     reason: dict[str, Any] | None = Field(description="Why it was refused; null where it was not.")
+
+
+class Recordings(BaseModel):
+    """Recordings that were asked for."""
+
+    recordings: list[RecordingStatus]
 
 
 class Quantity(BaseModel):
@@ -91,6 +105,7 @@ class DeliveryState(BaseModel):
     hook: str
     state: str
     attempts: int
+    last_error: str = Field(description="Why the latest attempt failed; empty where none did.")
 
 
 class Acknowledged(BaseModel):
@@ -107,7 +122,9 @@ class AlertState(BaseModel):
     id: int
     hanger: int
     raised_at: datetime
+    test: str
     test_at: datetime
+    kinds: list[str] = Field(description="The rules that raised it.")
     message: str
     acknowledged: Acknowledged | None
     deliveries: list[DeliveryState]
@@ -145,3 +162,95 @@ class Health(BaseModel):
 
     status: Literal["ok", "failing"]
     reasons: list[str]
+
+
+class RefusedFile(BaseModel):
+    """A file in the quarantine, and why it is there."""
+
+    file: str
+    message: str
+    remedy: str
+    at: datetime | None
+
+
+class Operation(BaseModel):
+    """Whether the work flows; `troubles` is empty where it does."""
+
+    troubles: list[str]
+    daemon: str | None = Field(description="Which daemon is active; null where none is.")
+    daemon_seen_seconds_ago: float | None
+    recordings: dict[str, int] = Field(description="How many stand at each stage.")
+    spool: int
+    oldest_waiting_at: datetime | None
+    deliveries: dict[str, int]
+    quarantine: list[RefusedFile] = Field(description="The newest first, at most 100.")
+    quarantined: int
+    disk_free_bytes: int
+    disk_bytes: int
+    version: str
+    python: str
+
+
+class Finding(BaseModel):
+    """What one check of `shm doctor` found."""
+
+    check: str
+    level: Literal["ok", "unknown", "warning", "fault"]
+    found: str
+    remedy: str
+
+
+class Examination(BaseModel):
+    """All checks of `shm doctor`."""
+
+    findings: list[Finding]
+
+
+class Underway(BaseModel):
+    """It is being worked out: ask again after `Retry-After` seconds."""
+
+    message: str
+
+
+class Bounded(BaseModel):
+    """A mean; `low` and `high` bound 90 %."""
+
+    mean: float
+    low: float
+    high: float
+
+
+class HangerAtAGlance(BaseModel):
+    """One hanger as the page of the bridge shows it; null before its first test."""
+
+    hanger: int
+    name: str
+    length_m: float
+    nominal_tension_n: float
+    status: Literal["alert", "watch", "steady", "first"] | None
+    tests: int
+    latest_test: str | None
+    latest_test_at: datetime | None
+    model: str | None
+    tension_n: Bounded | None
+    shift: Bounded | None = Field(
+        description="Of the tension since the baseline, a fraction; null where there is no "
+        "baseline, or the latest test is of it."
+    )
+    called: str = Field(description="Changes called since the baseline; empty where none was.")
+    open_alerts: int
+
+
+class BridgeState(BaseModel):
+    """The whole bridge: `status` is that of the hanger that is worst off."""
+
+    bridge: str
+    status: Literal["alert", "watch", "steady", "first"] | None
+    hangers: list[HangerAtAGlance]
+
+
+class Moved(BaseModel):
+    """What moved over the bridge, in words, and what may explain it."""
+
+    sentence: str
+    explanations: dict[str, float] = Field(description="The probability of each explanation.")

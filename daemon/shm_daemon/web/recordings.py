@@ -17,7 +17,8 @@ from shm.store import Stage, Store, StoredRecording
 from shm_daemon.landing import Incoming, Landed, TooLarge, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import Refused, answers
-from shm_daemon.web.models import RecordingStatus, Uploaded
+from shm_daemon.web.models import Recordings, RecordingStatus, Uploaded
+from shm_daemon.web.test_address import test_page
 
 _PIECE_BYTES = 1 << 20
 _SILENCE_S = 60.0
@@ -134,7 +135,21 @@ def status(
     ],
 ) -> Any:
     """The stage of a recording, and why it was refused where it was."""
-    return _row(_recording(site.store, key))
+    return _row(site.store, _recording(site.store, key))
+
+
+@router.get(
+    "",
+    response_model=Recordings,
+    responses=answers(400, 401, 403, 422, 503),
+    summary="The recording of a checksum",
+)
+def recordings(
+    site: AtSite, _: Reader, sha256: Annotated[str, Query(pattern="^[0-9a-fA-F]{64}$")]
+) -> Any:
+    """One, or none while the file waits in the spool."""
+    found = site.store.recording_of(sha256.lower())
+    return {"recordings": [_row(site.store, found)] if found else []}
 
 
 async def _stream(request: Request, file: Incoming) -> None:
@@ -205,7 +220,15 @@ def _recording(store: Store, key: str) -> StoredRecording:
     return found
 
 
-def _row(recording: StoredRecording) -> dict[str, Any]:
+def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
+    """The tests in force that came of a recording."""
+    if recording.hanger is None:
+        return []
+    names = [test.name for test in store.former_tests(recording.id) if test.superseded_at is None]
+    return [{"name": name, "page": test_page(recording.hanger, name)} for name in names]
+
+
+def _row(store: Store, recording: StoredRecording) -> dict[str, Any]:
     file = recording.file
     return {
         "id": recording.id,
@@ -215,6 +238,7 @@ def _row(recording: StoredRecording) -> dict[str, Any]:
         "received_at": recording.received_at,
         "stage": recording.stage.value,
         "hanger": recording.hanger,
+        "tests": _tests(store, recording),
         "reason": recording.reason,
     }
 

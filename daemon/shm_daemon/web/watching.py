@@ -32,9 +32,14 @@ log = logging.getLogger(__name__)
 )
 def health(site: AtSite) -> Any:
     """Needs no token and tells no secrets: for load balancers and service managers."""
-    reasons = [*_store(site), *_spool(site), *_daemon(site)]
+    reasons = troubles(site)
     found = Health(status="failing" if reasons else "ok", reasons=reasons)
     return JSONResponse(found.model_dump(), 503) if reasons else found
+
+
+def troubles(site: Site) -> list[str]:
+    """Why work stands still; empty where all is well."""
+    return [*_store(site), *_spool(site), *_daemon(site)]
 
 
 @router.get(

@@ -35,8 +35,8 @@ def serve() -> None:
     requests = socket.socket(fileno=0)
     pythons_own()  # found once, for all children
     gc.freeze()
-    requests.sendall(b"+")
     with suppress(ConnectionError):  # it was killed meanwhile
+        requests.sendall(b"+")
         while True:
             message, descriptors, _, _ = socket.recv_fds(requests, _LARGEST_REQUEST, 1)
             if not message:

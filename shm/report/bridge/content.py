@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 
 from shm.report.content import Interval
-from shm.report.summary import Status
-from shm.values import Hanger
+from shm.report.period import Period
+from shm.report.summary import Status, of_nominal
+from shm.values import Drift, Hanger
 from shm.watch.neighbours import BridgePattern
+
+
+@dataclass(frozen=True)
+class Course:
+    """What became of a hanger in the period of the report.
+
+    `change` is that of the tension from the first test of the period to the last, as a fraction;
+    None where it has fewer than two.
+    """
+
+    tests: int = 0
+    alerts: int = 0
+    change: Interval | None = None
 
 
 @dataclass(frozen=True)
 class HangerLine:
     """A hanger as the report of its bridge shows it.
 
-    `tension_n` is that of its latest test, None before the first; `called` says in a few words
-    what was called since its baseline; `open_alerts` counts those that nobody took note of.
+    `tension_n` is that of its latest test, None before the first; `drift` that of its tension
+    since its baseline, None where nothing was compared; `called` says in a few words what was
+    called since; `open_alerts` counts those that nobody took note of. `course` is None without a
+    period.
     """
 
     hanger: Hanger
@@ -25,6 +42,16 @@ class HangerLine:
     tension_n: Interval | None = None
     called: str = ""
     open_alerts: int = 0
+    drift: Drift | None = None
+    test: str = ""
+    model: str = ""
+    course: Course | None = None
+    baseline_tension_n: Interval | None = None
+
+    @property
+    def of_nominal(self) -> Interval | None:
+        """The tension in percent of the nominal one."""
+        return of_nominal(self.tension_n, self.hanger) if self.tension_n else None
 
 
 @dataclass(frozen=True)
@@ -37,6 +64,9 @@ class BridgeReport:
     why_no_pattern: str
     generated_at: datetime
     version: str
+    period: Period | None = None
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def worst(self) -> Status | None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from shm.documents import drift_document
 from shm.report.bridge.content import BridgeReport
-from shm.report.bridge.tables import summary
+from shm.report.bridge.summary import advice, summary
+from shm.report.period import period_json
 from shm.watch.neighbours import BridgePattern
 
 REPORT_SCHEMA = "shm.bridge_report/1"
@@ -24,6 +26,8 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
         "summary": summary(data),
+        "advice": list(advice(data)),
+        "period": period_json(data.period),
         "hangers": [
             {
                 "hanger": line.hanger.id,
@@ -31,13 +35,19 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "status": line.status.name.lower() if line.status else None,
                 "latest": line.latest,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
+                "drift": drift_document(line.drift) if line.drift else None,
+                "test": line.test or None,
+                "model": line.model or None,
                 "called": line.called,
                 "open_alerts": line.open_alerts,
+                "in_period": asdict(line.course) if line.course else None,
             }
             for line in data.hangers
         ],
         "pattern": pattern_json(data.pattern) if data.pattern else None,
         "why_no_pattern": data.why_no_pattern,
+        "lineage": dict(data.lineage),
+        "settings": dict(data.settings),
         "version": data.version,
         "generated_at": data.generated_at,
     }

@@ -1,29 +1,32 @@
-"""The tables and the summary of a bridge: one source for terminal and page."""
+"""The tables of a bridge: one source for terminal, page and paper."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from shm.report import words
-from shm.report.bridge.content import BridgeReport, HangerLine
+from shm.report.bridge.content import BridgeReport, Course, HangerLine
 from shm.report.content import Interval
-from shm.report.summary import Status
+from shm.report.origin import lineage, settings
+from shm.report.shifts import shift_cells
 from shm.report.table import Table
+from shm.values import Drift
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _BAR = 6
-
-
-def summary(data: BridgeReport) -> str:
-    """How many hangers are in which state, what moved over the bridge, what to do."""
-    told = data.pattern.sentence if data.pattern else data.why_no_pattern
-    remarks = data.pattern.remarks if data.pattern else ()
-    return " ".join((f"{_counts(data.hangers)}.", told, *remarks))
+_NOTHING = 0.05
 
 
 def tables(data: BridgeReport, *, bars: bool = False) -> tuple[Table, ...]:
     """All tables that this report can fill; `bars` where there is no figure beside them."""
-    return (_hangers(data), *(pattern_tables(data.pattern, bars=bars) if data.pattern else ()))
+    made = (
+        _hangers(data),
+        _since_baseline(data),
+        _courses(data),
+        *(pattern_tables(data.pattern, bars=bars) if data.pattern else ()),
+        _tests(data),
+        _origin(data),
+        settings(data.settings),
+    )
+    return tuple(table for table in made if table.rows)
 
 
 def pattern_tables(pattern: BridgePattern, *, bars: bool) -> tuple[Table, Table]:
@@ -40,7 +43,8 @@ def shift_table(pattern: BridgePattern, *, bars: bool = False) -> Table:
     headings: tuple[str, ...] = ("shift, kN (90 %)", "shift, % (90 %)", "it has", "test of")
     rows = [_shift(row) for row in pattern.rows]
     rows += [
-        (str(each.hanger), "", "", "not compared", _day(each.time)) for each in pattern.not_compared
+        (str(each.hanger), "not known", "not known", "not compared", _day(each.time))
+        for each in pattern.not_compared
     ]
     note = (
         "Shift of the tension since the baseline at each hanger's latest test, the swing with the "
@@ -82,55 +86,110 @@ def bar(share: float) -> str:
 
 
 def _one_decimal(interval: Interval) -> str:
-    return f"{interval.mean:+.1f} ({interval.low:+.1f} to {interval.high:+.1f})"
+    if max(abs(interval.low), abs(interval.high)) < _NOTHING:
+        return f"0.0 (within {_NOTHING})"
+    return f"{interval.mean:+z.1f} ({interval.low:+z.1f} to {interval.high:+z.1f})"
 
 
 def _hangers(data: BridgeReport) -> Table:
     return Table(
         "Hangers",
         (
-            "hanger", "state", "tension, kN (90 %)", "% of nominal", "called since the baseline",
-            "open alerts", "latest test",
+            "hanger", "state", "tension, kN (90 %)", "% of nominal (90 %)", "open alerts",
+            "latest test",
         ),
         tuple(_hanger(line) for line in data.hangers),
-        note="Tensions with 90 % intervals. Alert: beyond a threshold. Watch: a change was called, "
-        "or a shift beyond a threshold is likelier than not. More: shm report --hanger N.",
+        note="With 90 % intervals. Alert: beyond a threshold. Watch: a change was called, or a "
+        "shift beyond a threshold is likelier than not. More: shm report --hanger N.",
     )  # fmt: skip
 
 
 def _hanger(line: HangerLine) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
+    opened = str(line.open_alerts or "none")
     if line.tension_n is None or line.status is None:
-        return (name, "no test", *[""] * 3, str(line.open_alerts or "none"), "")
-    kilonewtons = words.kilonewtons(line.tension_n)
+        return (name, "no test", "not known", "not known", opened, "none")
+    share = line.of_nominal
     return (
         name,
         line.status.value,
-        f"{words.mean(kilonewtons)} ({words.span(kilonewtons)})",
-        f"{100 * line.tension_n.mean / line.hanger.nominal_tension_n:.1f}"
-        if line.hanger.nominal_tension_n > 0
-        else "no nominal",
-        line.called or "nothing",
-        str(line.open_alerts or "none"),
+        words.with_span(words.kilonewtons(line.tension_n)),
+        words.with_span(share) if share else "no nominal",
+        opened,
         _day(line.latest),
     )
 
 
-def _counts(lines: Sequence[HangerLine]) -> str:
-    counts = [
-        (status.value, [str(line.hanger.id) for line in lines if line.status is status])
-        for status in (*Status, None)
-        if status is not None
-    ]
-    told = [
-        f"{name}: {words.counted(len(ids), 'hanger')}"
-        + (f" ({words.listed(ids)})" if name in (Status.ALERT.value, Status.WATCH.value) else "")
-        for name, ids in counts
-        if ids
-    ]
-    missing = sum(line.status is None for line in lines)
-    told += [f"without a test: {words.counted(missing, 'hanger')}"] if missing else []
-    return "; ".join(told)
+def _since_baseline(data: BridgeReport) -> Table:
+    return Table(
+        "Since the baseline",
+        ("hanger", "shift of the tension", "90 % interval", "probability beyond it", "called"),
+        tuple(
+            (str(line.hanger.id), *_shifted(line.drift), line.called or "nothing")
+            for line in data.hangers
+            if line.drift
+        ),
+        note="Shift of the tension at the latest test, the swing with the temperature taken out; "
+        "how probable it is that it lies beyond the hanger's threshold; what was called since. "
+        "Hangers that have nothing but their baseline are left out.",
+    )
+
+
+def _shifted(drift: Drift) -> tuple[str, str, str]:
+    _, size, span, threshold, probability = shift_cells(drift)
+    return (size, span or "about none", f"{probability} ({threshold})")
+
+
+def _courses(data: BridgeReport) -> Table:
+    """What lay in the period; empty where the report has none."""
+    return Table(
+        f"In the period {data.period}",
+        ("hanger", "tests", "alerts", "change of the tension, % (90 %)"),
+        tuple(
+            _course(line, line.course)
+            for line in data.hangers
+            if line.course and (line.course.tests or line.course.alerts)
+        ),
+        note="Change from the first test of the period to the last, by these two alone, taken as "
+        "independent; the swing with the temperature is in it. Hangers without a test in the "
+        "period are left out.",
+    )
+
+
+def _course(line: HangerLine, course: Course) -> tuple[str, ...]:
+    change = course.change
+    return (
+        str(line.hanger.id),
+        str(course.tests or "none"),
+        str(course.alerts or "none"),
+        words.with_span(change.scaled(100), signed=True) if change else "fewer than two tests",
+    )
+
+
+def _tests(data: BridgeReport) -> Table:
+    return Table(
+        "Tests that these tensions come from",
+        ("hanger", "latest test", "taken", "model class"),
+        tuple(
+            (
+                str(line.hanger.id),
+                line.test,
+                words.moment(line.latest),
+                words.model_class(line.model),
+            )
+            for line in data.hangers
+            if line.test
+        ),
+        note="Their files and checksums: shm report --hanger N.",
+    )
+
+
+def _origin(data: BridgeReport) -> Table:
+    facts = {
+        **lineage(data.lineage),
+        "report made": f"{words.moment(data.generated_at)} by shm version {data.version}",
+    }
+    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
 
 
 def _day(time: object) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from shm.report.bridge.content import BridgeReport
-from shm.report.bridge.tables import summary, tables
+from shm.report.bridge.summary import summary
+from shm.report.bridge.tables import tables
 from shm.report.table import headed, laid_out
 
 
 def bridge_text(data: BridgeReport) -> str:
     """The report of a bridge: the summary, then the tables."""
     verdict = f": {data.worst.value}" if data.worst else ""
-    head = headed(f"{data.bridge}{verdict}", summary(data))
+    within = f", {data.period}" if data.period else ""
+    head = headed(f"{data.bridge}{within}{verdict}", summary(data))
     return "\n".join((head, *(laid_out(table) for table in tables(data, bars=True))))

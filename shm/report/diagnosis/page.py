@@ -35,6 +35,15 @@ def diagnosis_page(sheet: DiagnosisSheet) -> str:
 
 def section(sheet: DiagnosisSheet) -> dict[str, Any]:
     """What the templates show of a diagnosis."""
+    drawings = [
+        (item, Markup(item.svg()))  # noqa: S704
+        for item in diagnosis_figures(sheet)
+    ]
+    return {**in_words(sheet), "illustrations": drawings}
+
+
+def in_words(sheet: DiagnosisSheet) -> dict[str, Any]:
+    """The same without its drawings."""
     found = answer(sheet.diagnosis)
     return {
         "answer": found.value,
@@ -43,10 +52,6 @@ def section(sheet: DiagnosisSheet) -> dict[str, Any]:
         "consequences": consequences(sheet.diagnosis),
         "facts": _facts(sheet),
         "remarks": sheet.diagnosis.remarks,
-        "illustrations": [
-            (item, Markup(item.svg()))  # noqa: S704
-            for item in diagnosis_figures(sheet)
-        ],
         "answers": answers(sheet),
         "evidence": evidence(sheet),
     }

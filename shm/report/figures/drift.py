@@ -266,7 +266,7 @@ STATES = Member("drift", "States over time", _draw, _caption, _alt)
 FIGURE = Member[HangerReport](
     STATES.name,
     STATES.title,
-    lambda data: _draw(data.states),
-    lambda data: _caption(data.states),
-    lambda data: _alt(data.states),
+    lambda data: _draw(data.states.within(data.period)),
+    lambda data: _caption(data.states.within(data.period)),
+    lambda data: _alt(data.states.within(data.period)),
 )

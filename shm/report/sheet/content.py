@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
 from typing import ClassVar
 
 from shm.identify import Dropped, Hit, Identification
@@ -15,7 +16,8 @@ class TestSheet:
     """One identified test as a person checks it.
 
     `records` are those it came from, in the order in which they were given; empty where they are
-    not at hand. `band_hz` is where modes were looked for; None where nobody says.
+    not at hand. `band_hz` is where modes were looked for; None where nobody says. `lineage` names
+    what it was made from, as in a hanger's report; who made the sheet when is empty where unsaid.
     """
 
     __test__: ClassVar[bool] = False  # Told to pytest, which takes every `Test...` for a test.
@@ -24,6 +26,11 @@ class TestSheet:
     records: Sequence[Recording | FrequencyResponse] = ()
     hanger: Hanger | None = None
     band_hz: tuple[float, float] | None = None
+    bridge: str = ""
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    generated_at: datetime | None = None
+    version: str = ""
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

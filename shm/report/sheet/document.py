@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from shm import documents
@@ -27,6 +28,10 @@ def test_json(sheet: TestSheet) -> dict[str, Any]:
         "hits": [asdict(hit) for hit in found.hits],
         "dropped": [asdict(each) for each in found.dropped],
         "notes": list(found.notes),
-        "records": [record.source for record in sheet.records],
+        "records": [Path(record.source).name for record in sheet.records],
+        "lineage": dict(sheet.lineage),
+        "settings": dict(sheet.settings),
+        "generated_at": sheet.generated_at,
+        "version": sheet.version or None,
         "band_hz": list(sheet.band_hz) if sheet.band_hz else None,
     }

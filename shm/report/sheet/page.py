@@ -7,14 +7,15 @@ from markupsafe import Markup
 from shm.report import words
 from shm.report.figures.member import drawn
 from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import MEMBERS
+from shm.report.sheet.figures import PAGE_MEMBERS
 from shm.report.sheet.summary import HEADLINES, name, summary
 from shm.report.sheet.tables import details, results
 from shm.report.template import ENVIRONMENT
 from shm.report.verdicts import overall
 from shm.values import Verdict
 
-_STYLES: dict[Verdict, str] = {
+CLOSING = "Intervals are central 90 %; standard deviations are of one test; times are UTC."
+STYLES: dict[Verdict, str] = {
     "good": "steady",
     "warning": "watch",
     "refused": "alert",
@@ -25,21 +26,25 @@ _STYLES: dict[Verdict, str] = {
 def test_page(sheet: TestSheet) -> str:
     """The sheet of one test: readable on screen (light or dark), on paper, by ear."""
     verdict = overall(sheet.identification.quality)
-    # The quality stands as a table of words here, which can be searched and read aloud.
-    figures = drawn([member for member in MEMBERS if member.name != "quality"], sheet)
+    figures = drawn(PAGE_MEMBERS, sheet)
     return ENVIRONMENT.get_template("sheet.html.j2").render(
         title=name(sheet),
         verdict=HEADLINES[verdict],
-        style=_STYLES[verdict],
+        style=STYLES[verdict],
         summary=summary(sheet),
-        facts=_facts(sheet),
+        facts=facts(sheet),
         illustrations=[(item, Markup(item.svg())) for item in figures],  # noqa: S704
         results=results(sheet),
         details=details(sheet),
+        bridge=sheet.bridge,
+        made=f"Made {words.moment(sheet.generated_at)} by shm {sheet.version}. "
+        if sheet.generated_at
+        else "",
+        closing=CLOSING,
     )
 
 
-def _facts(sheet: TestSheet) -> tuple[tuple[str, str, str], ...]:
+def facts(sheet: TestSheet) -> tuple[tuple[str, str, str], ...]:
     """The figures on top: what, value, what stands beside it."""
     test, hits = sheet.identification.test, sheet.hits
     planes = {mode.plane for mode in sheet.modes}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from shm.report import words
+from shm.report.origin import added_mass, lineage, settings
 from shm.report.quality import quality_table
 from shm.report.sheet.content import TestSheet
 from shm.report.table import Table
@@ -18,7 +20,8 @@ def results(sheet: TestSheet) -> tuple[Table, ...]:
 
 def details(sheet: TestSheet) -> tuple[Table, ...]:
     """How it came about, as far as there is any of it."""
-    return _filled((notes(sheet), hits(sheet), dropped(sheet), conditions(sheet)))
+    made = (notes(sheet), hits(sheet), dropped(sheet), conditions(sheet), settings(sheet.settings))
+    return _filled(made)
 
 
 def _filled(tables: tuple[Table, ...]) -> tuple[Table, ...]:
@@ -84,7 +87,7 @@ def hits(sheet: TestSheet) -> Table:
         tuple(
             (
                 str(number),
-                records[hit.record].source if hit.record < len(records) else str(hit.record + 1),
+                _file(records[hit.record]) if hit.record < len(records) else str(hit.record + 1),
                 f"{hit.start_s:.3f}",
                 words.plain(hit.peak_force_n, 4),
                 "yes" if hit.used else f"no: {hit.reason}",
@@ -107,10 +110,11 @@ def conditions(sheet: TestSheet) -> Table:
         "time": words.moment(test.time),
         "temperature": words.temperature(test.temperature_c),
         "hit level over reference level": words.plain(test.amplitude),
-        "added mass": _added_mass(sheet),
+        "added mass": added_mass(test),
         "band": _band(sheet),
         "exponential window on the responses": _window(sheet),
         "records": _records(sheet),
+        **lineage(sheet.lineage),
     }
     return Table("Conditions", ("what", "value"), tuple(facts.items()))
 
@@ -122,11 +126,6 @@ def _hanger(sheet: TestSheet) -> str:
     hanger = sheet.hanger
     called = words.hanger_name(hanger.id, hanger.name)
     return f"{called}, {hanger.length_m:g} m, nominal tension {hanger.nominal_tension_n / 1e3:g} kN"
-
-
-def _added_mass(sheet: TestSheet) -> str:
-    mass = sheet.identification.test.added_mass
-    return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end" if mass else "none"
 
 
 def _band(sheet: TestSheet) -> str:
@@ -148,5 +147,10 @@ def _records(sheet: TestSheet) -> str:
 
 def _record(record: Recording | FrequencyResponse) -> str:
     if isinstance(record, Recording):
-        return f"{record.source}, {record.duration_s:.4g} s at {record.sampling_rate_hz:g} Hz"
-    return f"{record.source}, {len(record.frequency_hz)} lines"
+        return f"{_file(record)}, {record.duration_s:.4g} s at {record.sampling_rate_hz:g} Hz"
+    return f"{_file(record)}, {len(record.frequency_hz)} lines"
+
+
+def _file(record: Recording | FrequencyResponse) -> str:
+    """The file's name: where it lay is nothing for a report."""
+    return Path(record.source).name

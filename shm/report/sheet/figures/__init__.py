@@ -21,6 +21,8 @@ MEMBERS: tuple[Member[TestSheet], ...] = (
     SHAPES,
     DAMPING,
 )
+# The quality stands there as a table of words, which can be searched and read aloud.
+PAGE_MEMBERS = tuple(member for member in MEMBERS if member is not QUALITY)
 
 
 def test_figures(sheet: TestSheet) -> tuple[Illustration, ...]:

@@ -1,0 +1,126 @@
+"""The frame around every page: its templates, its navigation, and what went wrong as a page."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as version_of
+from pathlib import Path
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse
+from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader, StrictUndefined
+
+import shm
+from shm.errors import ShmError
+from shm.report import words
+from shm.report.figures.style import PALETTE
+from shm.report.template import ENVIRONMENT as OF_REPORTS
+from shm_daemon.web.site import Site
+
+STATIC = Path(__file__).with_name("static")
+"""Our style sheets and scripts."""
+
+NAVIGATION = (
+    ("/", "Bridge"),
+    ("/alerts", "Alerts"),
+    ("/upload", "Upload"),
+    ("/operation", "Operation"),
+)
+
+
+def page(request: Request, template: str, *, status: int = 200, **content: Any) -> HTMLResponse:
+    """A page in the frame; `content` is what its template needs.
+
+    Whoever may read sees the navigation, a stranger none: `access.reading` notes who asks.
+    """
+    visitor = getattr(request.state, "visitor", None)
+    site = request.app.state.site
+    assert isinstance(site, Site)
+    text = _environment().get_template(template).render(
+        visitor=visitor,
+        bridge=site.workspace.bridge.name if visitor else "",
+        open_alerts=_open_alerts(site) if visitor else None,
+        here=request.url.path,
+        **content,
+    )  # fmt: skip
+    return HTMLResponse(text, status)
+
+
+def problem(
+    request: Request, status: int, message: str, remedy: str, headers: dict[str, str] | None
+) -> HTMLResponse:
+    """What went wrong, for a person: a stranger is asked to sign in."""
+    template = "sign_in.html.j2" if status == 401 else "problem.html.j2"
+    found = page(
+        request, template, status=status, message=message, remedy=remedy, next=_address(request)
+    )
+    found.headers.update(headers or {})
+    return found
+
+
+def for_a_person(request: Request) -> bool:
+    """Whether a page was asked for, not a document: errors are told in kind."""
+    path, accepted = request.url.path, request.headers.get("accept", "")
+    return "text/html" in accepted and not path.startswith("/api/")
+
+
+def asset(name: str) -> str:
+    """The address of a file of `static/`; it changes with the file, so that it may be kept."""
+    return f"/static/{name}?v={_checksum(name)}"
+
+
+def plotly_address() -> str:
+    """The address of plotly's script, of the version that is installed."""
+    try:
+        return f"/static/plotly.js?v={version_of('plotly')}"
+    except PackageNotFoundError:
+        return "/static/plotly.js"
+
+
+@cache
+def _checksum(name: str) -> str:
+    return hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]
+
+
+@cache
+def _environment() -> Environment:
+    """Our templates; those of the reports stand behind `report/`."""
+    assert OF_REPORTS.loader is not None
+    made = Environment(
+        loader=ChoiceLoader(
+            [
+                PackageLoader("shm_daemon.web", "templates"),
+                PrefixLoader({"report": OF_REPORTS.loader}),
+            ]
+        ),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.globals.update(
+        asset=asset,
+        moment=words.moment,
+        navigation=NAVIGATION,
+        plotly_address=plotly_address,
+        palette=" ".join(f"{name}={colour}" for name, colour in PALETTE.items()),
+        version=shm.__version__,
+    )
+    return made
+
+
+def _open_alerts(site: Site) -> int | None:
+    """None where the store cannot be asked: the page itself says so."""
+    try:
+        return site.store.alert_counts()[0]
+    except ShmError:
+        return None
+
+
+def _address(request: Request) -> str:
+    """Where a person wanted to go."""
+    query = f"?{request.url.query}" if request.url.query else ""
+    return request.url.path + query if request.method == "GET" else "/"

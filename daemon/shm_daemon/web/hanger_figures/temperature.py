@@ -1,0 +1,73 @@
+"""Tension over the temperature of the tests."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from shm.report import words
+from shm.store import TrendPoint
+from shm_daemon.web.hanger_figures import over_time
+from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm_daemon.web.hanger_view import HangerView
+from shm_daemon.web.plotting import colour, figure
+
+_FEWEST = 2
+
+
+def _known(view: HangerView) -> list[TrendPoint]:
+    """Tests with a temperature, thinned by their tension where there are very many."""
+    known = [point for point in view.trend if math.isfinite(point.temperature_c)]
+    means = np.array([point.tension_n.mean for point in known])
+    temperatures = np.array([point.temperature_c for point in known])
+    return [known[i] for i in over_time.places(means, temperatures).tolist()] if known else []
+
+
+def _draw(view: HangerView) -> dict[str, Any]:
+    known = _known(view)
+    parts = (
+        (known[:-1], "earlier tests", "blue", "circle"),
+        (known[-1:], "latest", "orange", "diamond"),
+    )
+    traces = [_trace(*part) for part in parts]
+    return figure(traces, "temperature (°C)", "tension (kN)", hovermode="closest")
+
+
+def _trace(points: list[TrendPoint], name: str, hue: str, symbol: str) -> over_time.Trace:
+    band = over_time.scaled(over_time.band_of([point.tension_n for point in points]), 1e-3)
+    labels = [f"{point.test}, {point.time:%Y-%m-%d}" for point in points]
+    made = over_time.dots_trace([point.time for point in points], band, labels, name, hue)
+    marker = {"color": colour(hue), "size": 8, "symbol": symbol}
+    return {**made, "x": [point.temperature_c for point in points], "marker": marker}
+
+
+def _caption(view: HangerView) -> str:
+    without = len(view.trend) - sum(math.isfinite(point.temperature_c) for point in view.trend)
+    left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
+    return (
+        "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
+        f"is lies along one line; what leaves it has another reason than the weather.{left}"
+    )
+
+
+def _alt(view: HangerView) -> str:
+    known = _known(view)
+    temperatures = [point.temperature_c for point in known]
+    means = [point.tension_n.mean / 1e3 for point in known]
+    return (
+        f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
+        f"{max(temperatures):.1f} °C: {min(means):.1f} to {max(means):.1f} kN."
+    )
+
+
+FIGURE = HangerFigure(
+    "temperature",
+    "Tension and temperature",
+    "trends",
+    lambda view: len(_known(view)) >= _FEWEST,
+    _draw,
+    _caption,
+    _alt,
+)

@@ -1,0 +1,60 @@
+"""The tests of a hanger as lines of a table, in the words of the report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from shm.report import Interval, words
+from shm.store import TestRow, TrendPoint
+from shm_daemon.web.hanger_view import HangerView
+from shm_daemon.web.test_address import test_page
+
+
+@dataclass(frozen=True)
+class TestLine:
+    """One test; `point` is None before it has been through updating."""
+
+    __test__ = False  # no test, though named so
+
+    row: TestRow
+    point: TrendPoint | None
+
+    @property
+    def id(self) -> int:
+        return self.row.id
+
+    @property
+    def name(self) -> str:
+        return self.row.name
+
+    @property
+    def address(self) -> str:
+        return test_page(self.row.hanger, self.row.name)
+
+    @property
+    def time(self) -> str:
+        """Its own or, where it tells none, that of its receipt."""
+        received = self.point is not None and self.point.taken_at is None
+        return words.moment(self.row.time) + (" (received)" if received else "")
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Temperature, model, tension and its interval."""
+        if self.point is None:
+            return ("", f"on its way: {self.row.stage.value}", "", "")
+        tension = words.kilonewtons(Interval.of_summary(self.point.tension_n))
+        known = math.isfinite(self.point.temperature_c)
+        return (
+            words.temperature(self.point.temperature_c) if known else "not recorded",
+            words.model_class(self.point.model),
+            words.mean(tension),
+            words.span(tension),
+        )
+
+
+def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
+    """So many tests, the newest first; `before` is the number of the test to go on after."""
+    points = {point.test_id: point for point in view.trend}
+    rows = view.store.test_rows(view.hanger.id, limit, before)
+    return [TestLine(row, points.get(row.id)) for row in rows]

@@ -1,0 +1,128 @@
+"""What the page of one hanger and its figures show: each part is read when it is first wanted."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from shm.errors import ShmError
+from shm.pipeline import utc_now
+from shm.pipeline.reporting import hanger_now, hanger_states
+from shm.report import DiagnosisSheet, HangerReport
+from shm.report.states import NOTHING_WATCHED, StatesOverTime
+from shm.store import (
+    Baseline,
+    BaselineGlance,
+    HangerEvent,
+    Store,
+    StoredWatch,
+    TrendPoint,
+    Workspace,
+)
+from shm.values import Hanger
+from shm_daemon.web.working_out import Workshop
+
+_BYTES_A_TEST = 1_000
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkedOutStates:
+    """The states over time of a hanger, worked out aside."""
+
+    states: StatesOverTime
+
+    @property
+    def size_bytes(self) -> int:
+        return _BYTES_A_TEST * (1 + len(self.states.times))
+
+
+@dataclass(frozen=True)
+class StatesOrder:
+    """States over time to be worked out: of which hanger, against what, over which tests.
+
+    They take a second and load what takes longer, so that no request can wait for them.
+    """
+
+    folder: Path
+    hanger: Hanger
+    baseline_id: int
+    model: str
+    tests: tuple[int, ...]
+    false_call_years: float
+
+    def make(self) -> WorkedOutStates:
+        """Runs in a process of its own: the workspace is opened anew."""
+        workspace = Workspace.open(self.folder)
+        with workspace.store() as store:
+            baseline = store.baseline(self.hanger.id, self.model)
+            return WorkedOutStates(hanger_states(workspace, store, self.hanger, baseline))
+
+
+class HangerView:
+    """One hanger as it stands in the store; what is asked for twice is read once."""
+
+    def __init__(self, workspace: Workspace, store: Store, hanger: Hanger, workshop: Workshop[Any]):
+        self.workspace, self.store, self.hanger = workspace, store, hanger
+        self._workshop = workshop
+
+    @cached_property
+    def trend(self) -> tuple[TrendPoint, ...]:
+        """One point a test that has been through updating, the oldest first."""
+        return self.store.trend(self.hanger)
+
+    @cached_property
+    def baseline(self) -> BaselineGlance | None:
+        return self.store.baselines_in_force([self.hanger]).get(self.hanger.id)
+
+    @cached_property
+    def events(self) -> tuple[HangerEvent, ...]:
+        return self.store.hanger_events(self.hanger.id)
+
+    @cached_property
+    def calls(self) -> tuple[StoredWatch, ...]:
+        """The tests at which a change stood as called."""
+        return self.store.called_watches(self.hanger.id)
+
+    @cached_property
+    def report(self) -> HangerReport | None:
+        """What the report says of the latest test; None before the first is through."""
+        if not self.trend:
+            return None
+        return hanger_now(self.workspace, self.store, self.hanger, self.trend, utc_now())
+
+    @cached_property
+    def sheet(self) -> DiagnosisSheet | None:
+        """The latest diagnosis of the gap."""
+        stored = self.store.latest_diagnosis(self.hanger.id)
+        if stored is None:
+            return None
+        return DiagnosisSheet(stored.diagnosis, self.hanger, self.workspace.bridge.name)
+
+    @cached_property
+    def states(self) -> StatesOverTime | None:
+        """The states over time; None while they are worked out, empty where there are none."""
+        if self.baseline is None:
+            return NOTHING_WATCHED
+        try:
+            made = self._workshop.wanted(self._order(self.baseline))
+        except ShmError as error:
+            log.warning("states over time of hanger %d: %s", self.hanger.id, error)
+            return NOTHING_WATCHED
+        return None if made is None else made.states
+
+    def _order(self, baseline: BaselineGlance) -> StatesOrder:
+        stored = self.store.baseline(self.hanger.id, baseline.model)
+        assert isinstance(stored, Baseline)
+        return StatesOrder(
+            folder=self.workspace.folder,
+            hanger=self.hanger,
+            baseline_id=baseline.id,
+            model=baseline.model,
+            tests=tuple(each.id for each in self.store.watched_since(stored)),
+            false_call_years=self.workspace.settings.false_call_years,
+        )

@@ -1,0 +1,159 @@
+"""The page of one hanger: how it stands, how it went, what the model misses, its tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+
+from shm.report import HangerReport, Table, status, summary, words
+from shm.report import tables as report_tables
+from shm.report.diagnosis.page import in_words
+from shm.report.diagnosis.part import how_to_diagnose
+from shm.report.facts import facts
+from shm.report.states import called_words
+from shm.report.temperatures import temperature_table
+from shm.store import EventKind, Workspace
+from shm.values import Hanger
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.frame import page
+from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
+from shm_daemon.web.hanger_tests import lines_before
+from shm_daemon.web.hanger_view import HangerView
+from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.working_out import workshop_of
+
+router = APIRouter(include_in_schema=False)
+
+_LATEST_TESTS = 10
+_TESTS_A_PAGE = 100
+_LATEST_EVENTS = 20
+_EVENTS = {
+    EventKind.BASELINE: "baseline set",
+    EventKind.ADOPTED: "effect adopted",
+    EventKind.UNDONE: "adoption undone",
+    EventKind.ACKNOWLEDGED: "alert acknowledged",
+}
+_TABLES = (
+    report_tables.tension,
+    report_tables.drift,
+    report_tables.frequencies,
+    report_tables.parameters,
+    report_tables.models,
+    report_tables.quality,
+)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A figure as the page refers to it."""
+
+    title: str
+    address: str
+    caption: str
+    height_px: int
+    is_wide: bool
+
+
+@router.get("/hangers/{hanger_id}")
+def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTMLResponse:
+    """Everything known of a hanger; its figures are fetched as they come into view."""
+    one = described(site.workspace, hanger_id)
+    view = HangerView(site.workspace, site.store, one, workshop_of(request))
+    rows = lines_before(view, _LATEST_TESTS + 1)
+    common: dict[str, Any] = {
+        "name": words.hanger_name(one.id, one.name),
+        "hanger": one,
+        "beside": _beside(site.workspace, one),
+        "tests": rows[:_LATEST_TESTS],
+        "has_more": len(rows) > _LATEST_TESTS,
+    }
+    if view.report is None:
+        return page(request, "hanger_untested.html.j2", **common)
+    return page(request, "hanger.html.j2", **common, **_content(view, view.report))
+
+
+@router.get("/hangers/{hanger_id}/tests")
+def all_tests(
+    request: Request,
+    site: AtSite,
+    _: Reader,
+    hanger_id: Number,
+    before: Annotated[int | None, Query(ge=0, le=2**31 - 1)] = None,
+) -> HTMLResponse:
+    """All tests of a hanger, the newest first, some a page."""
+    one = described(site.workspace, hanger_id)
+    view = HangerView(site.workspace, site.store, one, workshop_of(request))
+    rows = lines_before(view, _TESTS_A_PAGE + 1, before)
+    return page(
+        request,
+        "hanger_tests.html.j2",
+        name=words.hanger_name(one.id, one.name),
+        hanger=one,
+        tests=rows[:_TESTS_A_PAGE],
+        is_first=before is None,
+        older=rows[_TESTS_A_PAGE - 1].id if len(rows) > _TESTS_A_PAGE else None,
+    )
+
+
+def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
+    found = status(report)
+    *_, origin = report_tables.tables(report)
+    return {
+        "status_word": found.value,
+        "style": found.name.lower(),
+        "summary": summary(report),
+        "facts": facts(report),
+        "is_called": report.is_called,
+        "charts": {part: _charts(view, part) for part in ("trends", "model", "gap")},
+        "tables": _tables(view, report),
+        "alerts": report_tables.alerts(report),
+        "events": _events(view),
+        "gap_watch": report.gap_watch,
+        "diagnosis": in_words(view.sheet) if view.sheet else None,
+        "how_to_diagnose": how_to_diagnose(report),
+        "origin": origin,
+    }
+
+
+def _charts(view: HangerView, part: str) -> list[Chart]:
+    return [_chart(view, each) for each in FIGURES if each.part == part and each.is_there(view)]
+
+
+def _chart(view: HangerView, figure: HangerFigure) -> Chart:
+    address = f"/api/hangers/{view.hanger.id}/figures/{figure.name}"
+    return Chart(figure.title, address, figure.caption(view), figure.height_px, figure.is_wide)
+
+
+def _tables(view: HangerView, report: HangerReport) -> list[Table]:
+    made = [make(report) for make in _TABLES]
+    if view.states is not None:
+        made.insert(2, temperature_table(view.states))
+    return [table for table in made if table.rows]
+
+
+def _events(view: HangerView) -> Table:
+    """What people did and what the watch called, the latest first."""
+    done = [(e.at, _EVENTS[e.kind], e.who, e.why) for e in view.events if e.kind in _EVENTS]
+    called = [
+        (call.watched.time, "change called", "the watch", called_words(call.watched.change))
+        for call in view.calls
+    ]
+    rows = sorted([*done, *called], key=lambda row: row[0], reverse=True)
+    return Table(
+        "What was set, adopted and called, latest first",
+        ("time", "what", "by", "why"),
+        tuple((words.moment(at), *rest) for at, *rest in rows[:_LATEST_EVENTS]),
+        note=words.some(min(len(rows), _LATEST_EVENTS), len(rows), "events").strip(),
+    )
+
+
+def _beside(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
+    """The hangers before and after it in the description."""
+    order: Sequence[Hanger] = workspace.bridge.hangers
+    place = [each.id for each in order].index(hanger.id)
+    before = [("previous", order[place - 1])] if place > 0 else []
+    return before + [("next", each) for each in order[place + 1 : place + 2]]

@@ -1,0 +1,247 @@
+"""The page of operation: whether the work flows, what was refused, what `shm doctor` says."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse
+
+import shm
+from shm.documents import parse_time
+from shm.errors import ShmError
+from shm.pipeline import utc_now
+from shm.report import Table, words
+from shm.store import DeliveryState, Stage, Workspace
+from shm_daemon.doctor import Finding, Level, examine
+from shm_daemon.doctor.contract import told
+from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.spool import scan
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.faults import answers
+from shm_daemon.web.frame import page
+from shm_daemon.web.hangers import quarantined
+from shm_daemon.web.models import Examination, Operation, Underway
+from shm_daemon.web.site import Site
+from shm_daemon.web.watching import troubles
+from shm_daemon.web.working_out import workshop_of
+
+router = APIRouter(tags=["operation"])
+
+_SHOWN = 100
+_FRESH_S = 300
+_AGAIN_S = 2
+_BEING_LOOKED = {"message": "All is being looked at …"}
+_MARKS = {
+    Level.OK: "good",
+    Level.UNKNOWN: "unknown",
+    Level.WARNING: "warning",
+    Level.FAULT: "refused",
+}
+_STAGES = {
+    "received": "taken in, not identified yet",
+    "identified": "identified, wait for the update (or for enough tests for a baseline)",
+    "updated": "updated, wait for the watch",
+    "watched": "watched, wait for their alerts to be sent",
+    "done": "through",
+    "refused": "refused",
+}
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What the checks found."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def size_bytes(self) -> int:
+        return sum(len(each.found) + len(each.remedy) + 200 for each in self.findings)
+
+
+@dataclass(frozen=True)
+class Examine:
+    """An order to look at everything, good for some minutes: a large store takes seconds."""
+
+    folder: Path
+    minutes: int
+
+    def make(self) -> Examined:
+        return Examined(examine(self.folder, utc_now()))
+
+
+@router.get("/operation", include_in_schema=False)
+def operation_page(request: Request, site: AtSite, _: Reader) -> Response:
+    """Everything an operator asks first, and the full examination as soon as it is there."""
+    state = _operation(site)
+    return page(
+        request,
+        "health.html.j2",
+        state=state,
+        facts=_facts(state),
+        stages=_stages(state["recordings"]),
+        examination=_examination(request, site),
+    )
+
+
+@router.get("/operation/examination", include_in_schema=False)
+def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
+    """The examination alone, for a page that is shown already."""
+    found = _examination(request, site)
+    if found is None:
+        return _underway()
+    return page(request, "examination.html.j2", examination=found)
+
+
+@router.get(
+    "/api/operation",
+    response_model=Operation,
+    responses=answers(400, 401, 403, 503),
+    summary="Whether the work flows",
+)
+def operation(site: AtSite, _: Reader) -> Any:
+    """Daemon, queue, quarantine, disk and versions."""
+    return _operation(site)
+
+
+@router.get(
+    "/api/operation/examination",
+    response_model=Examination,
+    responses={202: {"model": Underway}, **answers(400, 401, 403, 503)},
+    summary="All checks of `shm doctor`",
+)
+def examination(request: Request, site: AtSite, _: Reader) -> Any:
+    """Made anew every five minutes at most; 202 while it is being made."""
+    found = _examined(request, site)
+    return _underway() if found is None else {"findings": [asdict(each) for each in found]}
+
+
+def _operation(site: Site) -> dict[str, Any]:
+    workspace, store = site.workspace, site.store
+    disk = shutil.disk_usage(workspace.folder)
+    return {
+        "troubles": troubles(site),
+        "daemon": workspace.holder(),
+        "daemon_seen_seconds_ago": seconds_since_beat(workspace),
+        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
+        "spool": len(scan(workspace.spool)),
+        "oldest_waiting_at": store.oldest_waiting(),
+        "deliveries": {state.value: n for state, n in store.delivery_counts().items()},
+        "quarantine": _refused(workspace),
+        "quarantined": quarantined(workspace),
+        "disk_free_bytes": disk.free,
+        "disk_bytes": disk.total,
+        "version": shm.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def _refused(workspace: Workspace) -> list[dict[str, Any]]:
+    """The newest first."""
+    reasons = workspace.quarantine.folder.glob("*.reason.json")
+    newest = sorted(((_modified_ns(path), path) for path in reasons), reverse=True)[:_SHOWN]
+    return [_reason(path) for _, path in newest]
+
+
+def _reason(path: Path) -> dict[str, Any]:
+    """What is written beside a refused file, as far as it can be read."""
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        where = f" (line {said['line']})" if said["line"] else ""
+        return {
+            "file": f"{said['file']}{where}",
+            "message": str(said["message"]),
+            "remedy": str(said["remedy"]),
+            "at": parse_time(said["time"]),
+        }
+    except (OSError, ValueError, KeyError, TypeError):
+        name = path.name.removesuffix(".reason.json")
+        unread = "Its reason cannot be read."
+        return {"file": name, "message": unread, "remedy": "See the quarantine.", "at": None}
+
+
+def _modified_ns(path: Path) -> int:
+    try:
+        return path.stat().st_mtime_ns
+    except FileNotFoundError:  # taken away since it was listed
+        return 0
+
+
+def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
+    seen_s, counts = state["daemon_seen_seconds_ago"], state["recordings"]
+    ended = counts[Stage.DONE] + counts[Stage.REFUSED]
+    under_way = sum(counts.values()) - ended
+    owed = state["deliveries"]
+    return [
+        (
+            "Daemon",
+            "active" if state["daemon"] else "none active",
+            f"last seen {_ago(seen_s)} ago" if seen_s is not None else "never seen here",
+        ),
+        (
+            "Waiting",
+            f"{state['spool']} in the spool, {under_way} stored",
+            _since(state["oldest_waiting_at"]),
+        ),
+        (
+            "Deliveries",
+            f"{owed[DeliveryState.WAITING]} waiting",
+            f"{owed[DeliveryState.GIVEN_UP]} given up, {owed[DeliveryState.DELIVERED]} delivered",
+        ),
+        (
+            "Disk",
+            f"{state['disk_free_bytes'] / 1e9:.1f} GB free",
+            f"of {state['disk_bytes'] / 1e9:.0f} GB",
+        ),
+        ("Version", f"shm {state['version']}", f"Python {state['python']}"),
+    ]  # fmt: skip
+
+
+def _ago(seconds: float) -> str:
+    return told(timedelta(seconds=seconds))
+
+
+def _since(oldest: datetime | None) -> str:
+    return f"the oldest since {words.moment(oldest)}" if oldest else "nothing stored waits"
+
+
+def _stages(counts: dict[str, int]) -> Table:
+    rows = tuple((name, str(n), _STAGES[name]) for name, n in counts.items())
+    return Table("Recordings by stage", ("stage", "recordings", "what that means"), rows)
+
+
+def _examination(request: Request, site: Site) -> Table | None:
+    found = _examined(request, site)
+    return None if found is None else _findings(found)
+
+
+def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
+    order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
+    try:
+        found = workshop_of(request).wanted(order)
+    except ShmError as error:
+        return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
+    return None if found is None else found.findings
+
+
+def _findings(findings: Sequence[Finding]) -> Table:
+    order = list(Level)
+    worst_first = sorted(findings, key=lambda each: order.index(each.level), reverse=True)
+    return Table(
+        "What `shm doctor` finds",
+        ("check", "it is", "found", "what to do"),
+        tuple((each.check, each.level.value, each.found, each.remedy) for each in worst_first),
+        marks=tuple(_MARKS[each.level] for each in worst_first),
+        note="Made anew every five minutes at most; paths are those of the bridge's computer.",
+    )
+
+
+def _underway() -> JSONResponse:
+    return JSONResponse(_BEING_LOOKED, 202, {"Retry-After": str(_AGAIN_S)})

@@ -1,0 +1,155 @@
+"""The page of one test: its modes and whether to trust them, its figures, where it comes from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse
+
+from shm.errors import NothingThere
+from shm.report import words
+from shm.report.content import Interval
+from shm.report.sheet import tables
+from shm.report.sheet.spectra import shown_points
+from shm.report.sheet.summary import HEADLINES, name
+from shm.report.table import Table
+from shm.report.verdicts import overall
+from shm.values import ResponsePoint, Verdict
+from shm_daemon.web.access import Reader
+from shm_daemon.web.frame import page
+from shm_daemon.web.test_address import test_json, test_page
+from shm_daemon.web.test_figures.contract import TestFigure
+from shm_daemon.web.test_figures.response import point_name
+from shm_daemon.web.test_origin import origin, steps, superseded
+from shm_daemon.web.test_view import AT_WORK, TestView
+from shm_daemon.web.tests import RETRY_AFTER, View
+
+router = APIRouter(include_in_schema=False)
+Part = Annotated[Literal["page", "hits"], Query()]
+Response = Annotated[int | None, Query(ge=0, le=100_000)]
+_STYLES: dict[Verdict, str] = {
+    "good": "steady",
+    "warning": "watch",
+    "refused": "alert",
+    "unknown": "first",
+}
+_NOT_STORED = ("exponential window on the responses", "records")
+"""Conditions that only the raw file tells."""
+
+
+@router.get("/hangers/{hanger_id}/tests/{test:path}")
+def one_test(
+    request: Request, _: Reader, view: View, response: Response = None, part: Part = "page"
+) -> HTMLResponse:
+    """The page; or, where `part` says so, its tables of hits, once they are worked out."""
+    return _hits(request, view) if part == "hits" else _page(request, view, response)
+
+
+def _page(request: Request, view: TestView, response: int | None) -> HTMLResponse:
+    sheet, hanger_id = view.sheet, view.stored.hanger
+    before, after = view.store.beside(view.stored)
+    points, verdict = _points(view), overall(view.stored.quality)
+    chosen = response if response is not None and response < len(points) else _telling(view)
+    address = test_page(hanger_id, view.stored.test.id)
+    return page(
+        request,
+        "test.html.j2",
+        title=name(sheet),
+        hanger=hanger_id,
+        verdict=HEADLINES[verdict],
+        style=_STYLES[verdict],
+        summary=view.summary,
+        facts=_facts(view),
+        missing=view.missing,
+        before=before and (before, test_page(hanger_id, before)),
+        after=after and (after, test_page(hanger_id, after)),
+        results=_filled(tables.modes(sheet), tables.quality(sheet), tables.set_aside(sheet)),
+        charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
+        points=[point_name(point) for point in points],
+        chosen=chosen,
+        address=address,
+        document=test_json(hanger_id, view.stored.test.id),
+        hits=_hit_tables(view),
+        at_work=AT_WORK,
+        details=_filled(tables.notes(sheet), *_dropped(view), _conditions(view)),
+        lineage=_filled(origin(view), steps(view), superseded(view)),
+    )
+
+
+def _hits(request: Request, view: TestView) -> HTMLResponse:
+    """Without the frame: the page that asked puts it in its place."""
+    if view.whole() is None:
+        return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
+    return page(request, "test_hits.html.j2", hits=_hit_tables(view))
+
+
+def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
+    """None where they are not worked out."""
+    whole = None if view.missing else view.workshop.kept(view.order)
+    return _filled(whole.hits) if whole else None
+
+
+def _filled(*found: Table) -> tuple[Table, ...]:
+    return tuple(table for table in found if table.rows)
+
+
+def _dropped(view: TestView) -> tuple[Table, ...]:
+    """By itself where it was worked out; in the store it stands among the notes."""
+    return (view.worked.dropped,) if view.worked else ()
+
+
+def _conditions(view: TestView) -> Table:
+    if view.worked:
+        return view.worked.conditions
+    found = tables.conditions(view.as_stored)
+    return replace(found, rows=tuple(row for row in found.rows if row[0] not in _NOT_STORED))
+
+
+def _points(view: TestView) -> tuple[ResponsePoint, ...]:
+    curve = view.shown().spectrum
+    return curve.points if curve else ()
+
+
+def _telling(view: TestView) -> int:
+    """The response that shows the modes best."""
+    shown = view.shown()
+    return shown_points(shown.sheet, shown.spectrum, 1)[0] if shown.spectrum else 0
+
+
+def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:
+    """Where a figure's document is, and how high it is."""
+    address = f"{test_json(view.stored.hanger, view.stored.test.id)}/figures/{figure.name}"
+    if figure.source == "both":
+        address += f"?point={chosen}"
+    return address, figure.height_px(view.sheet)
+
+
+def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
+    """The figures on top: what, value, what stands beside it."""
+    test, sheet = view.stored.test, view.sheet
+    planes = {mode.plane for mode in sheet.modes}
+    aside = len(sheet.identification.set_aside)
+    return (
+        ("Modes", str(len(sheet.modes)), f"in {words.counted(len(planes), 'plane')}"),
+        _tension(view),
+        ("Temperature", _temperature(test.temperature_c), "of the test"),
+        ("Tested", words.moment(test.time), f"received {words.moment(view.recording.received_at)}"),
+        ("Set aside", str(aside), "resonances not of the hanger"),
+    )
+
+
+def _temperature(celsius: float) -> str:
+    return words.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
+
+
+def _tension(view: TestView) -> tuple[str, str, str]:
+    try:
+        posterior = view.store.posterior_of(view.stored)
+    except NothingThere:
+        return "Tension", "not yet", f"the test is {view.stored.stage}"
+    tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+    places = words.decimals(tension.width)
+    beside = f"90 % interval {words.span(tension)} kN, {words.model_class(posterior.model)}"
+    return "Tension by this test", f"{tension.mean:.{places}f} kN", beside

@@ -1,0 +1,80 @@
+"""Figures as plotly documents: plain dictionaries that the browser draws.
+
+The colours are those of the reports; `static/charts.js` turns them for a dark screen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from fastapi.responses import JSONResponse
+
+from shm.report.figures.style import PALETTE
+
+
+def figure(
+    traces: Sequence[Mapping[str, Any]], x_label: str, y_label: str, **layout: Any
+) -> dict[str, Any]:
+    """A plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown.
+
+    Labels carry their units. `layout` adds to the layout; its `xaxis` and `yaxis` add to the
+    labelled axes.
+    """
+    axes = {
+        "xaxis": {"title": {"text": x_label}, **layout.pop("xaxis", {})},
+        "yaxis": {"title": {"text": y_label}, **layout.pop("yaxis", {})},
+    }
+    return {
+        "data": [plain(dict(trace)) for trace in traces],
+        "layout": plain({**axes, **layout}),
+    }
+
+
+def answer(document: dict[str, Any], status: int = 200) -> JSONResponse:
+    """A figure over HTTP, without asking what each of its numbers is a second time."""
+    return JSONResponse(document, status)
+
+
+def colour(name: str, opacity: float = 1.0) -> str:
+    """A colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
+    code = PALETTE[name]
+    if opacity >= 1:
+        return code
+    red, green, blue = (int(code[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
+
+
+def plain(value: Any) -> Any:
+    """What JSON can say: arrays as lists, times in ISO 8601, NaN and infinity as null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return _listed(value)
+    if isinstance(value, str | bool) or value is None:
+        return value.value if isinstance(value, Enum) else value
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return _single(value)
+
+
+def _listed(values: np.ndarray[Any, Any]) -> Any:
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        return np.where(np.isfinite(values), values, None).tolist()  # type: ignore[call-overload]
+    if values.dtype.kind == "M":
+        return values.astype(str).tolist()
+    return plain(values.tolist()) if values.dtype.kind == "O" else values.tolist()
+
+
+def _single(value: Any) -> Any:
+    if isinstance(value, datetime):
+        return value.isoformat()
+    if isinstance(value, np.datetime64):
+        return str(value)
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

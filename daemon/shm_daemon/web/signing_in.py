@@ -1,0 +1,82 @@
+"""Signing in: a person gives a token once, and the browser keeps it where no script can read it."""
+
+from __future__ import annotations
+
+from urllib.parse import parse_qs
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import RedirectResponse
+from starlette.concurrency import run_in_threadpool
+
+from shm_daemon.web.access import COOKIE, AtSite, refuse_foreign, token_in_force
+from shm_daemon.web.faults import Refused
+from shm_daemon.web.frame import page
+
+router = APIRouter(include_in_schema=False)
+
+_KEPT_S = 30 * 86400
+_LONGEST_FORM_BYTES = 8192
+
+
+@router.get("/sign-in")
+def sign_in_page(request: Request, next: str = "/") -> Response:
+    """Asks for a token."""
+    return _ask(request, next)
+
+
+@router.post("/sign-in")
+async def sign_in(request: Request, site: AtSite) -> Response:
+    """Gives the cookie to who has a token in force; revoking the token takes effect at once."""
+    refuse_foreign(request)
+    told = await _form(request)
+    secret, wanted = told.get("token", "").strip(), told.get("next", "/")
+    try:
+        await run_in_threadpool(token_in_force, site, secret)
+    except Refused as refused:
+        return _ask(request, wanted, refused.status_code, refused.detail)
+    answer = RedirectResponse(_ours(wanted), 303)
+    answer.set_cookie(
+        COOKIE, secret, max_age=_KEPT_S, httponly=True, samesite="strict", secure=_is_https(request)
+    )
+    return answer
+
+
+@router.post("/sign-out")
+def sign_out(request: Request) -> Response:
+    """Takes the cookie back."""
+    refuse_foreign(request)
+    answer = RedirectResponse("/sign-in", 303)
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=_is_https(request))
+    return answer
+
+
+def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
+    return page(
+        request,
+        "sign_in.html.j2",
+        status=status,
+        message=message,
+        next=_ours(wanted),
+    )
+
+
+def _ours(wanted: str) -> str:
+    """An address of this site: nobody is sent elsewhere after signing in."""
+    plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
+    return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
+
+
+def _is_https(request: Request) -> bool:
+    """A proxy's word is enough: to believe it only makes the cookie stricter."""
+    return "https" in (request.url.scheme, request.headers.get("x-forwarded-proto", ""))
+
+
+async def _form(request: Request) -> dict[str, str]:
+    """The fields of a form, each once; raises Refused where there is far more than a token."""
+    body = bytearray()
+    async for piece in request.stream():
+        body += piece
+        if len(body) > _LONGEST_FORM_BYTES:
+            raise Refused(413, "This is more than a token.", "Paste the token alone.")
+    fields = parse_qs(body.decode("utf-8", "replace"), max_num_fields=5)
+    return {name: values[-1] for name, values in fields.items()}

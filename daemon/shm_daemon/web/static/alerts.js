@@ -1,0 +1,57 @@
+"use strict";
+// Acknowledges an alert by the API; the page then shows what the record says.
+
+(() => {
+  const remembered = "shm.who";
+
+  async function send(form) {
+    const said = Object.fromEntries(new FormData(form));
+    const answer = await fetch(form.dataset.address, {
+      method: "POST",
+      headers: { "Content-Type": "application/json", Accept: "application/json" },
+      body: JSON.stringify(said),
+    });
+    const found = await answer.json();
+    if (!answer.ok) throw new Error([found.message, found.remedy].filter(Boolean).join(" "));
+    localStorage.setItem(remembered, said.who);
+    return found;
+  }
+
+  function show(form, alert) {
+    const card = form.closest(".card");
+    const noted = document.createElement("p");
+    noted.className = "noted";
+    noted.textContent = `Acknowledged by ${alert.acknowledged.who}: ${alert.acknowledged.why}`;
+    form.closest("details").replaceWith(noted);
+    card.classList.remove("open");
+    const told = document.getElementById("told");
+    told.textContent = `Alert ${alert.id} is acknowledged.`;
+    card.tabIndex = -1;
+    card.focus();
+    const count = document.querySelector(".top .count");
+    if (count) {
+      const left = Number.parseInt(count.textContent, 10) - 1;
+      if (left > 0) count.firstChild.textContent = left;
+      else count.remove();
+    }
+  }
+
+  document.addEventListener("DOMContentLoaded", () => {
+    for (const form of document.querySelectorAll("form.acknowledge")) {
+      form.elements.who.value = localStorage.getItem(remembered) ?? "";
+      form.addEventListener("submit", async (event) => {
+        event.preventDefault();
+        const button = form.querySelector("button");
+        const problem = form.querySelector(".problem");
+        button.disabled = true;
+        problem.textContent = "";
+        try {
+          show(form, await send(form));
+        } catch (error) {
+          problem.textContent = `Not acknowledged: ${error.message}`;
+          button.disabled = false;
+        }
+      });
+    }
+  });
+})();

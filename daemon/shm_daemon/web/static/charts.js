@@ -1,0 +1,162 @@
+"use strict";
+// Fetches the figures of a page when they come into view and draws them with plotly, in the colours
+// of the theme. A figure that is still being computed (202, or Retry-After) is asked for again.
+
+(() => {
+  const meta = (name) => document.querySelector(`meta[name="${name}"]`).content;
+  const inCss = (name) =>
+    getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const drawn = new Map(); // plot -> document
+  let script = null;
+
+  function plotly() {
+    script ??= new Promise((resolve, reject) => {
+      const tag = document.createElement("script");
+      tag.src = meta("plotly");
+      tag.onload = () => resolve(window.Plotly);
+      tag.onerror = () => reject(new Error("The script that draws figures did not load."));
+      document.head.append(tag);
+    });
+    return script;
+  }
+
+  const numbers = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)).join(",");
+
+  function theme(light) {
+    const turned = new Map();
+    for (const pair of meta("palette").split(" ")) {
+      const [name, code] = pair.split("=");
+      const now = light ? code : inCss(name) || code;
+      turned.set(code, now);
+      turned.set(`rgba(${numbers(code)},`, `rgba(${numbers(now)},`);
+    }
+    return turned;
+  }
+
+  function inTheme(value, turned) {
+    if (typeof value === "string") {
+      if (value[0] === "#") return turned.get(value) ?? value;
+      if (!value.startsWith("rgba(")) return value;
+      const cut = value.lastIndexOf(",") + 1;
+      return (turned.get(value.slice(0, cut)) ?? value.slice(0, cut)) + value.slice(cut);
+    }
+    if (Array.isArray(value)) {
+      return typeof value[0] === "number" ? value : value.map((each) => inTheme(each, turned));
+    }
+    if (value && typeof value === "object") {
+      return Object.fromEntries(
+        Object.entries(value).map(([key, each]) => [key, inTheme(each, turned)]),
+      );
+    }
+    return value;
+  }
+
+  function merged(under, over) {
+    const found = { ...under };
+    for (const [key, value] of Object.entries(over)) {
+      const both = value && typeof value === "object" && !Array.isArray(value);
+      found[key] = both && found[key] && typeof found[key] === "object"
+        ? merged(found[key], value) : value;
+    }
+    return found;
+  }
+
+  function layoutOf(given, light) {
+    const ink = light ? "#1d2330" : inCss("ink");
+    const grid = light ? "#d5d9e0" : inCss("grid");
+    const paper = light ? "#ffffff" : inCss("page");
+    const base = {
+      paper_bgcolor: "rgba(0,0,0,0)",
+      plot_bgcolor: "rgba(0,0,0,0)",
+      font: { color: ink, family: "system-ui, sans-serif", size: 13 },
+      margin: { l: 64, r: 16, t: 36, b: 52 },
+      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+      hoverlabel: { bgcolor: paper, bordercolor: grid, font: { color: ink } },
+    };
+    const axis = { gridcolor: grid, linecolor: grid, zerolinecolor: grid, automargin: true };
+    const axes = new Set(["xaxis", "yaxis"]);
+    Object.keys(given).filter((key) => /^[xy]axis\d*$/.test(key)).forEach((key) => axes.add(key));
+    for (const name of axes) base[name] = axis;
+    const found = merged(base, given);
+    delete found.width;
+    found.autosize = true;
+    return found;
+  }
+
+  async function draw(plot, figure, light = !dark.matches) {
+    const turned = theme(light);
+    const library = await plotly();
+    await library.react(plot, inTheme(figure.data, turned),
+      layoutOf(inTheme(figure.layout ?? {}, turned), light),
+      { responsive: true, displaylogo: false, scrollZoom: false,
+        modeBarButtonsToRemove: ["lasso2d", "select2d"] });
+  }
+
+  function tell(chart, text) {
+    chart.querySelector(".told").textContent = text;
+  }
+
+  function describe(chart, figure) {
+    if (figure.caption) chart.querySelector(".caption").textContent = figure.caption;
+    const alternative = figure.alt ?? figure.caption;
+    if (alternative) chart.querySelector(".plot").setAttribute("aria-label", alternative);
+  }
+
+  function visible() {
+    if (!document.hidden) return Promise.resolve();
+    return new Promise((resolve) => {
+      document.addEventListener("visibilitychange", () => resolve(), { once: true });
+    });
+  }
+
+  async function later(chart, seconds) {
+    await new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
+    await visible();
+    await load(chart);
+  }
+
+  async function load(chart) {
+    const plot = chart.querySelector(".plot");
+    if (!drawn.has(plot)) tell(chart, "Loading …");
+    try {
+      const answer = await fetch(chart.dataset.figure, { headers: { Accept: "application/json" } });
+      const found = await answer.json();
+      const again = Number(answer.headers.get("Retry-After")) || 0;
+      if (!answer.ok) {
+        tell(chart, [found.message, found.remedy].filter(Boolean).join(" ") || "No figure came.");
+      } else if (answer.status === 202) {
+        tell(chart, found.message ?? "Being computed …");
+        later(chart, again || 2);
+      } else {
+        drawn.set(plot, found);
+        describe(chart, found);
+        tell(chart, found.message ?? "");
+        await draw(plot, found);
+        if (again) later(chart, again);
+      }
+    } catch (error) {
+      tell(chart, `The figure cannot be shown: ${error.message} Its numbers stand below.`);
+    }
+  }
+
+  function redraw(light) {
+    for (const [plot, figure] of drawn) draw(plot, figure, light);
+  }
+
+  document.addEventListener("DOMContentLoaded", () => {
+    const charts = document.querySelectorAll("figure.chart[data-figure]");
+    if (!charts.length) return;
+    const watcher = new IntersectionObserver((entries) => {
+      for (const { isIntersecting, target } of entries) {
+        if (!isIntersecting) continue;
+        watcher.unobserve(target);
+        load(target);
+      }
+    }, { rootMargin: "400px" });
+    charts.forEach((chart) => watcher.observe(chart));
+    dark.addEventListener("change", () => redraw(!dark.matches));
+    addEventListener("beforeprint", () => redraw(true));
+    addEventListener("afterprint", () => redraw(!dark.matches));
+  });
+})();

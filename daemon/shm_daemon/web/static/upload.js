@@ -1,0 +1,176 @@
+"use strict";
+// Sends the chosen files one after the other and follows each until it is a test.
+
+(() => {
+  const WORDS = {
+    received: "Taken in; its modes are being identified …",
+    identified: "Its modes are identified; the tension is updated next. The first tests of a hanger " +
+      "wait here until there are enough for a baseline.",
+    updated: "The tension is updated; it is compared with the baseline …",
+    watched: "Compared with the baseline; alerts are sent …",
+    done: "Done.",
+  };
+  const FIRST_S = 1;
+  const LONGEST_S = 15;
+  const said = (fault) => [fault.message, fault.remedy].filter(Boolean).join(" ");
+  const size = (bytes) => bytes < 1e6
+    ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  const made = (name, values = {}) => Object.assign(document.createElement(name), values);
+  const rest = (seconds) => new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
+  let queue = Promise.resolve();
+  let counted = 0;
+  let form, list, told;
+
+  function listed(file) {
+    const item = made("li", { className: "card" });
+    const bar = made("progress", { max: 1, value: 0 });
+    bar.setAttribute("aria-label", `Upload of ${file.name}`);
+    const stage = made("p", { className: "stage", textContent: "Waits for the file before it." });
+    item.append(made("h3", { textContent: file.name }),
+      made("p", { className: "note", textContent: size(file.size) }), bar, stage);
+    list.append(item);
+    return { item, bar, stage, name: file.name };
+  }
+
+  function state(row, text, kind = "") {
+    if (row.stage.textContent !== text) row.stage.textContent = text;
+    row.item.className = `card ${kind}`;
+  }
+
+  function failed(row, text) {
+    row.bar.remove();
+    state(row, text, "failed");
+    told.textContent = `${row.name}: ${text}`;
+  }
+
+  function address(file) {
+    const query = new URLSearchParams({ name: file.name });
+    for (const name of ["hanger", "temperature_c"]) {
+      const value = form.elements[name].value.trim();
+      if (value) query.set(name, value);
+    }
+    return `/api/recordings?${query}`;
+  }
+
+  function sent(file, row) {
+    return new Promise((resolve, reject) => {
+      const request = new XMLHttpRequest();
+      request.open("POST", row.address);
+      request.setRequestHeader("Content-Type", "application/octet-stream");
+      request.responseType = "json";
+      request.upload.onprogress = ({ loaded, total }) => {
+        row.bar.value = total ? loaded / total : 0;
+        state(row, `Sent ${size(loaded)} of ${size(total)}.`);
+      };
+      request.onload = () => {
+        const answer = request.response ?? {};
+        if (request.status < 300) resolve(answer);
+        else reject(new Error(said(answer) || `The answer was ${request.status}.`));
+      };
+      request.onerror = () => reject(new Error("The connection broke off. Send it again."));
+      request.send(file);
+    });
+  }
+
+  async function one(file, row) {
+    if (file.size > Number(form.dataset.maxBytes)) {
+      failed(row, `Not sent: it is larger than ${size(Number(form.dataset.maxBytes))}.`);
+      return;
+    }
+    try {
+      const landed = await sent(file, row);
+      row.bar.value = 1;
+      const again = landed.outcome === "duplicate" ? " These bytes were known already." : "";
+      state(row, `Safe on the disk; the daemon takes it next.${again}`);
+      told.textContent = `${row.name} is safe on the disk.`;
+      follow(`/api/recordings?sha256=${landed.sha256}`, row);
+    } catch (error) {
+      failed(row, `Not taken: ${error.message}`);
+    }
+  }
+
+  async function follow(statusUrl, row) {
+    for (let wait = FIRST_S; ; wait = Math.min(1.3 * wait, LONGEST_S)) {
+      await rest(wait);
+      if (document.hidden) continue;
+      let answer, found;
+      try {
+        answer = await fetch(statusUrl, { headers: { Accept: "application/json" } });
+        found = await answer.json();
+      } catch {
+        state(row, "The interface does not answer; it is asked again …");
+        continue;
+      }
+      if (!answer.ok && answer.status !== 503) {
+        failed(row, said(found));
+        return;
+      }
+      const [recording] = found.recordings ?? []; // none while it is in the spool
+      if (recording && shown(recording, row)) return;
+    }
+  }
+
+  function shown(recording, row) {
+    const { stage } = recording;
+    if (stage === "refused") {
+      failed(row, `Refused: ${said(recording.reason ?? {}) || "the reason was not noted."}`);
+      return true;
+    }
+    state(row, WORDS[stage] ?? stage, stage === "done" ? "done" : "");
+    links(recording, row);
+    if (stage === "done") {
+      row.bar.remove();
+      told.textContent = `${row.name} is a test now.`;
+    }
+    return stage === "done";
+  }
+
+  function links(recording, row) {
+    if (row.item.querySelector(".links") || !recording.tests.length) return;
+    const line = made("p", { className: "links" });
+    line.append(made("a", {
+      href: `/hangers/${recording.hanger}`, textContent: `Hanger ${recording.hanger}`,
+    }));
+    for (const test of recording.tests) {
+      line.append(" · ", made("a", { href: test.page, textContent: `Test ${test.name}` }));
+    }
+    row.item.append(line);
+  }
+
+  function begin(files) {
+    for (const file of files) {
+      const row = listed(file);
+      row.address = address(file);
+      counted += 1;
+      queue = queue.then(() => one(file, row));
+    }
+    told.textContent = `${counted} ${counted === 1 ? "file" : "files"} chosen.`;
+  }
+
+  document.addEventListener("DOMContentLoaded", () => {
+    form = document.getElementById("upload");
+    if (!form) return;
+    list = document.getElementById("list");
+    told = document.getElementById("told");
+    const drop = document.getElementById("drop");
+    const input = document.getElementById("files");
+    form.addEventListener("submit", (event) => event.preventDefault());
+    input.addEventListener("change", () => {
+      begin([...input.files]);
+      input.value = "";
+    });
+    for (const kind of ["dragenter", "dragover"]) {
+      drop.addEventListener(kind, (event) => {
+        event.preventDefault();
+        drop.classList.add("over");
+      });
+    }
+    for (const kind of ["dragleave", "drop"]) {
+      drop.addEventListener(kind, () => drop.classList.remove("over"));
+    }
+    drop.addEventListener("drop", (event) => {
+      event.preventDefault();
+      begin([...event.dataTransfer.files]);
+    });
+  });
+})();

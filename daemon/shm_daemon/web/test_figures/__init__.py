@@ -1,0 +1,1 @@
+"""The interactive figures of one hammer test, as documents for plotly."""

@@ -1,0 +1,185 @@
+"""Mode shapes along the hanger, a small panel for each mode, plane by plane."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from shm.report import TestSheet
+from shm.report.content import NORMAL_90
+from shm.report.figures.style import PLANE_COLOURS
+from shm.report.sheet.figures.shapes import FIGURE as PRINTED
+from shm.values import PLANES, FloatArray, Mode
+from shm_daemon.web import plotting
+from shm_daemon.web.test_figures.contract import Shown, TestFigure
+from shm_daemon.web.test_figures.marks import SYMBOLS
+from shm_daemon.web.test_figures.panels import axis, drawn, named_axis, numbers
+
+_MOST_COLUMNS = 4
+_MOST = 36
+_ROW_PX, _REST_PX = 118, 90
+_LEAST_POINTS = 2
+_NEAR = 0.4
+"""A string misses the points by no more than this share of them where it is drawn."""
+_ROOM = 1.35
+_GAP_X, _SHARE_OF_ROW = 0.04, 0.74
+"""Between two panels, as a share of the width; height of a panel, as a share of its row's."""
+
+
+def _draw(shown: Shown) -> dict[str, Any] | None:
+    sheet = shown.sheet
+    if not _shown(sheet):
+        return None
+    rows = _rows(sheet)
+    low, high = _extent_m(sheet)
+    layout: dict[str, Any] = {"annotations": [], "margin": {"t": 30}}
+    traces: list[dict[str, Any]] = []
+    seen: set[str] = set()
+    number = 0
+    for line, row in enumerate(rows):
+        for column, mode in enumerate(row):
+            number += 1
+            is_last = line + 1 == len(rows) or column >= len(rows[line + 1])
+            _place(layout, number, (line / len(rows), 1 / len(rows)), (column, _columns(sheet)))
+            _scale(layout, number, (low, high), column == 0, is_last)
+            layout["annotations"].append(_title(mode, number))
+            traces += _panel(sheet, mode, number, seen)
+    return drawn(traces, layout)
+
+
+def _shown(sheet: TestSheet) -> list[Mode]:
+    """Modes measured at so many places or directions that there is a shape to see."""
+    return [mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS][:_MOST]
+
+
+def _known_values(mode: Mode) -> int:
+    values = [value for p in mode.shape if math.isfinite(p.x_m) for value in (p.value, p.cross)]
+    return sum(math.isfinite(value) for value in values)
+
+
+def _rows(sheet: TestSheet) -> list[list[Mode]]:
+    """The modes row by row: a plane begins a new row."""
+    modes, columns = _shown(sheet), _columns(sheet)
+    planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
+    return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
+
+
+def _columns(sheet: TestSheet) -> int:
+    """So many, up to four, that the rows of a plane are about equally full."""
+    modes = _shown(sheet)
+    longest = max((sum(mode.plane == plane for mode in modes) for plane in PLANES), default=0)
+    return math.ceil(longest / math.ceil(longest / _MOST_COLUMNS)) if longest else 1
+
+
+def _extent_m(sheet: TestSheet) -> tuple[float, float]:
+    """From end to end of the hanger, or of the measured places where its length is not known."""
+    if sheet.hanger is not None:
+        return 0.0, sheet.hanger.length_m
+    places = [p.x_m for mode in sheet.modes for p in mode.shape if math.isfinite(p.x_m)]
+    low, high = min(places), max(places)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def _place(
+    layout: dict[str, Any], number: int, row: tuple[float, float], column: tuple[int, int]
+) -> None:
+    """Where a panel is: its row as start from the top and height, its column as which of many."""
+    width = (1 - _GAP_X * (column[1] - 1)) / column[1]
+    left, bottom = column[0] * (width + _GAP_X), max(0.0, 1 - row[0] - row[1])
+    layout[named_axis("x", number)] = {"domain": [left, min(1.0, left + width)]}
+    layout[named_axis("y", number)] = {"domain": [bottom, bottom + _SHARE_OF_ROW * row[1]]}
+
+
+def _scale(
+    layout: dict[str, Any], number: int, extent_m: tuple[float, float], is_first: bool,
+    is_last: bool,
+) -> None:  # fmt: skip
+    """Numbers stand at the left column, and below the last panel of a column."""
+    low, high = extent_m
+    margin = 0.03 * (high - low)
+    layout[named_axis("x", number)] |= {
+        "anchor": axis("y", number), "range": [low - margin, high + margin],
+        "tickvals": [low, high], "ticktext": [f"{low:.3g}", f"{high:.3g} m"],
+        "showticklabels": is_last, "tickfont": {"size": 10}, "fixedrange": True,
+    }  # fmt: skip
+    layout[named_axis("y", number)] |= {
+        "anchor": axis("x", number), "range": [-_ROOM, _ROOM], "tickvals": [-1, 0, 1],
+        "showticklabels": is_first, "tickfont": {"size": 10}, "zeroline": True,
+        "fixedrange": True,
+    }  # fmt: skip
+
+
+def _title(mode: Mode, number: int) -> dict[str, Any]:
+    return {
+        "text": f"{mode.order}: {mode.frequency_hz:.4g} Hz", "showarrow": False,
+        "xref": f"{axis('x', number)} domain", "yref": f"{axis('y', number)} domain",
+        "x": 0, "y": 1, "xanchor": "left", "yanchor": "bottom", "font": {"size": 11},
+    }  # fmt: skip
+
+
+def _panel(sheet: TestSheet, mode: Mode, number: int, seen: set[str]) -> list[dict[str, Any]]:
+    points = [p for p in mode.shape if math.isfinite(p.x_m)]
+    x_m = [p.x_m for p in points]
+    axes = {"xaxis": axis("x", number), "yaxis": axis("y", number), "type": "scatter"}
+    colour = PLANE_COLOURS[mode.plane]
+    halves = numbers(NORMAL_90 * p.sd for p in points)
+    own = {
+        **axes, "mode": "markers", "x": numbers(x_m), "y": numbers(p.value for p in points),
+        "marker": {"symbol": SYMBOLS[mode.plane], "size": 7, "color": colour},
+        "error_y": {"type": "data", "array": halves, "color": colour, "width": 2}, **_named(
+            mode.plane, seen
+        ),
+    }  # fmt: skip
+    other = {
+        **axes, "mode": "markers", "x": numbers(x_m), "y": numbers(p.cross for p in points),
+        "marker": {"symbol": "diamond-open", "size": 7, "color": plotting.colour("ink")},
+    }  # fmt: skip
+    traces = [*_guide(sheet, mode, axes, seen), own]
+    if any(math.isfinite(p.cross) for p in points):
+        traces.append({**other, **_named("other plane", seen)})
+    return traces
+
+
+def _named(name: str, seen: set[str]) -> dict[str, Any]:
+    """In the legend once."""
+    first = name not in seen
+    seen.add(name)
+    return {"name": name, "legendgroup": name, "showlegend": first}
+
+
+def _guide(
+    sheet: TestSheet, mode: Mode, axes: dict[str, Any], seen: set[str]
+) -> list[dict[str, Any]]:
+    """A taut string's shape of the mode's order in the measured size, where it comes near the
+    points; straight lines between the places where the hanger is not described."""
+    known = [p for p in mode.shape if math.isfinite(p.x_m) and math.isfinite(p.value)]
+    x_m, value = np.array([(p.x_m, p.value) for p in sorted(known, key=lambda p: p.x_m)]).T
+    if sheet.hanger is None:
+        return [_thin(x_m, value, axes, _named("places joined", seen))]
+    wave = mode.order * np.pi / sheet.hanger.length_m
+    string = np.sin(wave * x_m)
+    size = float(string @ value) / max(float(string @ string), 1e-9)
+    misses = float(np.linalg.norm(value - size * string))
+    if len(x_m) < _LEAST_POINTS or misses >= _NEAR * np.linalg.norm(value) or abs(size) > _ROOM:
+        return []
+    places = np.linspace(0, sheet.hanger.length_m, 12 * mode.order + 1)
+    return [_thin(places, size * np.sin(wave * places), axes, _named("guide: taut string", seen))]
+
+
+def _thin(
+    x_m: FloatArray, values: FloatArray, axes: dict[str, Any], named: dict[str, Any]
+) -> dict[str, Any]:
+    line = {"color": plotting.colour("quiet"), "width": 1}
+    return {
+        **axes, "mode": "lines", "x": numbers(x_m), "y": numbers(values), "line": line,
+        "hoverinfo": "skip", **named,
+    }  # fmt: skip
+
+
+FIGURE = TestFigure(
+    "shapes", PRINTED.title, "store", _draw, lambda shown: PRINTED.caption(shown.sheet),
+    lambda shown: PRINTED.alt(shown.sheet),
+    height_px=lambda sheet: _REST_PX + _ROW_PX * len(_rows(sheet)),
+)  # fmt: skip

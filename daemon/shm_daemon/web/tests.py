@@ -1,0 +1,151 @@
+"""What is known of one test, in numbers and as figures."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Path, Query, Request
+from fastapi.responses import JSONResponse, Response
+
+from shm import documents
+from shm.errors import NothingThere
+from shm.report.verdicts import overall
+from shm.store import FormerPosterior, FormerTest
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.faults import answers
+from shm_daemon.web.hangers import Number
+from shm_daemon.web.test_figures.registry import FIGURES
+from shm_daemon.web.test_models import Hits, PlotlyFigure, TestState, Waiting
+from shm_daemon.web.test_origin import formers_of, steps_of
+from shm_daemon.web.test_view import AT_WORK, TestView, as_bytes
+from shm_daemon.web.working_out import workshop_of
+
+RETRY_AFTER = {"Retry-After": "2"}
+_FAULTS = answers(400, 401, 403, 404, 422, 503)
+_LATER: dict[int | str, dict[str, Any]] = {
+    202: {"model": Waiting, "description": "It is being worked out; `Retry-After` says how long."}
+}
+_OF_TEST = "/hangers/{hanger_id}/tests/{test:path}"
+
+router = APIRouter(prefix="/api", tags=["state"])
+Name = Annotated[str, Path(max_length=1000, description="The test's name, percent-encoded.")]
+Point = Annotated[
+    int, Query(ge=0, le=100_000, description="Which response, from 0 in the order of `responses`.")
+]
+
+
+def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
+    """The test that is asked for; raises NothingThere."""
+    return TestView.of(site.workspace, site.store, workshop_of(request), hanger_id, test)
+
+
+View = Annotated[TestView, Depends(view_of)]
+
+
+@router.get(
+    _OF_TEST + "/figures/{figure}",
+    response_model=PlotlyFigure,
+    responses={**_LATER, **_FAULTS},
+    summary="One figure of a test",
+)
+def figure(
+    _: Reader,
+    view: View,
+    figure: Annotated[str, Path(description="One of the names in `figures` of the test.")],
+    point: Point = 0,
+) -> Response:
+    """A plotly document. A 200 with `Retry-After` is what the store has; more will come."""
+    if figure not in FIGURES:
+        raise NothingThere(f"no figure {figure!r}.", remedy=f"Known: {', '.join(FIGURES)}.")
+    found = view.figure(FIGURES[figure], point)
+    if found.document is None:
+        return waiting()
+    headers = RETRY_AFTER if found.provisional else None
+    return Response(as_bytes(found.document), headers=headers, media_type="application/json")
+
+
+@router.get(
+    _OF_TEST + "/hits",
+    response_model=Hits,
+    responses={**_LATER, **_FAULTS},
+    summary="The hits of a test, and why one was dropped",
+)
+def hits(_: Reader, view: View) -> Any:
+    """Every hit, and what else was left out: the raw file is identified once more for it."""
+    whole = view.whole()
+    if whole is None:
+        return waiting()
+    found = whole.sheet.identification
+    return {"hits": list(map(asdict, found.hits)), "dropped": list(map(asdict, found.dropped))}
+
+
+@router.get(
+    _OF_TEST,
+    response_model=TestState,
+    responses=_FAULTS,
+    summary="One test as it is stored",
+)
+def test(_: Reader, view: View) -> Any:
+    """Modes, quality, what was set aside, and where all that comes from."""
+    sheet, stored = view.as_stored, view.stored
+    before, after = view.store.beside(stored)
+    response = sheet.identification.frequency_response
+    return {
+        "test": documents.test_document(stored.test),
+        "hanger": stored.hanger,
+        "time": stored.time,
+        "stage": stored.stage.value,
+        "verdict": overall(stored.quality),
+        "summary": view.summary,
+        "quality": [_known(asdict(check)) for check in stored.quality],
+        "set_aside": [_known(asdict(each)) for each in stored.set_aside],
+        "notes": list(stored.notes),
+        "responses": [point.name for point in response.points] if response else [],
+        "file": _file(view),
+        "lineage": asdict(stored.lineage),
+        "steps": [{"stage": s.stage, "at": s.at, "version": s.version} for s in steps_of(view)],
+        "superseded": _superseded(view),
+        "previous": before,
+        "next": after,
+        "missing": view.missing,
+        "figures": [each.name for each in view.figures()],
+    }
+
+
+def waiting() -> JSONResponse:
+    """The answer while something is worked out."""
+    return JSONResponse({"message": AT_WORK}, 202, RETRY_AFTER)
+
+
+def _file(view: TestView) -> dict[str, Any]:
+    file = view.recording.file
+    return {
+        "file_name": file.file_name,
+        "sha256": file.sha256,
+        "size_bytes": file.size_bytes,
+        "received_at": view.recording.received_at,
+        "archived": view.is_archived,
+    }
+
+
+def _superseded(view: TestView) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for test in formers_of(view):
+        if test.superseded_at:
+            rows.append({"what": "identification", "model": None, "made_at": test.identified_at})
+            rows[-1] |= _ended(test)
+        for each in test.posteriors:
+            if each.superseded_at:
+                rows.append({"what": "posterior", "model": each.model, "made_at": each.updated_at})
+                rows[-1] |= _ended(each)
+    return rows
+
+
+def _ended(former: FormerTest | FormerPosterior) -> dict[str, Any]:
+    return {"superseded_at": former.superseded_at, "lineage": asdict(former.lineage)}
+
+
+def _known(row: dict[str, Any]) -> dict[str, Any]:
+    """NaN is what is not known."""
+    return {key: None if value != value else value for key, value in row.items()}

@@ -1,0 +1,47 @@
+"""The posterior as ArviZ reads it: a DataTree in netCDF, with the likelihood of each measurement.
+
+Needs `pip install shm[export]`. With ArviZ: `arviz.summary(arviz.from_netcdf("hanger3.nc"))`,
+`arviz.loo(...)`, `arviz.plot_ppc(...)`.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import xarray
+
+import shm
+
+hanger = shm.round_bar(
+    3,
+    diameter_m=0.130,
+    length_m=12.0,
+    elastic_modulus_pa=200e9,
+    density_kg_m3=7800,
+    nominal_tension_n=711e3,
+)
+recording = shm.simulate(hanger, hits=3, seconds_per_hit=10.0, seed=5)
+test = shm.identify(recording, hanger=hanger, cross_check="none")
+posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1)
+
+with TemporaryDirectory() as folder:
+    path = Path(folder) / "hanger3.nc"
+    shm.export.write(posterior, path, tests=[test.test], hanger=hanger)
+    tree = xarray.load_datatree(path, engine="h5netcdf")
+
+tension = tree["posterior"]["tension_n"]
+print(
+    f"tension {float(tension.mean()):.0f} {tension.attrs['units']}, groups {sorted(tree.children)}"
+)
+replicated = tree["posterior_predictive"]["frequency_hz"]
+observed = tree["observed_data"]["frequency_hz"]
+low, high = replicated.quantile([0.025, 0.975], dim=("chain", "draw"))
+inside = float(((observed > low) & (observed < high)).mean())
+print(f"{inside:.0%} of the measured frequencies lie within 95 % of what the model predicts")
+
+assert tension.dims == ("chain", "draw")
+assert tension.attrs["units"] == "N"
+assert np.array_equal(tension.values[0], posterior.tension_n)
+assert inside > 0.8
+pointwise = tree["log_likelihood"]["frequency_hz"].sum("measurement").values[0]
+assert np.allclose(pointwise, posterior.log_likelihood)

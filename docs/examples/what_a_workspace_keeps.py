@@ -1,0 +1,77 @@
+"""A workspace as a daemon fills it, read from a notebook.
+
+The command line makes a workspace and takes in two modal tests; `shm.Store` then reads what it
+keeps: the hangers, their tests, and the posterior of each.
+"""
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import shm
+from shm.documents import dump, modes_document
+from shm.simulate import CampaignPlan, HangerState, campaign
+from shm_cli.main import run
+
+BRIDGE = """
+[bridge]
+name = "Arch bridge"
+
+[settings]
+models = "beam1"
+samples = 300
+workers = 1
+
+[[hanger]]
+id = 3
+diameter_m = 0.130
+length_m = 12.0
+elastic_modulus_pa = 200e9
+density_kg_m3 = 7800
+nominal_tension_n = 711e3
+"""
+PLAN = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
+
+
+def measured(hanger: shm.Hanger, tension_n: float, day: int) -> shm.ModalTest:
+    """A modal test of one day, as an identification would give it."""
+    rng = np.random.default_rng(day)
+    plan = replace(PLAN, tension_spread=0.0, as_made=False)
+    (test,) = campaign(hanger, HangerState(tension_n), [], plan, rng)
+    time = datetime(2026, 5, 1, 10, tzinfo=UTC) + timedelta(days=day)
+    return replace(test, id=f"day {day}", time=time)
+
+
+def main() -> None:
+    with TemporaryDirectory() as folder:
+        described, modes = Path(folder) / "described.toml", Path(folder) / "hanger3.modes.json"
+        arch = Path(folder) / "arch"
+        described.write_text(BRIDGE)
+        hanger = shm.load_hanger(described)
+        tests = [measured(hanger, 711e3, 0), measured(hanger, 700e3, 30)]
+        modes.write_text(dump(modes_document(tests)))
+        assert run(["init", str(arch), "--from", str(described)]) == 0
+        assert run(["--workspace", str(arch), "ingest", str(modes)]) == 0
+
+        with shm.Store(arch) as store:
+            kept = store.tests(3)
+            posteriors = store.posteriors(3)
+            selection = store.selection(3)
+            figure = shm.plot.trend(posteriors, kept, store.hanger(3))
+
+    for test, posterior in zip(kept, posteriors, strict=True):
+        print(f"{test.time:%Y-%m-%d}: {posterior.tension_n.mean() / 1e3:.1f} kN")
+
+    assert [test.id for test in kept] == ["day 0", "day 30"]
+    assert selection.selected.model == "beam1"
+    assert abs(posteriors[0].tension_n.mean() / 711e3 - 1) < 0.005
+    assert abs(posteriors[1].tension_n.mean() / 700e3 - 1) < 0.005
+    assert figure.axes[0].get_xlabel() == "time of the test (UTC)"
+
+
+# The command line works in processes of its own, which import this file again.
+if __name__ == "__main__":
+    main()

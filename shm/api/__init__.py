@@ -1,0 +1,29 @@
+"""The steps as a researcher calls them in a notebook; `import shm` offers them under their names.
+
+Each has the defaults of the command of its name and gives the value that the step itself gives.
+The steps behind them (`shm.identify.identify`, `shm.update.update`, ...) take options as values and
+model classes as objects; these here take names and numbers.
+"""
+
+from __future__ import annotations
+
+from shm.api.described import load_hanger, round_bar
+from shm.api.diagnosing import diagnose
+from shm.api.identifying import identify
+from shm.api.reading import load_modes, read
+from shm.api.simulating import simulate
+from shm.api.stored import Store
+from shm.api.updating import select, update
+
+__all__ = [
+    "Store",
+    "diagnose",
+    "identify",
+    "load_hanger",
+    "load_modes",
+    "read",
+    "round_bar",
+    "select",
+    "simulate",
+    "update",
+]

@@ -1,0 +1,13 @@
+"""Posteriors and modes for other programs: pandas, ArviZ (xarray, netCDF), CSV, JSON, npz.
+
+`samples` and `modes` are tables, `datatree` is what ArviZ reads, `write` makes a file. Units stand
+in the attributes of a DataTree and in the names of a table's columns.
+"""
+
+from __future__ import annotations
+
+from shm.export.tables import modes, samples
+from shm.export.tree import datatree
+from shm.export.writing import FORMATS, check_format, write
+
+__all__ = ["FORMATS", "check_format", "datatree", "modes", "samples", "write"]

@@ -1,0 +1,91 @@
+"""A posterior as a file of one of the formats."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from shm.documents import dump, posterior_document
+from shm.errors import UsageError
+from shm.export.tables import columns, samples
+from shm.export.tree import datatree, write_netcdf
+from shm.values import Hanger, ModalTest, Posterior
+
+SAMPLES_SCHEMA = "shm.samples/1"
+Writer = Callable[[Posterior, Path, Sequence[ModalTest], Hanger | None], None]
+
+
+def write(
+    posterior: Posterior,
+    path: str | Path,
+    format: str | None = None,
+    *,
+    tests: Sequence[ModalTest] = (),
+    hanger: Hanger | None = None,
+) -> None:
+    """Writes the draws of a posterior; `format` is one of `FORMATS`, or follows from the suffix.
+
+    `csv` (.csv) and `npz` (.npz): a column a parameter, then `tension_n` in N and `log_likelihood`.
+    `json` (.json): the document of `shm update --json` with all draws by name under `draws`.
+    `netcdf` (.nc): the `datatree` for ArviZ, to which `tests` and `hanger` add the likelihood of
+    each measurement. Raises UsageError for another format, or where a library is missing.
+
+    Example:
+        >>> shm.export.write(posterior, "hanger3.nc", tests=[test.test], hanger=hanger)
+        >>> arviz.summary(arviz.from_netcdf("hanger3.nc"))
+    """
+    path = Path(path)
+    FORMATS[check_format(path, format)](posterior, path, tests, hanger)
+
+
+def check_format(path: Path, format: str | None = None) -> str:
+    """The format of a file to be; raises UsageError for one that is not known."""
+    suffixes = {".nc": "netcdf"} | {f".{name}": name for name in FORMATS}
+    named = suffixes.get(path.suffix.lower()) if format is None else format
+    if named is None or named not in FORMATS:
+        what = f"suffix {path.suffix!r}" if format is None else f"format {format!r}"
+        raise UsageError(f"{path.name}: unknown {what}.", remedy="Use .csv, .nc, .json or .npz.")
+    return named
+
+
+def _write_csv(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    samples(posterior).to_csv(path, index=False)
+
+
+def _write_npz(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **columns(posterior))
+    path.write_bytes(buffer.getvalue())
+
+
+def _write_json(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    document = {
+        "schema": SAMPLES_SCHEMA,
+        **posterior_document(posterior),
+        "draws": {name: values.tolist() for name, values in columns(posterior).items()},
+    }
+    path.write_text(dump(document) + "\n", encoding="utf-8")
+
+
+def _write_netcdf(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    write_netcdf(datatree(posterior, tests, hanger), path)
+
+
+FORMATS: dict[str, Writer] = {
+    "csv": _write_csv,
+    "json": _write_json,
+    "netcdf": _write_netcdf,
+    "npz": _write_npz,
+}
+"""What writes a format, by its name."""

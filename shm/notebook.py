@@ -1,0 +1,149 @@
+"""How values show themselves in a notebook: small tables with units, figures as pictures.
+
+`import shm` in a notebook is enough; elsewhere `%load_ext shm.notebook`. IPython finds the
+functions below by the names of the classes, so that the values stay plain data and nothing is
+imported before it is shown.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from shm.report import Interval
+    from shm.values import Diagnosis, Hanger, Posterior, Selection
+
+_CAUSES_SHOWN = 5
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Tells a shell of IPython how to show a hanger, posterior, selection, diagnosis, figure."""
+    html = shell.display_formatter.formatters["text/html"]
+    for home, kind, shown in (
+        ("shm.values.hanger", "Hanger", hanger_html),
+        ("shm.values.posterior", "Posterior", posterior_html),
+        ("shm.values.posterior", "Selection", selection_html),
+        ("shm.values.diagnosis", "Diagnosis", diagnosis_html),
+    ):
+        html.for_type_by_name(home, kind, shown)
+    png = shell.display_formatter.formatters["image/png"]
+    before = png.for_type_by_name("matplotlib.figure", "Figure", figure_png)
+    if before is not None:
+        png.for_type_by_name("matplotlib.figure", "Figure", before)
+
+
+def hanger_html(hanger: Hanger) -> str:
+    """The description of a hanger, in the units of a drawing."""
+    from shm.report import words
+
+    round_bar = math.isfinite(hanger.diameter_m)
+    rows = [
+        ("diameter", f"{1e3 * hanger.diameter_m:.0f} mm" if round_bar else "not round"),
+        ("length", f"{hanger.length_m:.3f} m"),
+        ("area", f"{1e6 * hanger.area_m2:.0f} mm²"),
+        ("mass", f"{hanger.mass_per_length_kg_m:.1f} kg/m"),
+        ("bending stiffness", f"{hanger.bending_stiffness_n_m2 / 1e3:.0f} kN m²"),
+        ("nominal tension", f"{hanger.nominal_tension_n / 1e3:.1f} kN"),
+        ("ends", f"{hanger.supports.deck} (deck), {hanger.supports.arch} (arch)"),
+        ("end plates", "yes" if hanger.plate else "none"),
+    ]
+    return _table(words.hanger_name(hanger.id, hanger.name), ("", ""), rows)
+
+
+def posterior_html(posterior: Posterior) -> str:
+    """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
+    from shm.report import Interval, words
+
+    tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+    best = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    at_best = best["theta_F"] * posterior.nominal_tension_n / 1e3
+    rows = [_interval_row("tension", tension, at_best, "tension in kN")]
+    for name in posterior.names:
+        interval = Interval.of_samples(posterior.parameter(name))
+        rows.append(_interval_row(name, interval, best[name], words.meaning(name, posterior.model)))
+    head = ("", "mean", "90 % interval", "most probable", "what it is")
+    return _table(f"{_whose(posterior)}, {words.model_class(posterior.model)}", head, rows) + (
+        f"<p>{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "
+        f"± {words.number(posterior.log_evidence_sd, '.2f')}, "
+        f"R-hat {words.number(posterior.r_hat, '.3f')}.</p>"
+    )
+
+
+def selection_html(selection: Selection) -> str:
+    """The model classes, most probable first, with the tension that each gives."""
+    from shm.report import Interval, words
+
+    rows = []
+    for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
+        tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+        rows.append(
+            (
+                words.model_class(posterior.model),
+                words.probability(probability),
+                f"{posterior.log_evidence:.2f}",
+                words.mean(tension),
+                words.span(tension),
+            )
+        )
+    head = ("class", "probability", "log evidence", "tension, kN", "90 % interval, kN")
+    return _table(f"{_whose(selection.selected)}, model classes", head, rows)
+
+
+def diagnosis_html(diagnosis: Diagnosis) -> str:
+    """The verdict in words, the likeliest causes, no gap, something unknown."""
+    from shm.report import words
+    from shm.report.diagnosis.content import claims
+    from shm.report.diagnosis.phrases import label
+    from shm.report.diagnosis.summary import consequences, verdict
+
+    causes = [cause for claim in claims(diagnosis) for cause in claim.causes]
+    rows = [(label(each), words.probability(each.probability)) for each in causes[:_CAUSES_SHOWN]]
+    rows += [
+        ("no gap", words.probability(diagnosis.no_gap_probability)),
+        (
+            "something not in the catalogue",
+            words.probability(diagnosis.unexplained_probability),
+        ),
+    ]
+    whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
+    title = f"Gap{whose} to {words.model_class(diagnosis.baseline)}"
+    paragraph = f"{verdict(diagnosis)} {consequences(diagnosis)}".strip()
+    return _table(title, ("cause", "probability"), rows) + f"<p>{escape(paragraph)}</p>"
+
+
+def figure_png(figure: Figure) -> bytes:
+    """A picture of a figure, also of one that pyplot does not know."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return buffer.getvalue()
+
+
+def _whose(posterior: Posterior) -> str:
+    return "Posterior" if posterior.hanger is None else f"Hanger {posterior.hanger}"
+
+
+def _interval_row(name: str, interval: Interval, best: float, meaning: str) -> tuple[str, ...]:
+    from shm.report import words
+
+    return (
+        name,
+        words.mean(interval),
+        words.span(interval),
+        f"{best:.{words.decimals(interval.width)}f}",
+        meaning,
+    )
+
+
+def _table(title: str, head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
+    headings = "".join(f"<th>{escape(each)}</th>" for each in head)
+    shown = f"<thead><tr>{headings}</tr></thead>" if any(head) else ""
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f"<table><caption>{escape(title)}</caption>{shown}<tbody>{body}</tbody></table>"

@@ -1,0 +1,214 @@
+"""Figures of the report, for a notebook: each function returns a `matplotlib.figure.Figure`.
+
+The figures are those of `shm report`, `shm identify --html` and `shm gap diagnose --html`: labels
+and units on every axis, colours that the colour-blind tell apart, on white. A notebook shows what a
+cell returns; elsewhere `figure.savefig("tension.png", dpi=150)`. Axes may be changed as any of
+matplotlib's: `figure.axes[0].set_title("Hanger 3")`. Where the data lack what a figure shows,
+NothingThere says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import TypeVar
+
+from matplotlib.figure import Figure
+
+from shm import __version__
+from shm.errors import NothingThere, UsageError
+from shm.identify import Identification
+from shm.report import DiagnosisSheet, HangerReport, TestSheet, TrendRow, trend_row
+from shm.report.diagnosis.figures.causes import FIGURE as CAUSES
+from shm.report.diagnosis.figures.gap_map import FIGURE as GAP_MAP
+from shm.report.figures.frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.member import Member
+from shm.report.figures.pairs import FIGURE as PAIRS
+from shm.report.figures.stiffness import FIGURE as STIFFNESS
+from shm.report.figures.tension import FIGURE as TENSION
+from shm.report.figures.trend import FIGURE as TREND
+from shm.report.sheet.figures.response import FIGURE as RESPONSE
+from shm.report.sheet.figures.shapes import FIGURE as SHAPES
+from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
+from shm.values import Diagnosis, Hanger, ModalTest, Posterior
+
+__all__ = [
+    "causes",
+    "frequencies",
+    "frequency_response",
+    "gap",
+    "pairs",
+    "shapes",
+    "stabilisation",
+    "stiffness",
+    "tension",
+    "trend",
+]
+
+Data = TypeVar("Data")
+
+
+def tension(posterior: Posterior, hanger: Hanger, baseline: Posterior | None = None) -> Figure:
+    """The posterior of the tension in kN: histogram, 90 % interval, nominal and baseline tension.
+
+    Example:
+        >>> figure = shm.plot.tension(posterior, hanger)
+        >>> figure.axes[0].get_xlabel()
+        'tension (kN)'
+    """
+    return _drawn(TENSION, _report(posterior, hanger, baseline=baseline))
+
+
+def trend(
+    posteriors: Sequence[Posterior],
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    baseline: Posterior | None = None,
+) -> Figure:
+    """The tension in kN over time: mean and 90 % band by each test, nominal, baseline, thresholds.
+
+    `posteriors` and `tests` go together, one posterior a test; tests without a time are left out.
+
+    Example:
+        >>> with shm.Store("arch") as store:
+        ...     posteriors = store.posteriors(3)
+        ...     figure = shm.plot.trend(posteriors, store.tests(3), store.hanger(3))
+    """
+    return _drawn(TREND, _history(posteriors, tests, hanger, baseline))
+
+
+def stiffness(
+    posteriors: Sequence[Posterior],
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    baseline: Posterior | None = None,
+) -> Figure:
+    """log10 of the end stiffness in N m/rad over time, a panel for each plane, with its 90 % band.
+
+    `posteriors` and `tests` go together, one posterior a test. The model class must have springs
+    at the ends (`beam2`, `solid1`, `solid2`).
+
+    Example:
+        >>> figure = shm.plot.stiffness(posteriors, tests, hanger)
+    """
+    return _drawn(STIFFNESS, _history(posteriors, tests, hanger, baseline))
+
+
+def frequencies(posterior: Posterior, test: ModalTest | Identification, hanger: Hanger) -> Figure:
+    """Predicted over measured frequency of every mode of `test`, with what each leaves open.
+
+    The light band is the model error sigma: a mode outside is one that the model does not explain.
+
+    Example:
+        >>> figure = shm.plot.frequencies(posterior, test, hanger)
+    """
+    modal = test.test if isinstance(test, Identification) else test
+    return _drawn(FREQUENCIES, _report(posterior, hanger, tests=(modal,)))
+
+
+def pairs(posterior: Posterior, hanger: Hanger) -> Figure:
+    """Each parameter alone and each against each other, with their correlations.
+
+    Example:
+        >>> figure = shm.plot.pairs(posterior, hanger)
+    """
+    return _drawn(PAIRS, _report(posterior, hanger))
+
+
+def frequency_response(test: Identification, hanger: Hanger | None = None) -> Figure:
+    """The frequency response of a test in m/s^2/N over Hz, with the fitted modes and coherence.
+
+    Example:
+        >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
+        >>> figure = shm.plot.frequency_response(test)
+    """
+    return _drawn(RESPONSE, TestSheet(test, hanger=hanger))
+
+
+def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
+    """The poles of all model orders over Hz, and which of them became modes.
+
+    Example:
+        >>> figure = shm.plot.stabilisation(test)
+    """
+    return _drawn(STABILISATION, TestSheet(test, hanger=hanger))
+
+
+def shapes(test: Identification, hanger: Hanger) -> Figure:
+    """The identified mode shapes along the hanger in m from the deck end, by plane and order.
+
+    Example:
+        >>> figure = shm.plot.shapes(test, hanger)
+    """
+    return _drawn(SHAPES, TestSheet(test, hanger=hanger))
+
+
+def gap(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
+    """Where the gap between model and measurement lies: by mode, condition and place.
+
+    Example:
+        >>> figure = shm.plot.gap(shm.diagnose(tests, hanger), hanger)
+    """
+    return _drawn(GAP_MAP, DiagnosisSheet(diagnosis, hanger))
+
+
+def causes(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
+    """What causes the gap: the probability of each effect, of no gap, of something unknown.
+
+    Example:
+        >>> figure = shm.plot.causes(shm.diagnose(tests, hanger), hanger)
+    """
+    return _drawn(CAUSES, DiagnosisSheet(diagnosis, hanger))
+
+
+def _drawn(member: Member[Data], data: Data) -> Figure:
+    figure = member.draw(data)
+    if figure is None:
+        raise NothingThere(
+            f"these data do not hold what the figure {member.title!r} shows.",
+            remedy="See the docstring for what it needs.",
+        )
+    figure.set_facecolor("white")
+    return figure
+
+
+def _history(
+    posteriors: Sequence[Posterior],
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    baseline: Posterior | None,
+) -> HangerReport:
+    _refuse_unless_matched(posteriors, tests)
+    rows = zip(posteriors, tests, strict=True)
+    trend = tuple(trend_row(posterior, test, hanger) for posterior, test in rows)
+    return _report(posteriors[-1], hanger, tuple(tests), trend=trend, baseline=baseline)
+
+
+def _refuse_unless_matched(posteriors: Sequence[Posterior], tests: Sequence[ModalTest]) -> None:
+    named = [test.id for test in tests]
+    used = [posterior.tests[-1] for posterior in posteriors]
+    if not posteriors or named != used:
+        raise UsageError(
+            f"{len(posteriors)} posteriors and {len(tests)} tests are not one posterior a test.",
+            remedy="Give the posterior of each test in the order of the tests.",
+        )
+
+
+def _report(
+    posterior: Posterior,
+    hanger: Hanger,
+    tests: tuple[ModalTest, ...] = (),
+    trend: tuple[TrendRow, ...] = (),
+    baseline: Posterior | None = None,
+) -> HangerReport:
+    """What the figures of a hanger are drawn from."""
+    return HangerReport(
+        bridge="",
+        hanger=hanger,
+        tests=tests,
+        posterior=posterior,
+        generated_at=datetime.now(UTC),
+        version=__version__,
+        trend=trend,
+        baseline=baseline,
+    )

@@ -1,0 +1,51 @@
+"""The figures on top of a hanger's report."""
+
+from __future__ import annotations
+
+from shm.report import words
+from shm.report.content import HangerReport
+from shm.report.summary import of_nominal, tension_change
+
+
+def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
+    """What, value, what stands beside it."""
+    tension = words.kilonewtons(data.tension_n)
+    return (
+        ("Tension", f"{words.mean(tension)} kN", f"90 % interval {words.span(tension)} kN"),
+        _of_nominal(data),
+        _since_baseline(data),
+        (
+            "Latest test",
+            words.moment(data.latest.time),
+            words.temperature(data.latest.temperature_c),
+        ),
+        (
+            "Model class",
+            words.model_class(data.posterior.model),
+            f"{words.counted(len(data.latest.modes), 'mode')} identified",
+        ),
+    )
+
+
+def _of_nominal(data: HangerReport) -> tuple[str, str, str]:
+    share = of_nominal(data.tension_n, data.hanger)
+    if share is None:
+        return ("Of nominal", "not known", "the hanger has no nominal tension")
+    nominal = f"{data.hanger.nominal_tension_n / 1e3:.0f} kN"
+    return (
+        "Of nominal",
+        f"{words.mean(share)} %",
+        f"90 % interval {words.span(share)} %; nominal {nominal}",
+    )
+
+
+def _since_baseline(data: HangerReport) -> tuple[str, str, str]:
+    change = tension_change(data)
+    if change is None:
+        return ("Since the baseline", "first test", "nothing earlier to compare with")
+    percent = change.scaled(100)
+    return (
+        "Since the baseline",
+        f"{words.mean(percent, signed=True)} %",
+        f"90 % interval {words.span(percent, signed=True)} %",
+    )

@@ -1,0 +1,179 @@
+"""The parts of a paper as what reportlab sets one below the other."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from itertools import count
+from typing import Any
+from xml.sax.saxutils import escape
+
+from reportlab.lib import colors
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.lib.units import mm
+from reportlab.platypus import (
+    CallerMacro,
+    Flowable,
+    Image,
+    KeepTogether,
+    Paragraph,
+    Spacer,
+)
+from reportlab.platypus import (
+    Table as SetTable,
+)
+
+from shm.report.figures import style
+from shm.report.figures.member import Illustration
+from shm.report.paper import columns, fonts
+from shm.report.paper.content import Fact, Paper, Part
+from shm.report.table import Table
+
+WIDTH = 174 * mm
+DOTS_PER_INCH = 220
+_TALLEST = 200 * mm
+_PADDING = 4.0
+_CELL_SIZE = 7.6
+_INK, _QUIET, _GRID = (colors.HexColor(each) for each in (style.INK, style.QUIET, style.GRID))
+_PANEL = colors.HexColor("#f4f6f9")
+STATUS_COLOURS = {
+    "alert": style.RED,
+    "watch": style.ORANGE,
+    "steady": style.GREEN,
+    "first": style.BLUE,
+}
+"""By the page's style of a state; its word always stands beside the colour."""
+_VERDICT_COLOURS = {"good": style.GREEN, "warning": style.ORANGE, "refused": style.RED}
+
+
+def _letters(name: str, size: float, font: str = fonts.PLAIN, **more: Any) -> ParagraphStyle:
+    settings = {"textColor": _INK, "leading": 1.35 * size, "bulletFontName": font, **more}
+    return ParagraphStyle(name, fontName=font, fontSize=size, **settings)
+
+
+_TITLE = _letters("title", 17, fonts.BOLD, spaceAfter=6)
+_HEADING = _letters("heading", 12.5, fonts.BOLD, spaceBefore=12, spaceAfter=6, keepWithNext=1)
+_SUBHEADING = _letters("subheading", 9.5, fonts.BOLD, spaceAfter=3, keepWithNext=1)
+_BODY = _letters("body", 9, leading=13.2)
+_NOTE = _letters("note", 7.6, textColor=_QUIET, spaceBefore=2, spaceAfter=9)
+_REMARK = _letters("remark", 8.6, leftIndent=10, bulletIndent=0, spaceAfter=2)
+_CELL = _letters("cell", _CELL_SIZE)
+_HEAD = _letters("head", _CELL_SIZE, fonts.BOLD, textColor=_QUIET)
+_FACT = _letters("fact", 11, fonts.BOLD)
+_LABEL = _letters("label", 7.6, textColor=_QUIET)
+
+
+def flowables(paper: Paper) -> list[Flowable]:
+    """The title and all parts that have something, in order; figures and tables are numbered."""
+    figures, tables = count(1), count(1)
+    colour = STATUS_COLOURS[paper.style]
+    state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
+    top: list[Flowable] = [
+        Paragraph(escape(paper.bridge), _LABEL),
+        Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
+    ]
+    parts = [
+        each for part in paper.parts if not part.is_empty
+        for each in _part(part, colour, figures, tables)
+    ]  # fmt: skip
+    return [*top, *parts, Paragraph(escape(f"{paper.made}. {paper.closing}"), _NOTE)]
+
+
+def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> list[Flowable]:
+    heading: list[Flowable] = [_mark(part.title), Paragraph(escape(part.title), _HEADING)]
+    found: list[Flowable] = []
+    if part.summary:
+        found += [_panel(Paragraph(escape(part.summary), _BODY), colour), Spacer(1, 6)]
+    if part.facts:
+        found += [_facts(part.facts), Spacer(1, 8)]
+    found += [Paragraph(escape(each), _REMARK, bulletText="•") for each in part.remarks]
+    drawn = [_figure(each, next(figures)) for each in part.illustrations]
+    if drawn and not found:
+        # Stated, because a heading is not kept with what is itself kept together.
+        drawn[0], heading = [*heading, *drawn[0]], []
+    found += [KeepTogether(each) for each in drawn]
+    for table in part.tables:
+        found += _table(table, next(tables))
+    return [*heading, *found]
+
+
+def _mark(title: str) -> Flowable:
+    """An entry of the document's outline, kept with the heading that follows."""
+
+    def entry(macro: CallerMacro) -> None:
+        macro.canv.bookmarkPage(title)
+        macro.canv.addOutlineEntry(title, title, level=0)
+
+    mark = CallerMacro(drawCallable=entry)
+    mark.keepWithNext = 1
+    return mark
+
+
+def _panel(paragraph: Paragraph, colour: str) -> Flowable:
+    rules = [
+        ("BACKGROUND", (0, 0), (-1, -1), _PANEL),
+        ("LINEBEFORE", (0, 0), (0, -1), 3, colors.HexColor(colour)),
+        ("LEFTPADDING", (0, 0), (-1, -1), 9),
+        ("TOPPADDING", (0, 0), (-1, -1), 6),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 7),
+    ]
+    return SetTable([[paragraph]], [WIDTH], style=rules, splitInRow=1)
+
+
+def _facts(facts: Sequence[Fact]) -> Flowable:
+    cells = [
+        [
+            Paragraph(escape(what), _LABEL),
+            Paragraph(escape(value), _FACT),
+            Paragraph(escape(beside), _LABEL),
+        ]
+        for what, value, beside in facts
+    ]
+    rules = [
+        ("BACKGROUND", (0, 0), (-1, -1), _PANEL),
+        ("VALIGN", (0, 0), (-1, -1), "TOP"),
+        ("INNERGRID", (0, 0), (-1, -1), 3, colors.white),
+    ]
+    return SetTable([cells], [WIDTH / len(cells)] * len(cells), style=rules)
+
+
+def _figure(item: Illustration, number: int) -> list[Flowable]:
+    inches = item.figure.get_size_inches()
+    points = min(WIDTH / inches[0], _TALLEST / inches[1]) * inches
+    picture = Image(io.BytesIO(item.png(DOTS_PER_INCH)), *map(float, points))
+    caption = f"<b>Figure {number}.</b> {escape(item.caption)}"
+    return [Paragraph(escape(item.title), _SUBHEADING), picture, Paragraph(caption, _NOTE)]
+
+
+def _table(table: Table, number: int) -> list[Flowable]:
+    """Rows break over pages under repeated headings."""
+    title = Paragraph(f"Table {number}. {escape(table.title)}", _SUBHEADING)
+    rows = [[Paragraph(escape(cell), _HEAD) for cell in table.headings]]
+    rows += [[Paragraph(escape(cell), _CELL) for cell in row] for row in table.rows]
+    set_table = SetTable(
+        rows,
+        columns.widths(table, WIDTH, _CELL_SIZE, 2 * _PADDING),
+        repeatRows=1,
+        splitInRow=1,
+        hAlign="LEFT",
+        style=_rules(table),
+    )
+    note = [Paragraph(escape(table.note), _NOTE)] if table.note else [Spacer(1, 9)]
+    return [title, set_table, *note]
+
+
+def _rules(table: Table) -> list[tuple[Any, ...]]:
+    rules: list[tuple[Any, ...]] = [
+        ("VALIGN", (0, 0), (-1, -1), "TOP"),
+        ("LINEBELOW", (0, 0), (-1, 0), 0.8, _QUIET),
+        ("LINEBELOW", (0, 1), (-1, -1), 0.3, _GRID),
+        ("LEFTPADDING", (0, 0), (-1, -1), 0),
+        ("RIGHTPADDING", (0, 0), (-1, -1), 2 * _PADDING),
+        ("TOPPADDING", (0, 0), (-1, -1), 2),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 2.5),
+    ]
+    for row, mark in enumerate(table.marks, 1):
+        if mark in _VERDICT_COLOURS:
+            colour = colors.HexColor(_VERDICT_COLOURS[mark])
+            rules.append(("LINEBEFORE", (1, row), (1, row), 1.5, colour))
+    return rules

@@ -1,0 +1,99 @@
+"""What the store hands out to be looked at by the thousand: rows without samples or contents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+from shm.store.rows import Stage
+from shm.values import Summary
+
+
+@dataclass(frozen=True)
+class TestRow:
+    """A test by its name; `time` is its own or, where it has none, the time of receipt."""
+
+    __test__ = False  # no test, though named so
+
+    id: int
+    recording_id: int
+    hanger: int
+    name: str
+    time: datetime
+    stage: Stage
+
+
+@dataclass(frozen=True, kw_only=True)
+class Numbers:
+    """A posterior in numbers.
+
+    `stiffness` is that of each plane's ends as `shm.models.ends.end_stiffness` has it, log10 of
+    N m/rad, by `transverse_end_stiffness` and the like; empty where the class clamps the ends.
+    `parameters` are those of the class, as it takes them, and sigma.
+    """
+
+    tension_n: Summary
+    most_probable_tension_n: float
+    stiffness: Mapping[str, Summary]
+    parameters: Mapping[str, Summary]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrendPoint(Numbers):
+    """One test in the history of a hanger, with its posterior in numbers.
+
+    `taken_at` is None where the test tells no time and `time` is that of its receipt.
+    """
+
+    test_id: int
+    test: str
+    hanger: int
+    time: datetime
+    taken_at: datetime | None
+    temperature_c: float
+    posterior_id: int
+    model: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaselineGlance(Numbers):
+    """A baseline in force with its posterior in numbers; see `Baseline`.
+
+    `temperature_c` is the mean of its tests, NaN where none has one.
+    """
+
+    id: int
+    hanger: int
+    set_at: datetime
+    who: str
+    why: str
+    since: datetime | None
+    model: str
+    tests: tuple[str, ...]
+    temperature_c: float
+
+
+class EventKind(StrEnum):
+    """What happened to a hanger beside its tests."""
+
+    BASELINE = "baseline"
+    ADOPTED = "adopted"
+    UNDONE = "adoption undone"
+    ALERT = "alert"
+    ACKNOWLEDGED = "acknowledged"
+
+
+@dataclass(frozen=True)
+class HangerEvent:
+    """Something that happened to a hanger, and who did it and why; `id` is that of its kind's row.
+
+    An alert has its message for a reason and nobody who did it; its time is that of its test.
+    """
+
+    at: datetime
+    kind: EventKind
+    who: str
+    why: str
+    id: int

@@ -1,0 +1,274 @@
+"""Posteriors in numbers: years of tests of a hanger, all hangers at once, without their samples.
+
+A summary is kept beside its posterior. Where there is none yet, as of rows of before there were
+any, or where the hanger is described otherwise by now, it is made from the samples anew: what is
+answered is the same, only later.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import astuple
+from datetime import datetime
+from statistics import fmean
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import UsageError
+from shm.store.blobs import number, posterior_from
+from shm.store.database import Database
+from shm.store.files import in_force
+from shm.store.glances import BaselineGlance, Numbers, TrendPoint
+from shm.store.queries import baselines_now, hidden
+from shm.store.rows import Stage
+from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
+from shm.values import NAN, Hanger, Posterior, Summary
+
+log = logging.getLogger(__name__)
+
+_AT_ONCE = 50
+_OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
+_NAMED = ("stiffness", "parameters")
+_SUMMARY = (summaries.c.key, summaries.c.document.label("summary"))
+
+
+class Trends(Database):
+    """The part of the store that answers in numbers."""
+
+    def trend(self, hanger: Hanger, since: datetime | None = None) -> tuple[TrendPoint, ...]:
+        """Each test of a hanger that has a posterior, in numbers, by time: see `history`."""
+        chosen = _shown_tests().where(tests.c.hanger == hanger.id)
+        if since is not None:
+            chosen = chosen.where(tests.c.time >= since)
+        return self._points(chosen, [hanger])
+
+    def latest_trends(self, hangers: Iterable[Hanger]) -> dict[int, TrendPoint]:
+        """The latest point of each hanger that has one, by hanger."""
+        known = list(hangers)
+        of_hangers = sa.select(tests.c.hanger).where(in_force(tests)).distinct().subquery()
+        latest = (
+            _shown_tests()
+            .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
+            .order_by(tests.c.time.desc(), tests.c.id.desc())
+            .limit(1)
+            .correlate(of_hangers)
+        )
+        query = sa.select(latest.scalar_subquery()).select_from(of_hangers)
+        with self.reading() as connection:
+            ids = [id_ for id_ in connection.scalars(query) if id_ is not None]
+        return {point.hanger: point for point in self._points(ids, known)}
+
+    def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
+        """The baseline in force of each hanger that has one, in numbers, by hanger."""
+        query = (
+            sa.select(baselines, posteriors.c.model, *_SUMMARY)
+            .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
+            .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
+            .where(baselines.c.id.in_(baselines_now()))
+            .order_by(baselines.c.hanger)
+        )
+        known = {hanger.id: hanger for hanger in hangers}
+        with self.reading() as connection:
+            rows = [row for row in connection.execute(query) if row.hanger in known]
+            numbers = _numbers(connection, rows, known)
+            made_of = _made_of(connection, [row.posterior_id for row in rows])
+        return {
+            row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
+            for row in rows
+        }
+
+    def keep_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
+        """Keeps the summaries of a hanger that are not kept yet; how many there were.
+
+        Some at a time, each time a transaction: it may be killed and begun again.
+        """
+        missing = self._missing(hanger)
+        for begin in range(0, len(missing), _AT_ONCE):
+            some = missing[begin : begin + _AT_ONCE]
+            with self.reading() as connection:
+                made = _made(connection, some, {hanger.id: hanger})
+            rows = [
+                {"posterior_id": id_, "key": key_of(hanger), "document": _document(numbers)}
+                for id_, numbers in made.items()
+            ]
+            with self.writing() as connection:
+                former = summaries.c.posterior_id.in_(some)
+                connection.execute(sa.delete(summaries).where(former))
+                connection.execute(sa.insert(summaries), rows)
+            tell((begin + len(some)) / len(missing))
+        return len(missing)
+
+    def _missing(self, hanger: Hanger) -> list[int]:
+        """What is shown of a hanger and has no summary under its present description."""
+        up_to_date = sa.exists().where(
+            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key_of(hanger)
+        )
+        of_baselines = sa.select(baselines.c.posterior_id).where(
+            baselines.c.id.in_(baselines_now())
+        )
+        looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
+        query = sa.select(posteriors.c.id).where(
+            posteriors.c.hanger == hanger.id, in_force(posteriors), looked_at, ~up_to_date
+        )
+        with self.reading() as connection:
+            return list(connection.scalars(query.order_by(posteriors.c.id)))
+
+    def _points(
+        self, chosen: sa.Select[Any] | Sequence[int], hangers: Iterable[Hanger]
+    ) -> tuple[TrendPoint, ...]:
+        """Of tests that are `chosen` by their numbers, by time."""
+        newest = (
+            sa.select(
+                posterior_tests.c.test_id,
+                sa.func.max(posterior_tests.c.posterior_id).label("posterior_id"),
+            )
+            .join(posteriors)
+            .where(posterior_tests.c.test_id.in_(chosen), *_shown())
+            .group_by(posterior_tests.c.test_id)
+            .subquery()
+        )
+        of_test = (tests.c[name] for name in _OF_TEST)
+        query: sa.Select[Any] = (
+            sa.select(*of_test, newest.c.posterior_id, posteriors.c.model, *_SUMMARY)
+            .select_from(newest)
+            .join(tests, tests.c.id == newest.c.test_id)
+            .join(posteriors, posteriors.c.id == newest.c.posterior_id)
+            .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
+            .order_by(tests.c.time, tests.c.id)
+        )
+        known = {hanger.id: hanger for hanger in hangers}
+        with self.reading() as connection:
+            rows = [row for row in connection.execute(query) if row.hanger in known]
+            numbers = _numbers(connection, rows, known)
+        return tuple(_point(row, numbers[row.posterior_id]) for row in rows)
+
+
+def _shown_tests() -> sa.Select[Any]:
+    return sa.select(tests.c.id).where(in_force(tests), tests.c.stage != Stage.REFUSED)
+
+
+def _shown() -> tuple[sa.ColumnElement[bool], ...]:
+    return posteriors.c.id.not_in(hidden), in_force(posteriors)
+
+
+def _of_shown(test_id: sa.ColumnElement[int]) -> sa.Select[Any]:
+    """The test itself, where it has a posterior that is shown."""
+    query = sa.select(posterior_tests.c.test_id).join(posteriors)
+    return query.where(posterior_tests.c.test_id == test_id, *_shown())
+
+
+def _numbers(
+    connection: Connection, rows: Sequence[Row[Any]], hangers: Mapping[int, Hanger]
+) -> dict[int, Numbers]:
+    """Of each row's posterior: as they are kept, or made from its samples."""
+    keys = {number_: key_of(hanger) for number_, hanger in hangers.items()}
+    kept = {
+        row.posterior_id: _from_document(row.summary) for row in rows if row.key == keys[row.hanger]
+    }
+    missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
+    for begin in range(0, len(missing), _AT_ONCE):
+        kept |= _made(connection, missing[begin : begin + _AT_ONCE], hangers)
+    return kept
+
+
+def _made(
+    connection: Connection, ids: Sequence[int], hangers: Mapping[int, Hanger]
+) -> dict[int, Numbers]:
+    columns = (posteriors.c[name] for name in ("id", "hanger", "document", "samples"))
+    query = sa.select(*columns).where(posteriors.c.id.in_(ids))
+    return {
+        row.id: summarised(posterior_from(row.document, row.samples), hangers[row.hanger])
+        for row in connection.execute(query)
+    }
+
+
+def summarised(posterior: Posterior, hanger: Hanger) -> Numbers:
+    """A posterior of `hanger` in numbers."""
+    # Imported here because who only asks what is kept needs no model.
+    from shm.models.ends import end_stiffness
+
+    try:
+        stiffness = end_stiffness(posterior, hanger)
+    except UsageError as reason:  # its effect may have left the catalogue since
+        log.warning("no end stiffness of hanger %d: %s", hanger.id, reason)
+        stiffness = {}
+    most_probable = posterior.most_probable[posterior.names.index("theta_F")]
+    return Numbers(
+        tension_n=Summary.of(posterior.tension_n),
+        most_probable_tension_n=float(most_probable * posterior.nominal_tension_n),
+        stiffness={name: Summary.of(samples) for name, samples in stiffness.items()},
+        parameters={name: Summary.of(posterior.parameter(name)) for name in posterior.names},
+    )
+
+
+def key_of(hanger: Hanger) -> str:
+    """Tells one description of a hanger from another."""
+    return hashlib.sha256(repr(hanger).encode()).hexdigest()
+
+
+def _document(numbers: Numbers) -> dict[str, Any]:
+    """Each summary as a list: there are thousands of them to be read at once."""
+    named = {
+        part: {name: astuple(each) for name, each in getattr(numbers, part).items()}
+        for part in _NAMED
+    }
+    plain = numbers.most_probable_tension_n
+    return {"tension_n": astuple(numbers.tension_n), "most_probable_tension_n": plain, **named}
+
+
+def _from_document(document: Mapping[str, Any]) -> Numbers:
+    named = {
+        part: {name: _summary(each) for name, each in document[part].items()} for part in _NAMED
+    }
+    return Numbers(
+        tension_n=_summary(document["tension_n"]),
+        most_probable_tension_n=number(document["most_probable_tension_n"]),
+        **named,
+    )
+
+
+def _summary(values: Sequence[float | None]) -> Summary:
+    return Summary(*map(number, values))
+
+
+def _point(row: Row[Any], numbers: Numbers) -> TrendPoint:
+    return TrendPoint(
+        test_id=row.id,
+        test=row.name,
+        hanger=row.hanger,
+        time=row.time,
+        taken_at=row.taken_at,
+        temperature_c=row.temperature_c,
+        posterior_id=row.posterior_id,
+        model=row.model,
+        **vars(numbers),
+    )
+
+
+def _made_of(connection: Connection, ids: Sequence[int]) -> defaultdict[int, list[Row[Any]]]:
+    """The names and temperatures of the tests of each posterior, by time."""
+    columns = (posterior_tests.c.posterior_id, tests.c.name, tests.c.temperature_c)
+    query: sa.Select[Any] = sa.select(*columns).join(tests)
+    query = query.where(posterior_tests.c.posterior_id.in_(ids))
+    found = defaultdict[int, list[Row[Any]]](list)
+    for row in connection.execute(query.order_by(tests.c.time, tests.c.id)):
+        found[row.posterior_id].append(row)
+    return found
+
+
+def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> BaselineGlance:
+    temperatures_c = [each.temperature_c for each in made_of if math.isfinite(each.temperature_c)]
+    plain = {name: getattr(row, name) for name in ("id", "hanger", "set_at", "who", "why", "since")}
+    return BaselineGlance(
+        **plain,
+        model=row.model,
+        tests=tuple(each.name for each in made_of),
+        temperature_c=fmean(temperatures_c) if temperatures_c else NAN,
+        **vars(numbers),
+    )

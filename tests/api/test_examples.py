@@ -1,0 +1,30 @@
+"""The examples of the manual run, end with what they assert, and say what they show."""
+
+from __future__ import annotations
+
+import ast
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "docs" / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_finds_the_known_truth(
+    example: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runpy.run_path(str(example), run_name="__main__")
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_says_what_it_shows_and_asserts_it(example: Path) -> None:
+    tree = ast.parse(example.read_text(encoding="utf-8"))
+    assert len((ast.get_docstring(tree) or "").splitlines()) >= 3
+    assert sum(isinstance(node, ast.Assert) for node in ast.walk(tree)) >= 3
+
+
+def test_there_are_examples() -> None:
+    assert len(EXAMPLES) >= 8

@@ -1,0 +1,143 @@
+"""Figures for a notebook are the report's, and values show themselves there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import shm
+from shm import notebook
+from shm.errors import NothingThere, UsageError
+from tests.helpers.diagnoses import a_diagnosis
+
+UNITS = {
+    "tension": "tension (kN)",
+    "trend": "tension (kN)",
+    "frequencies": "predicted / measured frequency",
+    "pairs": "theta_F",
+    "frequency_response": "accelerance (m/s²/N)",
+    "stabilisation": "frequency (Hz)",
+    "shapes": "position from the deck end (m)",
+}
+
+
+@pytest.fixture(scope="module")
+def drawn(
+    hanger: shm.Hanger,
+    posterior: shm.Posterior,
+    test_of_711_kn: shm.ModalTest,
+    identified: shm.Identification,
+) -> dict[str, Figure]:
+    dated = replace(test_of_711_kn, time=datetime(2026, 5, 1, tzinfo=UTC))
+    return {
+        "tension": shm.plot.tension(posterior, hanger),
+        "trend": shm.plot.trend([posterior], [dated], hanger),
+        "frequencies": shm.plot.frequencies(posterior, test_of_711_kn, hanger),
+        "pairs": shm.plot.pairs(posterior, hanger),
+        "frequency_response": shm.plot.frequency_response(identified, hanger),
+        "stabilisation": shm.plot.stabilisation(identified),
+        "shapes": shm.plot.shapes(identified, hanger),
+    }
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_a_figure_is_one_of_matplotlib_with_labels_on_white(
+    drawn: dict[str, Figure], name: str
+) -> None:
+    figure = drawn[name]
+    assert isinstance(figure, Figure)
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    labels += [axes.get_ylabel().replace("\n", " ") for axes in figure.axes]
+    labels += [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text]
+    assert UNITS[name] in labels
+    assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_pairs_show_each_parameter_and_each_two(
+    drawn: dict[str, Figure], posterior: shm.Posterior
+) -> None:
+    panels = drawn["pairs"].axes
+    assert len(panels) == len(posterior.names) ** 2
+    said = [text.get_text() for axes in panels for text in axes.texts]
+    force, length, _ = posterior.samples.T
+    assert said[0] == f"{np.corrcoef(force, length)[0, 1]:+.2f}"
+
+
+def test_a_parameter_that_does_not_vary_has_no_correlation(
+    hanger: shm.Hanger, posterior: shm.Posterior
+) -> None:
+    samples = posterior.samples.copy()
+    samples[:, 1] = 1.0
+    figure = shm.plot.pairs(replace(posterior, samples=samples), hanger)
+    assert "constant" in [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_the_figures_of_a_diagnosis_are_those_of_its_page(hanger: shm.Hanger) -> None:
+    found = a_diagnosis()
+    assert "order of the mode" in [a.get_xlabel() for a in shm.plot.gap(found, hanger).axes]
+    assert "probability" in [a.get_xlabel() for a in shm.plot.causes(found, hanger).axes]
+
+
+def test_a_figure_without_its_data_says_so(
+    hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+) -> None:
+    with pytest.raises(NothingThere, match="'Trend of the tension'"):
+        shm.plot.trend([posterior], [test_of_711_kn], hanger)  # no test has a time
+    with pytest.raises(UsageError, match="1 posteriors and 0 tests"):
+        shm.plot.trend([posterior], [], hanger)
+
+
+class Formatter:
+    """What IPython's formatters do with a name of a class."""
+
+    def __init__(self) -> None:
+        self.shown: dict[tuple[str, str], Callable[..., object]] = {}
+
+    def for_type_by_name(self, home: str, kind: str, show: Callable[..., object]) -> object:
+        before = self.shown.get((home, kind))
+        self.shown[home, kind] = show
+        return before
+
+
+@pytest.fixture
+def formatters() -> dict[str, Formatter]:
+    return {"text/html": Formatter(), "image/png": Formatter()}
+
+
+@pytest.fixture
+def shell(formatters: dict[str, Formatter]) -> SimpleNamespace:
+    return SimpleNamespace(display_formatter=SimpleNamespace(formatters=formatters))
+
+
+def test_a_notebook_shows_values_by_the_names_of_their_classes(
+    shell: SimpleNamespace,
+    formatters: dict[str, Formatter],
+    hanger: shm.Hanger,
+    posterior: shm.Posterior,
+) -> None:
+    notebook.load_ipython_extension(shell)
+    shown = formatters["text/html"].shown
+    choice = shm.Selection((posterior,), (1.0,))
+    for value in (hanger, posterior, choice, a_diagnosis()):
+        html = shown[type(value).__module__, type(value).__name__](value)
+        assert re.search(r"<caption>.*hanger 3", str(html), re.IGNORECASE)
+        assert not re.search(r"\bnan\b|None|\binf\b", str(html))
+    assert "tension in kN" in str(shown["shm.values.posterior", "Posterior"](posterior))
+
+
+def test_a_notebook_shows_figures_unless_it_does_already(
+    shell: SimpleNamespace, formatters: dict[str, Formatter], drawn: dict[str, Figure]
+) -> None:
+    notebook.load_ipython_extension(shell)
+    png = formatters["image/png"].shown["matplotlib.figure", "Figure"](drawn["tension"])
+    assert bytes(png).startswith(b"\x89PNG")  # type: ignore[call-overload]
+    own = formatters["image/png"].shown["matplotlib.figure", "Figure"] = lambda figure: b""
+    notebook.load_ipython_extension(shell)
+    assert formatters["image/png"].shown["matplotlib.figure", "Figure"] is own

@@ -1,0 +1,142 @@
+"""What `import shm` gives: names and signatures are pinned, importing is cheap."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import shm
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SIGNATURES = {
+    "read": "(path)",
+    "load_modes": "(path)",
+    "load_hanger": "(path, hanger_id=None)",
+    "round_bar": "(id, *, diameter_m, length_m, elastic_modulus_pa, density_kg_m3, "
+    "nominal_tension_n, name='')",
+    "identify": "(records, *, hanger=None, test_id=None, band_hz=(2.0, 100.0), identifier='ssi', "
+    "cross_check='frf', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
+    "mains_hz=50.0, window_time_constant_s=inf)",
+    "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, repeat=1, "
+    "method='noise-floor', progress)",
+    "select": "(tests, hanger, models=None, *, seed=1, samples=1000, repeat=1, "
+    "method='noise-floor', progress)",
+    "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
+    "progress)",
+    "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "
+    "k4_n_m_rad=inf, damping_ratio=0.001, hits=5, seconds_per_hit=20.0, sampling_rate_hz=512.0, "
+    "sensors=2, hammer_x_m=nan, acceleration_noise_m_s2=0.02, effects=(), disturbances=(), "
+    "amplitude=1.0, temperature_c=nan, reference_c=10.0, added_mass=None, time=None, seed=1)",
+    "Store": "(workspace)",
+    "plot.tension": "(posterior, hanger, baseline=None)",
+    "plot.trend": "(posteriors, tests, hanger, baseline=None)",
+    "plot.stiffness": "(posteriors, tests, hanger, baseline=None)",
+    "plot.frequencies": "(posterior, test, hanger)",
+    "plot.pairs": "(posterior, hanger)",
+    "plot.frequency_response": "(test, hanger=None)",
+    "plot.stabilisation": "(test, hanger=None)",
+    "plot.shapes": "(test, hanger)",
+    "plot.gap": "(diagnosis, hanger)",
+    "plot.causes": "(diagnosis, hanger)",
+    "export.samples": "(posterior)",
+    "export.modes": "(tests)",
+    "export.datatree": "(posterior, tests=(), hanger=None)",
+    "export.write": "(posterior, path, format=None, *, tests=(), hanger=None)",
+    "export.check_format": "(path, format=None)",
+}
+NOUNS = {
+    "AddedMass", "Diagnosis", "FrequencyResponse", "Hanger", "Identification", "ModalTest", "Mode",
+    "PlantedEffect", "Posterior", "Recording", "Selection", "ShmError",
+}  # fmt: skip
+
+
+def named(path: str) -> object:
+    found: object = shm
+    for part in path.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def bare(signature: inspect.Signature) -> str:
+    """The signature without types; a default that is a function is left out."""
+    parameters = [
+        each.replace(
+            annotation=inspect.Parameter.empty,
+            default=inspect.Parameter.empty if callable(each.default) else each.default,
+        )
+        for each in signature.parameters.values()
+    ]
+    return str(signature.replace(parameters=parameters, return_annotation=inspect.Signature.empty))
+
+
+def test_the_names_are_pinned() -> None:
+    top = {name for name in SIGNATURES if "." not in name}
+    assert set(shm.__all__) == top | NOUNS | {"plot", "export"}
+    assert {f"plot.{name}" for name in shm.plot.__all__} == {
+        name for name in SIGNATURES if name.startswith("plot.")
+    }
+    assert {f"export.{name}" for name in shm.export.__all__} == {
+        name for name in SIGNATURES if name.startswith("export.")
+    } | {"export.FORMATS"}
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_a_signature_is_pinned(name: str) -> None:
+    assert bare(inspect.signature(named(name))) == SIGNATURES[name]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", [name for name in SIGNATURES if name != "export.check_format"])
+def test_a_docstring_shows_an_example(name: str) -> None:
+    text = inspect.getdoc(named(name)) or ""
+    assert ">>> " in text
+
+
+def test_help_and_dir_tell_every_name() -> None:
+    text = shm.__doc__ or ""
+    assert set(shm.__all__) <= set(dir(shm))
+    assert [name for name in shm.__all__ if f"`{name}`" not in text] == []
+
+
+def test_a_step_is_a_package_too_whatever_was_imported_first() -> None:
+    from shm.identify import identify as inner
+    from shm.identify.options import IdentifyOptions
+
+    assert isinstance(shm.identify, types.ModuleType)
+    assert shm.identify.options.IdentifyOptions is IdentifyOptions
+    assert shm.identify.identify is inner
+    assert callable(shm.identify)
+    assert "band_hz" in inspect.signature(shm.identify).parameters
+    assert (shm.identify.__doc__ or "").startswith("The modes of one test")
+
+
+def test_a_wrong_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'indentify'"):
+        shm.indentify  # noqa: B018
+
+
+def test_importing_loads_nothing_and_takes_little() -> None:
+    code = (
+        "import sys, time; before = set(sys.modules); start = time.process_time(); import shm\n"
+        "took = time.process_time() - start; new = set(sys.modules) - before\n"
+        "print(took, *(name for name in new if name.startswith('shm') or 'numpy' in name))"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    took, *loaded = ran.stdout.split()
+    assert loaded == ["shm"]
+    assert float(took) < 0.1
+
+
+def test_a_step_can_be_called_after_its_package_was_imported() -> None:
+    code = "import shm.read, shm\ntry: shm.read('none.csv')\nexcept shm.ShmError as e: print(e)"
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.startswith("none.csv: ")

@@ -1,0 +1,79 @@
+"""The manual: its commands are those of the command line, its pages and anchors are found."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+from tests.helpers.command_lines import commands, fenced_commands, inline_commands, parse, words_of
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
+TYPED = [
+    pytest.param(line, id=f"{page.name}: {line}")
+    for page in (*PAGES, ROOT / "README.md")
+    for line in fenced_commands(page)
+]
+NAMES = dict(commands())
+
+
+@pytest.fixture(autouse=True)
+def files_need_not_exist(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        click.Path, "convert", lambda self, value, *_: self.coerce_path_result(value)
+    )
+
+
+@pytest.mark.parametrize("line", TYPED)
+def test_a_command_of_a_page_is_taken(line: str) -> None:
+    assert parse(line).startswith("shm ")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_a_sentence_calls_a_command_is_one(page: Path) -> None:
+    for line in inline_commands(page):
+        words = words_of(line.replace("--workspace arch", ""))
+        named = [word for word in words if not word.startswith(("-", "/"))]
+        spoken_of = {" ".join(named[:length]) for length in (1, 2, 3)} & set(NAMES)
+        assert spoken_of or {"--help", "--debug", "--version"} & set(words) or "..." in line, line
+        known = {
+            option
+            for name in spoken_of
+            for parameter in NAMES[name].params
+            for option in parameter.opts
+        } | {"--workspace", "--help", "--debug"}
+        unknown = {word for word in words if word.startswith("--") and word.isascii()} - known
+        assert not unknown, line
+
+
+def test_every_page_has_its_place_in_the_tree() -> None:
+    listed = re.findall(
+        r"^```\{toctree\}\n(.*?)^```$", (DOCS / "index.md").read_text(), re.M | re.S
+    )
+    entries = [line for block in listed for line in block.splitlines() if line[:1] not in (":", "")]
+    assert sorted(entries) == sorted(page.stem for page in PAGES if page.stem != "index")
+
+
+def test_the_index_says_of_every_page_what_it_is_for() -> None:
+    linked = set(re.findall(r"\]\((\w+)\.md\)", (DOCS / "index.md").read_text()))
+    assert linked == {page.stem for page in PAGES if page.stem != "index"}
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda page: page.name)
+def test_anchors_lead_to_headings(page: Path) -> None:
+    for file, anchor in re.findall(r"\]\(([\w./]*\.md)?#([\w-]+)\)", page.read_text()):
+        target = page.parent / file if file else page
+        assert anchor in _anchors(target), f"{file}#{anchor}"
+
+
+def _anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as readers of Markdown form them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.+)$", text, re.M)
+    return {
+        re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings
+    }

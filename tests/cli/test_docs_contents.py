@@ -1,0 +1,84 @@
+"""What stands in the pages beside commands: descriptions, sidecars, documents, equations."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from sphinx.errors import SphinxError
+
+from shm.documents import load_modes
+from shm.read import peek, sidecar_path
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def blocks(page: str, kind: str) -> list[str]:
+    text = (DOCS / page).read_text()
+    return re.findall(rf"^```{kind}\n(.*?)^```$", text, re.M | re.S)
+
+
+def test_the_sidecars_of_the_page_on_own_data_make_a_file_complete(tmp_path: Path) -> None:
+    whole, volts = blocks("own_data.md", "toml")
+    path = tmp_path / "hanger3.csv"
+    path.write_text(
+        "# sampling_rate_hz: 512\nforce,acc_1,acc_2\n" + "1,2,3\n" * 64, encoding="utf-8"
+    )
+    sidecar_path(path).write_text(whole)
+    first = peek(path)
+    assert first.problems == ()
+    assert first.hanger == 3
+    assert [channel.plane for channel in first.channels[1:]] == ["transverse", "longitudinal"]
+    sidecar_path(path).write_text(volts)
+    assert [channel.calibration for channel in peek(path).channels[:2]] == [227.0, 10.0]
+
+
+def test_the_modal_tests_of_the_page_on_own_data_are_read(tmp_path: Path) -> None:
+    (document,) = blocks("own_data.md", "json")
+    path = tmp_path / "t1.modes.json"
+    path.write_text(document)
+    (test,) = load_modes(path)
+    assert [mode.plane for mode in test.modes] == ["transverse", "longitudinal"]
+    assert json.loads(document)["hanger"] == test.hanger
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_every_description_of_a_page_is_toml(page: Path) -> None:
+    for block in blocks(page.name, "toml"):
+        if "# ..." not in block:
+            assert tomllib.loads(block)
+
+
+@pytest.fixture(scope="module")
+def drawn_math() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "drawn_math", DOCS / "extensions" / "drawn_math.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_equation_of_the_physics_can_be_drawn(drawn_math: ModuleType) -> None:
+    text = (DOCS / "physics.md").read_text()
+    displayed = re.findall(r"\$\$(.+?)\$\$", text, re.S)
+    lines = [line for block in displayed for line in block.split(r"\\")]
+    inline = re.findall(r"(?<!\$)\$([^$\n]+)\$(?!\$)", re.sub(r"\$\$.+?\$\$", "", text, flags=re.S))
+    assert len(lines) > 10
+    assert len(inline) > 30
+    for equation in (*lines, *inline):
+        drawn = drawn_math.drawing(equation, 1.0)
+        assert drawn.count("<svg") == 1
+        assert 'fill="currentColor"' in drawn
+
+
+def test_an_equation_that_cannot_be_drawn_is_named(drawn_math: ModuleType) -> None:
+    with pytest.raises(SphinxError, match="frobnicate"):
+        drawn_math.drawing(r"\frobnicate{x}", 1.0)

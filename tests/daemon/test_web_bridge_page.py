@@ -1,0 +1,197 @@
+"""The page of the bridge: the elevation, its marks, and the same in a table and in JSON."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import timedelta
+from itertools import pairwise
+from pathlib import Path
+
+import httpx
+import pytest
+
+from shm.report import Interval, Status
+from shm.report.bridge.content import HangerLine
+from shm.store import Workspace
+from shm.values import TENSION, Drift, Hanger
+from shm_daemon.web import bridge_view
+from shm_daemon.web.address import Address
+from shm_daemon.web.bridge_drawing import CLASSES, elevation, kind_of, shift_words
+from shm_daemon.web.bridge_view import HangerGlance
+from shm_daemon.web.site import Site
+from tests.helpers.flows import ingest
+from tests.helpers.web_servers import Served, served
+from tests.helpers.workspaces import START, make_workspace, write_loss
+
+
+def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
+    """A hanger whose tension moved by so much since its baseline."""
+    moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
+    tension = Interval.normal(711e3, 5e3)
+    line = HangerLine(hanger, Status.STEADY, START, tension, drift=moved)
+    return HangerGlance(line, tests=9)
+
+
+def never_tested(hanger: Hanger) -> HangerGlance:
+    return HangerGlance(HangerLine(hanger, None))
+
+
+@pytest.fixture(scope="module")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Hanger 3 has lost a fifth of its tension; hanger 4 was never tested."""
+    workspace = make_workspace(tmp_path_factory.mktemp("page") / "bridge", hangers=(3, 4))
+    write_loss(workspace.spool, workspace)
+    ingest(workspace)
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def site(bridge: Workspace) -> Iterator[Served]:
+    with served(bridge) as site:
+        yield site
+
+
+@pytest.fixture(scope="module")
+def client(site: Served) -> Iterator[httpx.Client]:
+    with site.client(Accept="text/html") as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def hanger(bridge: Workspace) -> Hanger:
+    return bridge.bridge.hangers[0]
+
+
+def drawn(page: str) -> ET.Element:
+    found = re.search(r'<svg class="elevation".*?</svg>', page, re.DOTALL)
+    assert found is not None
+    return ET.fromstring(found[0])
+
+
+def test_each_hanger_is_a_link_with_its_state_in_words(client: httpx.Client) -> None:
+    links = drawn(client.get("/").text).findall("a")
+    assert [link.get("href") for link in links] == ["/hangers/3", "/hangers/4"]
+    lost, never = (link.get("aria-label", "") for link in links)
+    assert re.match(r"Hanger 3, -(19|20|21)\.?\d* % .* since the baseline", lost)
+    assert "open alert" in lost
+    assert "no test yet" in never
+
+
+def test_what_was_lost_is_marked_in_colour_and_in_shape(client: httpx.Client) -> None:
+    lost, never = drawn(client.get("/").text).findall("a")
+    assert "lost3" in str(lost.get("class"))
+    assert len(lost.findall("polygon")) == 3
+    assert lost.find("g[@class='alarm']") is not None
+    assert "unknown" in str(never.get("class"))
+    assert never.findall("polygon") == []
+
+
+def test_the_table_says_the_same(client: httpx.Client) -> None:
+    page = client.get("/").text
+    rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", page, re.DOTALL)
+    text = [" ".join(re.sub(r"<[^>]+>", " ", row).split()) for row in rows]
+    assert len(text) == 2
+    assert text[0].startswith("Hanger 3 Alert ")
+    assert re.search(r"-(19|20|21)\.\d+ \(-\d+\.\d+ to -\d+\.\d+\)", text[0])
+    assert text[1].startswith("Hanger 4 no test yet")
+    assert "/alerts?hanger=3" in rows[0]
+
+
+def test_the_page_says_how_old_the_last_test_is(client: httpx.Client) -> None:
+    page = " ".join(re.sub(r"<[^>]+>", " ", client.get("/").text).split())
+    assert re.search(r"Last test \d+ d ago hanger 3, \d{4}-\d\d-\d\d \d\d:\d\d UTC", page)
+    assert "1 without a result" in page
+    assert "Over the bridge nothing can be compared" in page
+
+
+def test_the_same_stands_in_json(client: httpx.Client) -> None:
+    found = client.get("/api/bridge").json()
+    lost, never = found["hangers"]
+    assert found["status"] == lost["status"] == "alert"
+    assert lost["shift"]["low"] < lost["shift"]["mean"] < lost["shift"]["high"] < 0
+    assert lost["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.03)
+    assert (never["status"], never["shift"], never["tension_n"]) == (None, None, None)
+    moved = client.get("/api/bridge/moved").json()
+    assert "nothing can be compared" in moved["sentence"]
+    assert moved["explanations"] == {}
+
+
+def test_a_bridge_without_hangers_has_a_page(workspace: Workspace) -> None:
+    Path(workspace.bridge.source).write_text('[bridge]\nname = "Empty"\n', encoding="utf-8")
+    empty = Workspace.open(workspace.folder)
+    with served(empty) as site, site.client(Accept="text/html") as client:
+        page = client.get("/")
+    assert page.status_code == 200
+    assert "describes no hanger yet" in page.text
+
+
+@pytest.mark.parametrize(
+    ("shift", "kind"),
+    [
+        (-0.08, "lost3"), (-0.04, "lost2"), (-0.02, "lost1"), (-0.009, "same"), (0.0, "same"),
+        (0.02, "gained1"), (0.059, "gained2"), (0.06, "gained3"),
+    ],
+)  # fmt: skip
+def test_a_shift_has_a_class_that_the_legend_names(hanger: Hanger, shift: float, kind: str) -> None:
+    assert kind_of(glance(hanger, shift)) == kind
+    assert kind in dict(CLASSES)
+
+
+def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
+    tension = Interval.normal(711e3, 5e3)
+    first = HangerLine(hanger, Status.FIRST, START, tension, baseline_tension_n=tension)
+    unready = HangerLine(hanger, Status.FIRST, START, tension)
+    told = {
+        "is the baseline": HangerGlance(first),
+        "no baseline yet": HangerGlance(unready),
+        "no test yet": never_tested(hanger),
+    }
+    for words, seen in told.items():
+        assert (shift_words(seen), kind_of(seen)) == (words, "unknown")
+
+
+def test_a_test_that_the_watch_passed_over_is_compared_by_itself(hanger: Hanger) -> None:
+    then, now = Interval.normal(700e3, 5e3), Interval.normal(630e3, 5e3)
+    line = HangerLine(hanger, Status.STEADY, START, now, baseline_tension_n=then)
+    assert kind_of(HangerGlance(line)) == "lost3"
+
+
+def test_a_shift_that_may_be_none_is_marked_hollow(hanger: Hanger) -> None:
+    sure, unsure = glance(hanger, -0.02, 0.005), glance(hanger, -0.02, 0.02)
+    marks = elevation([sure, unsure]).hangers
+    assert [[one.hollow for one in mark.triangles] for mark in marks] == [[False], [True]]
+
+
+def test_a_hanger_is_drawn_as_long_as_it_is(hanger: Hanger) -> None:
+    short, long = replace(hanger, length_m=6.0), replace(hanger, id=4, length_m=12.0)
+    drawing = elevation([glance(short), glance(long)])
+    heights = [drawing.deck - mark.top for mark in drawing.hangers]
+    assert heights[1] == pytest.approx(2 * heights[0], abs=0.2)
+
+
+def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Hanger) -> None:
+    many = [glance(replace(hanger, id=number)) for number in range(1, 201)]
+    many[96] = replace(many[96], line=replace(many[96].line, open_alerts=1))
+    drawing = elevation(many)
+    places = [mark.x for mark in drawing.hangers]
+    steps = [after - before for before, after in pairwise(places)]
+    assert min(steps) >= 8.9
+    assert places[-1] < drawing.width
+    numbered = [mark for mark in drawing.hangers if mark.number]
+    assert 97 in [mark.id for mark in numbered]
+    gaps = [after.x - before.x for before, after in pairwise(numbered)]
+    assert min(gaps) >= 30
+    assert len(numbered) > 30
+
+
+def test_a_hanger_long_not_tested_is_said(bridge: Workspace) -> None:
+    site = Site(bridge, Address())
+    later = START + timedelta(days=bridge.settings.quiet_days + 1000)
+    try:
+        assert [each.is_quiet for each in bridge_view.glance(site, START).hangers] == [False, False]
+        assert [each.is_quiet for each in bridge_view.glance(site, later).hangers] == [True, False]
+    finally:
+        site.close()

@@ -1,0 +1,229 @@
+"""The page of a hanger, its figures and its numbers, over HTTP."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import timedelta
+from typing import Any, ClassVar
+
+import httpx
+import plotly.graph_objects as plotly
+import pytest
+
+from shm.pipeline.reporting import hanger_report
+from shm.report import Status, status, summary
+from shm.report.states import NOTHING_WATCHED, StatesOverTime
+from shm.store import Lineage, Workspace
+from shm_daemon.web.hanger_figures import FIGURES
+from shm_daemon.web.working_out import Order, Workshop
+from tests.helpers.flows import Clock, ingest
+from tests.helpers.web_servers import Served, served
+from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
+from tests.report.diagnoses import LED
+
+_OF_SPRINGS = {"stiffness"}  # the class in force, beam1, clamps its ends
+_PAGE = {"Accept": "text/html"}
+
+
+@pytest.fixture(scope="module")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Hanger 3 lost a fifth of its tension and was diagnosed; hanger 4 has no tests."""
+    workspace = make_workspace(
+        tmp_path_factory.mktemp("hanger") / "bridge",
+        hangers=(3, 4),
+        settings={"models": "beam1,beam2"},
+    )
+    write_loss(workspace.spool, workspace, lost=2)
+    write_test(
+        workspace.spool / "od d%3F.modes.json", workspace, day=75, tension=0.8, name="a/b ü?"
+    )
+    ingest(workspace, clock=Clock(START + timedelta(days=200)))
+    with workspace.store() as store:
+        store.add_diagnosis(3, replace(LED, hanger=3), Lineage.of({}, {}), START)
+    return workspace
+
+
+class AtTheSecondRequest(Workshop[Any]):
+    """A workshop without a process: nothing is made yet when it is first asked for."""
+
+    made: ClassVar[dict[Order, Any]] = {}
+
+    def wanted(self, order: Order) -> Any:
+        if order not in self.made:
+            self.made[order] = None
+            return None
+        self.made[order] = self.made[order] or order.make()
+        return self.made[order]
+
+
+@pytest.fixture(scope="module")
+def site(bridge: Workspace) -> Iterator[Served]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("shm_daemon.web.app.Workshop", AtTheSecondRequest)
+        with served(bridge) as site:
+            yield site
+
+
+@pytest.fixture
+def client(site: Served) -> Iterator[httpx.Client]:
+    with site.client() as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def page(site: Served) -> str:
+    with site.client() as client:
+        return client.get("/hangers/3", headers=_PAGE).text
+
+
+def words_of(page: str) -> str:
+    """What a person reads."""
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+
+
+def figures_of(page: str) -> list[str]:
+    return re.findall(r'data-figure="/api/hangers/3/figures/([a-z_]+)"', page)
+
+
+def figure(client: httpx.Client, name: str) -> dict[str, Any]:
+    found = client.get(f"/api/hangers/3/figures/{name}")
+    assert found.status_code == 200, found.text
+    document: dict[str, Any] = found.json()
+    return document
+
+
+def names_in(document: dict[str, Any]) -> set[str]:
+    return {trace.get("name", "") for trace in document["data"]}
+
+
+def test_the_page_says_what_the_report_says(
+    page: str, bridge: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_states: Callable[..., StatesOverTime] = lambda *_: NOTHING_WATCHED  # noqa: E731
+    monkeypatch.setattr("shm.pipeline.reporting.hanger_states", without_states)
+    with bridge.store() as store:
+        report = hanger_report(bridge, store, 3, START)
+    assert status(report) is Status.ALERT
+    assert summary(report) in words_of(page)
+    assert f'<span class="status alert">{Status.ALERT.value}</span>' in page
+
+
+def test_nothing_that_a_person_reads_is_not_a_number(client: httpx.Client, page: str) -> None:
+    documents = [figure(client, name) for name in figures_of(page)]
+    read = [page, client.get("/hangers/4", headers=_PAGE).text]
+    read += [f"{document['caption']} {document['alt']}" for document in documents]
+    for text in read:
+        assert not re.search(r"\b(nan|None|inf|NaN)\b", words_of(text))
+
+
+def test_every_figure_of_the_page_is_one_that_plotly_draws(client: httpx.Client, page: str) -> None:
+    assert set(figures_of(page)) == {each.name for each in FIGURES} - _OF_SPRINGS
+    for name in figures_of(page):
+        document = figure(client, name)
+        drawn = plotly.Figure({key: document[key] for key in ("data", "layout")})
+        assert any(trace for trace in drawn.data), name
+        assert len(document["caption"]) > 40, name
+        assert len(document["alt"]) > 20, name
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("trend", "(kN)"),
+        ("temperature", "(kN)"),
+        ("frequencies", "measured"),
+        ("gap_map", "(%)"),
+        ("gap_places", "density"),
+        ("before_and_after", "(%)"),
+    ],
+)
+def test_axes_have_labels_with_units(client: httpx.Client, name: str, unit: str) -> None:
+    layout = figure(client, name)["layout"]
+    assert unit in layout["yaxis"]["title"]["text"]
+    assert layout["xaxis"]["title"]["text"]
+
+
+def test_the_trend_marks_the_alert_the_change_and_the_baseline(client: httpx.Client) -> None:
+    document = figure(client, "trend")
+    assert {"alert", "baseline", "threshold", "nominal", "baseline set"} <= names_in(document)
+    (alert,) = (trace for trace in document["data"] if trace.get("name") == "alert")
+    assert alert["y"][0] == pytest.approx(0.8 * 711, rel=0.05)
+    (span,) = document["layout"]["shapes"]
+    assert "2026-05" in span["x0"]
+    assert "-2" in span["label"]["text"]
+
+
+def test_the_trend_is_there_before_the_state_over_time_is_worked_out(
+    client: httpx.Client,
+) -> None:
+    AtTheSecondRequest.made.clear()
+    first, second = (client.get("/api/hangers/3/figures/trend") for _ in range(2))
+    states = client.get("/api/hangers/3/trend").json()["states"]
+    assert first.headers["Retry-After"] == "2"
+    assert "being worked out" in first.json()["caption"]
+    assert "Retry-After" not in second.headers
+    assert "state, 90 % band" in names_in(second.json()) - names_in(first.json())
+    tension = next(each for each in states if each["quantity"] == "tension")
+    assert len(tension["times"]) == len(tension["q50"]) == 4
+    assert tension["q05"][-1] < tension["q50"][-1] < tension["q95"][-1]
+
+
+def test_the_trend_is_there_in_numbers(client: httpx.Client) -> None:
+    found = client.get("/api/hangers/3/trend").json()
+    assert [point["test"] for point in found["points"]] == ["t0", "t1", "t2", "a/b ü?"]
+    assert {event["kind"] for event in found["events"]} >= {"baseline", "alert"}
+    assert found["changes"][0]["words"].startswith("sudden")
+    since = client.get("/api/hangers/3/trend", params={"since": "2026-06-20T00:00:00Z"}).json()
+    assert [point["test"] for point in since["points"]] == ["t2", "a/b ü?"]
+
+
+def test_tests_are_listed_newest_first_and_paged(client: httpx.Client) -> None:
+    first = client.get("/api/hangers/3/tests", params={"limit": 3}).json()
+    rest = client.get(
+        "/api/hangers/3/tests", params={"limit": 3, "before": first["next_before"]}
+    ).json()
+    assert [each["test"] for each in first["tests"]] == ["a/b ü?", "t2", "t1"]
+    assert [each["test"] for each in rest["tests"]] == ["t0"]
+    assert rest["next_before"] is None
+    assert first["tests"][0]["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.05)
+
+
+def test_each_test_links_to_its_page_whatever_its_name(client: httpx.Client, page: str) -> None:
+    assert '<a href="/hangers/3/tests/a%2Fb%20%C3%BC%3F">a/b ü?</a>' in page
+    listed = client.get("/hangers/3/tests", headers=_PAGE).text
+    assert '<a href="/hangers/3/tests/t0">t0</a>' in listed
+    oldest = client.get("/api/hangers/3/tests").json()["tests"][-1]["id"]
+    older = client.get("/hangers/3/tests", params={"before": oldest}, headers=_PAGE).text
+    assert "There are no older tests." in words_of(older)
+
+
+def test_a_hanger_without_tests_says_so(client: httpx.Client) -> None:
+    found = client.get("/hangers/4", headers=_PAGE)
+    assert found.status_code == 200
+    assert "its tension is not known" in words_of(found.text)
+    assert "data-figure" not in found.text
+    assert client.get("/api/hangers/4/trend").json()["points"] == []
+    assert client.get("/api/hangers/4/tests").json()["tests"] == []
+    missing = client.get("/api/hangers/4/figures/trend")
+    assert (missing.status_code, missing.json()["remedy"]) == (404, "Figures: none.")
+
+
+def test_an_unknown_hanger_is_a_page_that_says_so(client: httpx.Client) -> None:
+    for address in ("/hangers/99", "/hangers/99/tests"):
+        found = client.get(address, headers=_PAGE)
+        assert found.status_code == 404
+        assert found.headers["content-type"].startswith("text/html")
+        assert "known: 3, 4" in words_of(found.text)
+    assert client.get("/api/hangers/99/trend").json()["message"]
+    assert client.get("/api/hangers/3/figures/nothing").status_code == 404
+
+
+def test_the_gap_is_told_with_its_causes_and_how_far_it_shrinks(page: str) -> None:
+    told = words_of(page)
+    for part in ("Where the gap lies", "Where along the hanger", "What causes the gap"):
+        assert part in told
+    assert "point mass" in told
+    assert "How far the gap shrinks" in told

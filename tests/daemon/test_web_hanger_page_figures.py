@@ -1,0 +1,198 @@
+"""Figures of the hanger page, drawn of a hanger that is put together here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import plotly.graph_objects as plotly
+import pytest
+
+from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
+from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
+from shm.values import NAN, FloatArray, Summary
+from shm.watch.history import Band
+from shm_daemon.web.hanger_figures.over_time import MOST_POINTS, places
+from shm_daemon.web.hanger_figures.stiffness import FIGURE as STIFFNESS
+from shm_daemon.web.hanger_figures.temperature import FIGURE as TEMPERATURE
+from shm_daemon.web.hanger_figures.trend import FIGURE as TREND
+from shm_daemon.web.hanger_view import HangerView
+from tests.helpers.workspaces import START
+from tests.report.diagnoses import HANGER
+
+BLUNDER = 700
+
+
+def summed_up(mean: float, sd: float) -> Summary:
+    return Summary(mean, sd, mean - 1.645 * sd, mean, mean + 1.645 * sd)
+
+
+def a_point(number: int, tension_n: float = 700e3) -> TrendPoint:
+    stiffness = {f"{plane}_end_stiffness": summed_up(6.5, 0.1) for plane in PLANES}
+    time = START + timedelta(days=number)
+    return TrendPoint(
+        tension_n=summed_up(tension_n, 2e3),
+        stiffness=stiffness,
+        parameters={},
+        most_probable_tension_n=tension_n,
+        test_id=number,
+        test=f"t{number}",
+        hanger=3,
+        time=time,
+        taken_at=time,
+        temperature_c=NAN if number % 3 == 0 else 10.0 + number % 20,
+        posterior_id=number,
+        model="beam2",
+    )
+
+
+PLANES = ("transverse", "longitudinal")
+BASELINE = BaselineGlance(
+    tension_n=summed_up(700e3, 2e3),
+    stiffness={f"{plane}_end_stiffness": summed_up(6.5, 0.1) for plane in PLANES},
+    parameters={},
+    most_probable_tension_n=700e3,
+    id=1,
+    hanger=3,
+    set_at=START,
+    who="shm",
+    why="the first test",
+    since=None,
+    model="beam2",
+    tests=("t0",),
+    temperature_c=11.0,
+)
+
+
+def a_view(tests: int, **parts: Any) -> HangerView:
+    """A hanger of so many tests, one of which is far off."""
+    points = [a_point(i, 500e3 if i == BLUNDER else 700e3 + 1e3 * (i % 7)) for i in range(tests)]
+    view = SimpleNamespace(
+        hanger=HANGER,
+        trend=tuple(points),
+        baseline=BASELINE,
+        events=(),
+        calls=(),
+        states=NOTHING_WATCHED,
+    )
+    vars(view).update(parts)
+    return cast(HangerView, view)
+
+
+def states_of(view: HangerView) -> StatesOverTime:
+    """The tension and two springs of one plane that the tests tell apart."""
+    count = len(view.trend)
+
+    def quantity(name: str, title: str, value: float) -> QuantityOverTime:
+        middle = np.full(count, value)
+        band = Band(0.99 * middle, middle, 1.01 * middle)
+        return QuantityOverTime(name, title, band, band, band, value, 0.9 * value, 1.1 * value)
+
+    return StatesOverTime(
+        tuple(point.time for point in view.trend),
+        np.full(count, 11.0),
+        11.0,
+        np.zeros(count, bool),
+        (
+            quantity("tension", "tension", 702e3),
+            quantity("log10_k1", "end stiffness k1 (deck end, transverse)", 6.4),
+            quantity("log10_k3", "end stiffness k3 (arch end, transverse)", 6.8),
+        ),
+    )
+
+
+def drawn(view: HangerView, figure: Any) -> dict[str, Any]:
+    document: dict[str, Any] = figure.document(view)
+    plotly.Figure({key: document[key] for key in ("data", "layout")})
+    return document
+
+
+def trace(document: dict[str, Any], name: str) -> dict[str, Any]:
+    return next(each for each in document["data"] if each.get("name") == name)
+
+
+def test_a_short_trend_is_drawn_whole() -> None:
+    dots = trace(drawn(a_view(30), TREND), "test by itself")
+    assert len(dots["x"]) == 30
+
+
+def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None:
+    view = a_view(8 * MOST_POINTS)
+    alerted = view.trend[4321]
+    event = HangerEvent(alerted.time, EventKind.ALERT, "", "tension fell", 1)
+    view = a_view(8 * MOST_POINTS, events=(event,))
+    document = drawn(view, TREND)
+    dots = trace(document, "test by itself")
+    assert len(dots["x"]) <= 1.05 * MOST_POINTS
+    assert min(dots["y"]) == 500.0
+    assert f"t{BLUNDER}" in dots["text"]
+    assert "t4321" in dots["text"]
+    assert dots["text"][0] == "t0"
+    assert dots["text"][-1] == f"t{8 * MOST_POINTS - 1}"
+    assert "keep every extreme" in document["caption"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_thinning_keeps_the_extremes_of_every_curve(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    curves: list[FloatArray] = [rng.normal(size=20_000) for _ in range(3)]
+    chosen = places(*curves, always=(7, 11))
+    for curve in curves:
+        assert curve[chosen].max() == curve.max()
+        assert curve[chosen].min() == curve.min()
+    assert {0, 7, 11, 19_999} <= set(chosen.tolist())
+    assert np.all(np.diff(chosen) > 0)
+
+
+def test_the_tension_shows_the_state_where_there_is_one() -> None:
+    view = a_view(12)
+    with_state = a_view(12, states=states_of(view))
+    state = trace(drawn(with_state, TREND), "state, 90 % band")
+    assert state["y"] == [pytest.approx(702.0)] * 12
+    assert "at 11.0 °C" in TREND.caption(with_state)
+    assert "state, 90 % band" not in [t.get("name") for t in drawn(view, TREND)["data"]]
+    assert "being worked out" in TREND.caption(a_view(12, states=None))
+
+
+def test_one_far_interval_does_not_squeeze_the_rest() -> None:
+    view = a_view(12)
+    wide = replace(view.trend[3], tension_n=Summary(700e3, 1e6, 1e3, 700e3, 9e6))
+    document = drawn(a_view(12, trend=(*view.trend[:3], wide, *view.trend[4:])), TREND)
+    low, high = document["layout"]["yaxis"]["range"]
+    assert 600 < low < 665
+    assert 735 < high < 800
+
+
+def test_a_hanger_without_a_baseline_has_no_thresholds() -> None:
+    document = drawn(a_view(1, baseline=None), TREND)
+    assert "threshold" not in [each.get("name") for each in document["data"]]
+    assert document["caption"].endswith("Dotted: nominal.")
+
+
+def test_each_plane_has_its_panel_of_stiffness() -> None:
+    document = drawn(a_view(9), STIFFNESS)
+    titles = [each["text"] for each in document["layout"]["annotations"]]
+    assert titles == ["transverse end stiffness", "longitudinal end stiffness"]
+    assert {each["yaxis"] for each in document["data"]} == {"y", "y2"}
+    assert "log10 of N m/rad" in document["caption"]
+
+
+def test_ends_that_frequencies_tell_apart_have_a_panel_each() -> None:
+    view = a_view(9)
+    document = drawn(a_view(9, states=states_of(view)), STIFFNESS)
+    titles = [each["text"] for each in document["layout"]["annotations"]]
+    assert titles == [
+        "end stiffness k1 (deck end, transverse)",
+        "end stiffness k3 (arch end, transverse)",
+    ]
+    assert "6.40 (6.34 to 6.46)" in document["alt"]
+
+
+def test_tests_without_a_temperature_are_left_out_and_counted() -> None:
+    document = drawn(a_view(10), TEMPERATURE)
+    assert sum(len(each["x"]) for each in document["data"]) == 6
+    assert "4 tests without a temperature left out" in document["caption"]
+    assert not TEMPERATURE.is_there(a_view(2))

@@ -1,0 +1,205 @@
+"""Of every kind of hanger, bridge and test each form says numbers or words, never nan or None."""
+
+from __future__ import annotations
+
+import json as standard_json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import timedelta
+
+import numpy as np
+import pytest
+
+from shm import documents, report
+from shm.report import BridgeReport, HangerReport, Interval
+from shm.report.bridge.content import Course, HangerLine
+from shm.report.content import TrendRow
+from shm.report.period import Period
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
+from shm.report.summary import Status
+from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
+from shm.watch.history import Band
+from tests.helpers.pdf_words import Pdf
+from tests.report.conftest import START
+from tests.report.diagnoses import CASES
+from tests.report.outline import Outline
+from tests.report.sheets import ambient, given_responses, make_sheet, one_sensor, refused
+
+UNSPOKEN = re.compile(r"(?<![\w.])[+-]?(?:nan|inf|infinity|None|NaN)(?!\w)")
+Change = Callable[[HangerReport], HangerReport]
+
+
+pytestmark = pytest.mark.usefixtures("unpainted")
+
+
+def watched(data: HangerReport) -> StatesOverTime:
+    times = tuple(row.time for row in data.trend if row.time is not None)
+    level: FloatArray = np.full(len(times), 700e3)
+    band = Band(level - 5e3, level, level + 5e3)
+    tension = QuantityOverTime("tension", "tension", band, band, band, 700e3, 665e3, 735e3)
+    unknown = np.full(len(times), NAN)
+    spring = QuantityOverTime(
+        "log10_k1", "spring k1", Band(unknown, unknown, unknown), band, band, 7.0, 6.5, 7.5
+    )
+    return StatesOverTime(
+        times, np.full(len(times), NAN), NAN, np.zeros(len(times), bool), (tension, spring),
+        (CalledChange(times[-2], times[-1], "sudden: tension -7.2 %"),),
+        (TemperatureCoefficient("tension", 0.0, 0.001, 0.001),),
+    )  # fmt: skip
+
+
+def without_sds(data: HangerReport) -> HangerReport:
+    modes = tuple(replace(mode, frequency_sd_hz=NAN) for mode in data.latest.modes)
+    posterior = replace(data.posterior, log_evidence_sd=NAN, r_hat=NAN, seconds=NAN)
+    check = QualityCheck("noise", "unknown", NAN, NAN, "dB", "not measured", "")
+    drift = Drift(3, "t009", START, "tension", NAN, NAN, NAN, NAN, 0.05, NAN)
+    tests = (replace(data.latest, modes=modes, amplitude=NAN, time=None),)
+    return replace(data, tests=tests, posterior=posterior, quality=(check,), drifts=(drift,))
+
+
+def of_period(data: HangerReport) -> HangerReport:
+    period = Period(START + timedelta(days=30), data.generated_at)
+    return replace(
+        data,
+        period=period,
+        trend=tuple(row for row in data.trend if period.holds(row.time)),
+        states=watched(data),
+    )
+
+
+def unrecorded(row: TrendRow) -> TrendRow:
+    return replace(row, time=None, temperature_c=NAN)
+
+
+KINDS: dict[str, Change] = {
+    "whole": lambda data: data,
+    "no baseline": lambda data: replace(data, baseline=None, drifts=(), alerts=()),
+    "one test": lambda data: replace(
+        data, trend=data.trend[-1:], baseline=data.posterior, drifts=(), alerts=(), selection=None
+    ),
+    "no temperature": lambda data: replace(
+        data,
+        tests=(replace(data.latest, temperature_c=NAN),),
+        trend=tuple(unrecorded(row) for row in data.trend),
+    ),
+    "called drift": lambda data: replace(
+        data, states=watched(data), is_called=True, drift_watch="Called: the tension fell by 7 %."
+    ),
+    "adopted class": lambda data: replace(
+        data,
+        posterior=replace(data.posterior, model="beam2+point_mass@deck_end:0.1,2"),
+        gap_watch="Since the point mass was adopted the gap has stayed below 0.3 %.",
+    ),
+    "no standard deviations": without_sds,
+    "period": of_period,
+    "period with one test": lambda data: replace(
+        of_period(data), trend=data.trend[-1:], alerts=()
+    ),
+    "settings": lambda data: replace(data, settings={"band_low_hz": "2.0 Hz"}),
+    "diagnosis": lambda data: replace(data, diagnosis=CASES["led"]),
+    "diagnosis of nothing": lambda data: replace(data, diagnosis=CASES["nothing known"]),
+}  # fmt: skip
+
+
+DRAWN = ("called drift", "no standard deviations", "period", "diagnosis of nothing")
+
+
+def assert_spoken(told: str) -> None:
+    assert told.strip()
+    found = UNSPOKEN.search(told)
+    assert found is None, told[max(0, found.start() - 60) : found.end() + 60]
+
+
+def page_words(page: str) -> str:
+    parsed = Outline()
+    parsed.feed(page)
+    assert parsed.open == []
+    return " ".join(" ".join(parsed.words).split())
+
+
+def document_words(document: object) -> str:
+    """Every text of a document, which must be strict JSON."""
+
+    def strict(constant: str) -> None:
+        raise AssertionError(constant)
+
+    def texts(value: object) -> Iterator[str]:
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, dict):
+            for each in value.values():
+                yield from texts(each)
+        elif isinstance(value, list):
+            for each in value:
+                yield from texts(each)
+
+    return "\n".join(texts(standard_json.loads(documents.dump(document), parse_constant=strict)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hanger_of_any_kind_is_told_in_numbers_and_words(kind: str, season: HangerReport) -> None:
+    data = KINDS[kind](season)
+    assert_spoken(report.text(data))
+    assert_spoken(document_words(report.json(data)))
+    # Drawing takes its time: who has no figure or table of its own is told by the others' words.
+    if kind in DRAWN:
+        assert_spoken(page_words(report.html(data)))
+        assert_spoken(Pdf.parse(report.pdf(data)).words)
+
+
+def test_a_bare_hanger_is_told_in_numbers_and_words(bare: HangerReport) -> None:
+    assert_spoken(report.text(bare))
+    assert_spoken(page_words(report.html(bare)))
+    assert_spoken(Pdf.parse(report.pdf(bare)).words)
+    assert_spoken(document_words(report.json(bare)))
+
+
+@pytest.mark.parametrize("with_period", [False, True])
+def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period: bool) -> None:
+    drift = replace(season.drifts[0], shift_mean=NAN, shift_sd=NAN, probability=NAN)
+    tension = Interval(650e3, 640e3, 660e3)
+    course = Course(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
+    lines = (
+        HangerLine(season.hanger, Status.ALERT, START, tension, "", 1, season.drifts[0],
+                   "t009", "beam2", course),
+        HangerLine(replace(season.hanger, id=4), Status.FIRST, None, tension, "", 0, drift,
+                   course=Course(1) if with_period else None),
+        HangerLine(replace(season.hanger, id=5, nominal_tension_n=0.0), Status.STEADY, START,
+                   tension),
+        HangerLine(replace(season.hanger, id=6), None, course=Course() if with_period else None),
+    )  # fmt: skip
+    period = Period(START, season.generated_at) if with_period else None
+    data = BridgeReport(
+        "Arch", lines, None, "Nothing can be compared.", START, "0.1.0", period,
+        settings={"seed": "1"},
+    )  # fmt: skip
+    assert_spoken(report.bridge_text(data))
+    assert_spoken(page_words(report.bridge_page(data)))
+    assert_spoken(Pdf.parse(report.bridge_pdf(data)).words)
+    assert_spoken(document_words(report.bridge_json(data)))
+
+
+@pytest.mark.parametrize("make", [make_sheet, given_responses, one_sensor, ambient])
+def test_a_test_of_any_kind_is_told_in_numbers_and_words(
+    make: Callable[[], report.TestSheet],
+) -> None:
+    sheet = make()
+    assert_spoken(report.test_text(sheet))
+    assert_spoken(page_words(report.test_page(sheet)))
+    assert_spoken(Pdf.parse(report.test_pdf(sheet)).words)
+    assert_spoken(document_words(report.test_json(sheet)))
+
+
+def test_a_refused_test_says_so_on_paper() -> None:
+    assert "Do not use" in Pdf.parse(report.test_pdf(refused(make_sheet()))).words
+
+
+@pytest.mark.parametrize("told", ["is nan kN", "+inf %", "None", "(nan to nan)"])
+def test_what_must_not_be_said_is_found(told: str) -> None:
+    assert UNSPOKEN.search(told)
+
+
+@pytest.mark.parametrize("told", ["none", "-0.01 %", "2026-05-01", "information", "No change"])
+def test_what_may_be_said_is_not(told: str) -> None:
+    assert UNSPOKEN.search(told) is None

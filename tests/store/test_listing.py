@@ -1,0 +1,189 @@
+"""Lists say what the full answers say, in few questions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import timedelta
+
+import pytest
+import sqlalchemy as sa
+
+from shm.errors import NothingThere
+from shm.store import (
+    Baseline,
+    EventKind,
+    IdentifiedTest,
+    Lineage,
+    Stage,
+    Store,
+    StoredTest,
+    StoredWatch,
+    TestRow,
+)
+from shm.values import Selection
+from tests.helpers.nouns import (
+    NOW,
+    a_change,
+    a_file,
+    a_posterior,
+    a_test,
+    a_watched_test,
+    an_alert,
+)
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+
+
+def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
+    recording = store.receive(a_file(number), NOW).recording
+    made = a_test(f"t{number}", days=number, hanger=hanger)
+    store.identified(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
+    return next(test for test in store.tests() if test.recording_id == recording.id)
+
+
+def with_baseline(store: Store, number: int = 1, hanger: int = 3) -> Baseline:
+    first = identified(store, number, hanger)
+    posterior = a_posterior("beam1", (first.test.id,))
+    store.selected(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    baseline = store.baseline(hanger)
+    assert baseline is not None
+    return baseline
+
+
+def watched(store: Store, baseline: Baseline, number: int, evidence_years: float = 1.0) -> None:
+    test = identified(store, number, baseline.hanger)
+    name = test.test.id
+    store.updated(test, a_posterior("beam1", (name,), seed=number), LINEAGE, NOW)
+    found = replace(a_watched_test(name), change=a_change(evidence_years=evidence_years))
+    alert = replace(an_alert(), key=f"alert {number}", hanger=baseline.hanger, test=name)
+    store.watched(test, baseline, replace(found, time=test.time), alert, ["mail"], NOW)
+
+
+@contextmanager
+def questions(store: Store) -> Iterator[list[str]]:
+    """What is asked of the database."""
+    asked: list[str] = []
+
+    def note(*arguments: object) -> None:
+        asked.append(str(arguments[2]))
+
+    sa.event.listen(store.engine, "before_cursor_execute", note)
+    yield asked
+    sa.event.remove(store.engine, "before_cursor_execute", note)
+
+
+def latest_of_each(watches: tuple[StoredWatch, ...]) -> dict[int, int]:
+    return {each.hanger: each.id for each in watches}
+
+
+def test_tests_are_listed_page_by_page_newest_first(store: Store) -> None:
+    for number in (1, 3, 2):
+        identified(store, number)
+    first = store.test_rows(3, limit=2)
+    second = store.test_rows(3, limit=2, before=first[-1].id)
+    assert [row.name for row in (*first, *second)] == ["t3", "t2", "t1"]
+    assert store.test_rows(3, before=second[-1].id) == store.test_rows(4) == ()
+    stored = store.test_named(3, "t3")
+    assert (first[0].id, first[0].time, first[0].stage) == (stored.id, stored.time, stored.stage)
+
+
+def test_tests_at_one_time_are_on_one_page_each(file_store: Store) -> None:
+    recording = file_store.receive(a_file(1), NOW).recording
+    same = [IdentifiedTest(a_test(f"t{i}"), position=i) for i in range(5)]
+    file_store.identified(recording.id, same, LINEAGE, NOW)
+    seen: list[TestRow] = []
+    while page := file_store.test_rows(3, 2, seen[-1].id if seen else None):
+        seen += page
+    assert [row.name for row in seen] == ["t4", "t3", "t2", "t1", "t0"]
+
+
+def test_a_test_is_found_by_its_name_and_what_is_beside_it(store: Store) -> None:
+    for number in (1, 2, 3):
+        identified(store, number)
+    identified(store, 4, hanger=5)
+    names = [store.beside(store.test_named(3, f"t{number}")) for number in (1, 2, 3)]
+    assert names == [(None, "t2"), ("t1", "t3"), ("t2", None)]
+
+
+def test_a_name_that_is_not_there_names_the_latest(file_store: Store) -> None:
+    for number in range(1, 6):
+        identified(file_store, number)
+    with pytest.raises(NothingThere, match="no test t9 of hanger 3") as caught:
+        file_store.test_named(3, "t9")
+    assert caught.value.remedy == "The latest: t3, t4, t5."
+    with pytest.raises(NothingThere, match="none"):
+        file_store.test_named(4, "t1")
+
+
+def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:
+    first, second = identified(file_store, 1), identified(file_store, 2)
+    file_store.again(first.recording_id, Stage.IDENTIFIED, NOW)
+    file_store.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
+    assert file_store.test_rows(3) == ()
+    with pytest.raises(NothingThere):
+        file_store.test_named(3, "t1")
+
+
+def test_the_latest_watches_are_those_of_each_hanger_in_few_questions(store: Store) -> None:
+    for hanger in range(3, 8):
+        baseline = with_baseline(store, 10 * hanger, hanger)
+        for number in (1, 2):
+            watched(store, baseline, 10 * hanger + number)
+    expected = latest_of_each(store.watches())
+    with questions(store) as asked:
+        found = store.latest_watches()
+    assert {hanger: each.id for hanger, each in found.items()} == expected
+    assert found[3].watched.drifts == store.watches(3)[-1].watched.drifts != ()
+    assert sum("SELECT" in text for text in asked) == 3
+
+
+def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Store) -> None:
+    baseline = with_baseline(file_store)
+    watched(file_store, baseline, 2)
+    record = ("engineer", "new pin", NOW + timedelta(days=2))
+    chosen = [file_store.test_named(3, "t2")]
+    posterior = a_posterior("beam1", ("t2",))
+    file_store.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
+    assert file_store.latest_watches() == {}
+    assert file_store.called_watches() == ()
+
+
+def test_only_called_changes_are_listed_as_called(store: Store) -> None:
+    baseline = with_baseline(store)
+    for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 400.0)):
+        watched(store, baseline, number, evidence_years)
+    other = with_baseline(store, 5, hanger=4)
+    watched(store, other, 6, 1.0)
+    called = [each for each in store.watches() if each.watched.change.called]
+    assert [each.watched.test for each in called] == ["t3", "t4"]
+    assert [each.id for each in store.called_watches()] == [each.id for each in called]
+    assert [each.id for each in store.called_watches(3)] == [each.id for each in called]
+    assert store.called_watches(4) == ()
+
+
+def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
+    for hanger in (3, 4):
+        baseline = with_baseline(store, 10 * hanger, hanger)
+        for number in range(1, hanger):
+            watched(store, baseline, 10 * hanger + number)
+    assert store.open_alert_counts() == {3: 2, 4: 3}
+    for alert in store.alerts(3):
+        store.acknowledge(alert.id, "engineer", "seen", NOW)
+    assert store.open_alert_counts() == {4: 3}
+
+
+def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:
+    happened = filled.hanger_events(3)
+    assert [event.at for event in happened] == sorted(event.at for event in happened)
+    kinds = sorted(event.kind for event in happened)
+    assert kinds == sorted([*[EventKind.BASELINE] * 3, *set(EventKind) - {EventKind.BASELINE}])
+    by_kind = {event.kind: event for event in happened}
+    dropped, noted = by_kind[EventKind.UNDONE], by_kind[EventKind.ACKNOWLEDGED]
+    assert (dropped.who, dropped.why) == ("engineer", "the lamp is gone")
+    assert (noted.who, noted.why) == ("engineer", "looked at the pin")
+    raised = by_kind[EventKind.ALERT]
+    assert (raised.who, raised.why) == ("", filled.alerts(3)[0].alert.message)
+    assert filled.hanger_events(4) == ()
+    assert filled.hanger_events(3, NOW + timedelta(days=400)) == ()

@@ -1,0 +1,264 @@
+"""Years of tests in numbers: what is answered without samples is what the samples say."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import fields, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+
+from shm.models import described
+from shm.models.ends import end_stiffness
+from shm.store import (
+    Adoption,
+    IdentifiedTest,
+    Lineage,
+    Numbers,
+    Stage,
+    Store,
+    StoredTest,
+    TrendPoint,
+)
+from shm.store.tables import posteriors
+from shm.values import EndPlate, Hanger, Posterior, Selection, Summary
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.modelled_tests import posterior as modelled
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+SPRUNG = [1.0, 0.98, 7.0, 7.4, 7.2, 7.1]
+Told = tuple[str, tuple[datetime, datetime | None, float], str, Numbers]
+ANOTHER = replace(HANGER_3, id=4)
+
+
+def a_sprung(test: str, tension: float = 1.0) -> Posterior:
+    return replace(modelled([tension, *SPRUNG[1:]]), tests=(test,))
+
+
+def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
+    recording = store.receive(a_file(number), NOW).recording
+    made = a_test(f"t{number}", days=number, hanger=hanger)
+    store.identified(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
+    return next(test for test in store.tests() if test.recording_id == recording.id)
+
+
+def begun(store: Store, number: int = 1, hanger: int = 3) -> StoredTest:
+    """The first test of a hanger: two classes compete, the sprung one is selected."""
+    first = identified(store, number, hanger)
+    ranked = (a_sprung(first.test.id), a_posterior("beam1", (first.test.id,)))
+    store.selected(hanger, [first], Selection(ranked, (0.9, 0.1)), LINEAGE, NOW)
+    return first
+
+
+def updated(store: Store, number: int, tension: float, hanger: int = 3) -> StoredTest:
+    test = identified(store, number, hanger)
+    store.updated(test, a_sprung(test.test.id, tension), LINEAGE, NOW)
+    return test
+
+
+def from_history(store: Store, hanger: Hanger) -> list[Told]:
+    return [
+        (
+            stored.test.id,
+            (stored.time, stored.test.time, stored.test.temperature_c),
+            posterior.model,
+            in_numbers(posterior, hanger),
+        )
+        for stored, posterior in store.history(hanger.id)
+    ]
+
+
+def in_numbers(posterior: Posterior, hanger: Hanger) -> Numbers:
+    stiffness = end_stiffness(posterior, hanger)
+    most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    return Numbers(
+        tension_n=Summary.of(posterior.tension_n),
+        most_probable_tension_n=most_probable["theta_F"] * posterior.nominal_tension_n,
+        stiffness={name: Summary.of(samples) for name, samples in stiffness.items()},
+        parameters={name: Summary.of(posterior.parameter(name)) for name in posterior.names},
+    )
+
+
+def numbers_of(point: TrendPoint) -> Numbers:
+    return Numbers(**{field.name: getattr(point, field.name) for field in fields(Numbers)})
+
+
+def from_trend(store: Store, hanger: Hanger) -> list[Told]:
+    return [
+        (
+            point.test,
+            (point.time, point.taken_at, point.temperature_c),
+            point.model,
+            numbers_of(point),
+        )
+        for point in store.trend(hanger)
+    ]
+
+
+def without_samples(store: Store) -> None:
+    """What is read from now on is not made from samples."""
+    with store.writing() as connection:
+        connection.execute(sa.update(posteriors).values(samples=b"no npz"))
+
+
+def sent_back(store: Store) -> None:
+    store.again(store.tests(3)[1].recording_id, Stage.UPDATED, NOW)
+
+
+def sent_back_and_done_again(store: Store) -> None:
+    sent_back(store)
+    store.updated(store.tests(3)[1], a_sprung("t2", 0.8), LINEAGE, NOW)
+
+
+def refused(store: Store) -> None:
+    test = store.tests(3)[1]
+    store.refuse(test.recording_id, {"message": "no."}, NOW, [test.id])
+
+
+def adopted(store: Store) -> None:
+    before = store.selection(3)
+    assert before is not None
+    model = "beam2+point_mass@everywhere"
+    adoption = Adoption(3, model, "beam2", "point_mass", "everywhere", "a lamp", "engineer")
+    probable = {"beam1": 0.1, "beam2": 0.4, model: 0.5}
+    chosen = [store.tests(3)[0]]
+    prior = described(model, HANGER_3).prior
+    posterior = replace(modelled(list((prior.lower + prior.upper) / 2), model), tests=("t1",))
+    store.adopt(adoption, posterior, probable, (before, chosen), LINEAGE, NOW)
+
+
+def undone(store: Store) -> None:
+    adopted(store)
+    store.drop_adoption(1, "the lamp is gone", "engineer", NOW)
+
+
+def rebaselined(store: Store) -> None:
+    baseline = store.baseline(3)
+    assert baseline is not None
+    chosen = list(store.tests(3)[1:])
+    record = ("engineer", "new pin", chosen[0].time)
+    joint = replace(a_sprung("t3", 0.9), tests=tuple(test.test.id for test in chosen))
+    store.rebaseline(baseline, joint, chosen, record, LINEAGE, NOW)
+
+
+HAPPENINGS = (sent_back, sent_back_and_done_again, refused, adopted, undone, rebaselined)
+
+
+@pytest.mark.parametrize("happened", HAPPENINGS, ids=lambda each: each.__name__)
+def test_the_trend_is_what_the_history_says(
+    store: Store, happened: Callable[[Store], None]
+) -> None:
+    begun(store)
+    updated(store, 2, 0.95)
+    updated(store, 3, 0.9)
+    happened(store)
+    expected = from_history(store, HANGER_3)
+    assert 2 <= len(expected) <= 3
+    assert from_trend(store, HANGER_3) == expected
+    store.keep_summaries(HANGER_3)
+    without_samples(store)
+    assert from_trend(store, HANGER_3) == expected
+    (latest,) = store.latest_trends([HANGER_3]).values()
+    assert latest == store.trend(HANGER_3)[-1]
+
+
+@pytest.mark.parametrize("happened", HAPPENINGS, ids=lambda each: each.__name__)
+def test_the_baselines_in_force_are_those_of_each_hanger(
+    file_store: Store, happened: Callable[[Store], None]
+) -> None:
+    begun(file_store)
+    updated(file_store, 2, 0.95)
+    updated(file_store, 3, 0.9)
+    begun(file_store, 4, hanger=4)
+    happened(file_store)
+    found = file_store.baselines_in_force([HANGER_3, ANOTHER])
+    assert list(found) == [3, 4]
+    for hanger, glance in found.items():
+        baseline = file_store.baseline(hanger)
+        assert baseline is not None
+        assert (glance.id, glance.who, glance.why) == (baseline.id, baseline.who, baseline.why)
+        assert (glance.since, glance.tests) == (baseline.since, baseline.posterior.tests)
+        assert glance.temperature_c == 11.5
+        assert glance.tension_n == Summary.of(baseline.posterior.tension_n)
+
+
+def test_only_what_is_not_kept_is_made_from_samples(file_store: Store) -> None:
+    begun(file_store)
+    assert file_store.keep_summaries(HANGER_3) == 1
+    assert file_store.keep_summaries(HANGER_3) == 0
+    without_samples(file_store)
+    updated(file_store, 2, 0.95)
+    assert [point.test for point in file_store.trend(HANGER_3)] == ["t1", "t2"]
+
+
+def test_another_description_of_the_hanger_gives_another_stiffness(file_store: Store) -> None:
+    plate = EndPlate(1.0915, 0.04, 1.0644, 0.241, 0.562, 0.0425)
+    narrow, wide = (
+        replace(HANGER_3, plate=replace(plate, end_width_m=width)) for width in (0.9, 1.1)
+    )
+    prior = described("solid2", narrow).prior
+    posterior = modelled(list((prior.lower + prior.upper) / 2), "solid2", narrow)
+    first = identified(file_store, 1)
+    chosen = Selection((replace(posterior, tests=("t1",)),), (1.0,))
+    file_store.selected(3, [first], chosen, LINEAGE, NOW)
+    file_store.keep_summaries(narrow)
+    for hanger in (wide, narrow):
+        assert from_trend(file_store, hanger) == from_history(file_store, hanger)
+    (before,), (after,) = file_store.trend(narrow), file_store.trend(wide)
+    assert before.tension_n == after.tension_n
+    name = "longitudinal_end_stiffness"
+    assert after.stiffness[name].mean - before.stiffness[name].mean > 0.05
+    assert file_store.keep_summaries(wide) == 1
+
+
+def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
+    file_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shm.store.trends._AT_ONCE", 2)
+    begun(file_store)
+    for number in range(2, 7):
+        updated(file_store, number, 0.9)
+    heard: list[float] = []
+
+    def killed(fraction: float) -> None:
+        heard.append(fraction)
+        if len(heard) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        file_store.keep_summaries(HANGER_3, killed)
+    assert heard == pytest.approx([2 / 6, 4 / 6])
+    assert file_store.keep_summaries(HANGER_3) == 2
+
+
+def test_a_trend_begins_where_it_is_asked_to(file_store: Store) -> None:
+    begun(file_store)
+    for number in (2, 3):
+        updated(file_store, number, 0.9)
+    since = NOW + timedelta(days=2)
+    assert [point.test for point in file_store.trend(HANGER_3, since)] == ["t2", "t3"]
+
+
+def test_clamped_ends_have_no_stiffness(file_store: Store) -> None:
+    first = identified(file_store, 1)
+    chosen = Selection((a_posterior("beam1", ("t1",)),), (1.0,))
+    file_store.selected(3, [first], chosen, LINEAGE, NOW)
+    file_store.keep_summaries(HANGER_3)
+    assert file_store.trend(HANGER_3)[0].stiffness == {}
+
+
+def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(Path(__file__).parent / "data" / "schema_0005.db", path)
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        expected = from_history(store, HANGER_3)
+        assert len(expected) == 3
+        assert from_trend(store, HANGER_3) == expected
+        assert store.keep_summaries(HANGER_3) > 0
+        without_samples(store)
+        assert from_trend(store, HANGER_3) == expected
