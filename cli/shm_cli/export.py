@@ -9,7 +9,7 @@ import rich_click as click
 from shm import export
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Posterior
-from shm_cli.common import hanger_option, json_option, opened_store, show
+from shm_cli.common import hanger_option, json_option, opened_store, show, waiting
 
 
 @click.command()
@@ -53,7 +53,8 @@ def command(
         hanger = workspace.bridge.hanger(hanger_id)
         posterior = store.posterior(hanger_id, test)
         tests = [store.test_named(hanger_id, name).test for name in posterior.tests]
-    _write(posterior, out, form, tests, hanger)
+    with waiting("writing the samples"):
+        _write(posterior, out, form, tests, hanger)
     if as_json:
         show({"file": str(out), "model": posterior.model, "samples": len(posterior.samples)})
         return

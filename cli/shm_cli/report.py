@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +18,11 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
-from shm.report.period import period_since
-from shm_cli.common import hanger_option, opened_store
+from shm.report.period import Period, period_since
+from shm_cli.common import drawing, hanger_option, opened_store, waiting
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
+_DRAWN = ("html", "pdf")
 _Writers = dict[str, Callable[[Any], str | bytes]]
 _OF_HANGER: _Writers = {
     "text": report.text,
@@ -92,15 +95,27 @@ def command(
     _refuse_pdf_on_a_terminal(form, out)
     now = utc_now()
     period = period_since(since, now) if since else None
-    with opened_store(ctx) as (workspace, store):
-        if hanger_id is None:
-            written = _OF_BRIDGE[form](bridge_report(workspace, store, now, period))
-        elif test_id is None:
-            written = _OF_HANGER[form](hanger_report(workspace, store, hanger_id, now, period))
-        else:
-            sheet = test_sheet(workspace, store, hanger_id, test_id)
-            written = _OF_TEST[form](replace(sheet, generated_at=now))
+    writers, content = _gathered(ctx, hanger_id, test_id, now, period)
+    with drawing() if form in _DRAWN else nullcontext():
+        written = writers[form](content)
     _write(written, out)
+
+
+def _gathered(
+    ctx: click.Context,
+    hanger_id: int | None,
+    test_id: str | None,
+    now: datetime,
+    period: Period | None,
+) -> tuple[_Writers, Any]:
+    """What is to be written, and who writes such."""
+    with opened_store(ctx) as (workspace, store), waiting("gathering the numbers"):
+        if hanger_id is None:
+            return _OF_BRIDGE, bridge_report(workspace, store, now, period)
+        if test_id is None:
+            return _OF_HANGER, hanger_report(workspace, store, hanger_id, now, period)
+        sheet = test_sheet(workspace, store, hanger_id, test_id)
+        return _OF_TEST, replace(sheet, generated_at=now)
 
 
 def _write(written: str | bytes, out: Path | None) -> None:

@@ -1,4 +1,4 @@
-"""What an attribution claims."""
+"""What an attribution claims, and what it leaves possible."""
 
 from __future__ import annotations
 
@@ -21,3 +21,16 @@ def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
         if each is leading or (each.group is not None and each.group == leading.group)
     ]
     return [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+
+
+def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
+    """The fits of all that may be, with their probabilities: no gap, every cause, the unknown.
+
+    A number that does not hang on the cause, such as the tension, is averaged over them (Hoeting
+    et al., Stat. Sci. 14, 1999).
+    """
+    return [
+        (attribution.no_gap_probability, attribution.baseline),
+        (attribution.unexplained_probability, attribution.unexplained),
+        *((each.probability, each.best.fit) for each in attribution.explanations if each.best.fit),
+    ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from shm.gap.chances import Family, Tried, families, probabilities
 from shm.gap.contract import Fit
+from shm.gap.faint import without_faint
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.imitation import imitated_share, visible_shifts
 from shm.gap.options import GapOptions, Progress, silent
@@ -54,7 +55,8 @@ class Attribution:
     `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior
     predictive p-value of the leading explanation that has no remainder. A part of
     `unexplained_probability` is that of something unknown that passes for an effect of the
-    catalogue. `invisible` names the effects that these data cannot show, and why.
+    catalogue. `invisible` names the effects that these data cannot show, and why. `search` can be
+    gone on with from what it has `tried`.
     """
 
     baseline: Fit
@@ -65,6 +67,8 @@ class Attribution:
     groups: tuple[tuple[str, ...], ...]
     invisible: tuple[tuple[str, str], ...]
     p_value: float
+    search: Search
+    tried: tuple[Tried, ...]
 
     @property
     def leads(self) -> Leads:
@@ -90,30 +94,43 @@ def attributed(
     options: GapOptions,
     rng: np.random.Generator,
     progress: Progress = silent,
-    *,
-    thorough: bool = False,
 ) -> Attribution:
     """The causes of the gap between the baseline and the measurements, with probabilities.
 
-    `thorough` where something unknown led without it: pairs of many more effects are fitted. Sizes
-    that these data cannot show are cut from the priors (`problem.smallest`). Raises UsageError for
-    an unknown effect in `options.without`.
+    Sizes that these data cannot show are cut from the priors (`problem.smallest`). Raises
+    UsageError for an unknown effect in `options.without`.
     """
     search = Search(problem, options, rng, progress)
     tried = search.with_unknown(search.singles())
     if search.calls_for_pairs(tried):
         tried = search.with_pairs(tried)
-        tried = search.with_many_pairs(tried) if thorough else tried
+    return _weighed(search, tried)
+
+
+def more_thorough(found: Attribution) -> Attribution:
+    """The attribution gone on with: pairs of many more effects are fitted."""
+    search, tried = found.search, list(found.tried)
+    if not search.calls_for_pairs(tried):
+        return found
+    return _weighed(search, search.with_many_pairs(tried))
+
+
+def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
-    progress("weighing", 1.0)
+    search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
     imitated = imitated_share(visible_shifts(search.scans), search.baseline, likeliest)
     chances, passing = probabilities(kinds, imitated)
-    return _attribution(search, kinds, [float(chance) for chance in chances], passing)
+    chances = without_faint(search.problem, search.baseline, kinds, chances)
+    return _attribution(search, tried, kinds, [float(chance) for chance in chances], passing)
 
 
 def _attribution(
-    search: Search, kinds: Sequence[Family], chances: Sequence[float], passing: float
+    search: Search,
+    tried: Sequence[Tried],
+    kinds: Sequence[Family],
+    chances: Sequence[float],
+    passing: float,
 ) -> Attribution:
     """`passing` is the probability of something unknown that passes for one of the effects."""
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
@@ -129,6 +146,8 @@ def _attribution(
         groups=groups,
         invisible=search.invisible,
         p_value=search.p_value(_fit([kind for kind in kinds if not kind.flexible])),
+        search=search,
+        tried=tuple(tried),
     )
 
 
@@ -136,7 +155,7 @@ def _explanations(
     kinds: Sequence[Family], chances: Sequence[float], none: Family
 ) -> tuple[Explanation, ...]:
     """Every effect and pair that was tried, the likeliest first."""
-    return tuple(
+    found = [
         Explanation(
             best=kind.best,
             variants=kind.tried,
@@ -146,7 +165,8 @@ def _explanations(
         )
         for kind, chance in zip(kinds, chances, strict=True)
         if kind.effects and not kind.flexible
-    )
+    ]
+    return tuple(sorted(found, key=lambda each: -each.probability))
 
 
 def _fit(kinds: Sequence[Family]) -> Fit:

@@ -79,9 +79,10 @@ def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, 
     `variants` says how many variants each effect has; those of a pair that were not tried count as
     if they had no evidence, and so does a pair that was not tried at all.
     """
-    kinds: dict[tuple[str, bool], list[Tried]] = {}
+    kinds: dict[tuple[tuple[str, ...], bool], list[Tried]] = {}
     for each in tried:
-        kinds.setdefault((each.hypothesis.name, each.hypothesis.flexible), []).append(each)
+        names = tuple(sorted(name for name, _ in each.hypothesis.effects))
+        kinds.setdefault((names, each.hypothesis.flexible), []).append(each)
     made = [_family(members, variants) for members in kinds.values()]
     return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.answer import answered
+from shm.gap.answer import answered, possible
 from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.next_measurement import ranked
@@ -94,7 +94,7 @@ def diagnose(
         model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
         tension_before_n=_tension(problem, [(1.0, before)], rng),
-        tension_after_n=_tension(problem, answer, rng),
+        tension_after_n=_tension(problem, possible(attribution), rng),
         next_measurements=following,
         remarks=(*found.remarks, *set_aside(aside), *doubtful(doubted)),
         seed=options.seed,
@@ -144,13 +144,13 @@ def _contenders(attribution: Attribution) -> list[Fit]:
 
 
 def _tension(
-    problem: GapProblem, answer: Sequence[tuple[float, Fit]], rng: np.random.Generator
+    problem: GapProblem, fits: Sequence[tuple[float, Fit]], rng: np.random.Generator
 ) -> TensionEstimate:
-    """The tension over all fits of an answer, each with its weight; NaN of a bar without any."""
+    """The tension over some fits, each with its weight; NaN of a bar without any."""
     if not problem.hanger.nominal_tension_n:
         return TensionEstimate(NAN, NAN, NAN, NAN)
-    weight = np.array([weight for weight, _ in answer])
-    draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in answer]
+    weight = np.array([weight for weight, _ in fits])
+    draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in fits]
     counts = rng.multinomial(len(draws[0]), weight / weight.sum())
     mixed = [rng.choice(each, count) for each, count in zip(draws, counts, strict=True)]
     samples = np.concatenate(mixed)

@@ -6,11 +6,15 @@ points; the evidence is the sum of their integrals. Mirror images count as what 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import combinations
+
 import numpy as np
 from scipy.special import logsumexp
 
 from shm.errors import BadInput
 from shm.gap.contract import Fit, Hypothesis, Peak
+from shm.gap.coordinates import is_place
 from shm.gap.descent import Optimum, optima
 from shm.gap.landscape import Landscape
 from shm.gap.problem import GapProblem
@@ -21,6 +25,9 @@ _DRAWS = 256
 _STARTS = 3
 _BASELINE_STARTS = (-2.0, -1.0, 0.0, 1.0)
 BASELINE = Hypothesis()
+
+_POOR = 3.0
+"""Squares of the residuals, per datum, from which on a fit is poor whatever the errors."""
 
 
 def fitted(
@@ -42,7 +49,7 @@ def fitted(
             f"the model cannot be solved anywhere for {hypothesis.name or problem.baseline}.",
             remedy="Check the description of the hanger.",
         )
-    return _fit(landscape, found, rng)
+    return _fit(landscape, _seen_from_the_other_end(landscape, found), rng)
 
 
 def baseline_fit(problem: GapProblem, rng: np.random.Generator) -> Fit:
@@ -60,6 +67,31 @@ def _starts(problem: GapProblem, hypothesis: Hypothesis, rng: np.random.Generato
     starts = np.zeros((len(_BASELINE_STARTS), coordinates.dimension))
     starts[:, 0] = _BASELINE_STARTS
     return starts
+
+
+def _seen_from_the_other_end(landscape: Landscape, found: list[Optimum]) -> list[Optimum]:
+    """The optima with those that a poor fit reaches with its places mirrored.
+
+    Where an effect is large, the scan that the starts come from hardly tells an end from the other.
+    """
+    best = max(found, key=lambda each: each.log_posterior)
+    squares = landscape.likelihood.squares(best.residual[None])
+    if squares.min() < _POOR * len(best.residual):
+        return found
+    z = best.branch.z(best.w[None])[0]
+    parameters = landscape.problem.coordinates(landscape.hypothesis).parameters
+    places = [k for k, parameter in enumerate(parameters) if is_place(parameter)]
+    mirrored = [_mirrored(z, some) for n in (1, 2) for some in combinations(places, n)]
+    others = optima(landscape, np.array(mirrored)) if mirrored else []
+    if not others:
+        return found
+    return optima(landscape, np.array([e.branch.z(e.w[None])[0] for e in (*found, *others)]))
+
+
+def _mirrored(z: FloatArray, places: Sequence[int]) -> FloatArray:
+    other = z.copy()
+    other[list(places)] *= -1
+    return other
 
 
 def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -> Fit:

@@ -27,10 +27,10 @@ from shm.models.effects import EFFECTS
 from shm.values import FloatArray, IntArray
 
 FRACTIONS = ((0.003, 0.15), (0.03, 0.15), (0.1, 0.13), (0.2, 0.08), (0.4, 0.04))
-"""By how much an effect's law is off mode by mode, each with its prior probability."""
+"""By how much an effect's law is off of what it does to a mode, each with its prior probability; as
+likely from mode to mode as smooth over the orders."""
 FRACTIONS_ON_THE_WHOLE = ((0.01, 0.05), (0.03, 0.05), (0.1, 0.05))
-"""The same of what the effect does to the modes of a test and plane on the whole, as likely from
-mode to mode as smooth over the orders."""
+"""The same of what the effect does to the modes of a test and plane on the whole."""
 EXACT = 0.3
 """The prior probability that it is not off at all."""
 SHOWN = 3.0
@@ -80,31 +80,28 @@ def _changes(problem: GapProblem, fit: Fit) -> FloatArray:
     """What the other laws of a fit's effects, one at a time, change of its prediction (data, k)."""
     theta = problem.theta(fit.hypothesis, fit.z[None])
     found = [
-        problem.predict_at(other, theta)[0] - fit.predicted for other in _otherwise(fit.hypothesis)
+        problem.predict_at(other, theta)[0] - fit.predicted for other in otherwise(fit.hypothesis)
     ]
     return np.column_stack([np.empty((len(fit.predicted), 0)), *found])
 
 
-def _otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
+def otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """The same effects, one of them by another law."""
     for index, (name, variant) in enumerate(hypothesis.effects):
-        for law in range(1, len(EFFECTS[name].other_laws) + 1):
-            effects = list(hypothesis.effects)
-            effects[index] = name, replace(variant, law=law)
-            yield replace(hypothesis, effects=tuple(effects))
+        for law in range(len(EFFECTS[name].other_laws) + 1):
+            if law != variant.law:
+                effects = list(hypothesis.effects)
+                effects[index] = name, replace(variant, law=law)
+                yield replace(hypothesis, effects=tuple(effects))
 
 
 def _allowances(design: Design, shift: FloatArray) -> list[tuple[FloatArray, FloatArray, float]]:
     """By how much data are off (data,), how frequencies go together (F, F), prior probabilities."""
-    whole, each = _on_the_whole(design, shift), same_mode(design)
-    return [
-        *((fraction * shift, each, share) for fraction, share in FRACTIONS),
-        *(
-            (fraction * whole, alike, share / 2)
-            for fraction, share in FRACTIONS_ON_THE_WHOLE
-            for alike in (each, smooth_over_orders(design))
-        ),
-    ]
+    whole = _on_the_whole(design, shift)
+    off = [(fraction * shift, share) for fraction, share in FRACTIONS]
+    off += [(fraction * whole, share) for fraction, share in FRACTIONS_ON_THE_WHOLE]
+    orders = same_mode(design), smooth_over_orders(design)
+    return [(error, alike, share / len(orders)) for error, share in off for alike in orders]
 
 
 def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:

@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.hypotheses import hypotheses, invisible
-from shm.gap.laws import by_its_laws
+from shm.gap.laws import by_its_laws, otherwise
 from shm.gap.options import GapOptions, Progress
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
@@ -30,6 +31,7 @@ SAMPLED_WITHIN = 4.0
 MOST_FITS = 30
 MOST_SAMPLED = 5
 LEADERS = 3
+LEADING_PAIRS = 2
 MOST_PAIRS = 8
 MANY_LEADERS, MANY_PAIRS, ALIKE = 6, 30, 2
 SUPPORTED = 2.0
@@ -136,7 +138,13 @@ class Search:
         first = max(each.log_evidence for each in tried)
         gap = first - self.baseline.log_evidence
         least = first - max(LAWS_WITHIN, LAWS_WITHIN_SHARE * gap)
-        return [self._by_its_laws(each) if each.log_evidence > least else each for each in tried]
+        foremost = {family.best.hypothesis for family in self._foremost(tried)}
+        return [
+            self._by_its_laws(each, each.hypothesis in foremost)
+            if each.log_evidence > least
+            else each
+            for each in tried
+        ]
 
     @property
     def invisible(self) -> tuple[tuple[str, str], ...]:
@@ -196,11 +204,31 @@ class Search:
         hypothesis = replace(base.hypothesis, flexible=True)
         return self._tried(fitted(self.problem, hypothesis, self.rng, base.z[None]))
 
-    def _by_its_laws(self, tried: Tried) -> Tried:
+    def _foremost(self, tried: Sequence[Tried]) -> list[Family]:
+        """The likeliest families of one effect and of two."""
+        pairs = [f for f in families(tried, self.variants) if f.effects > 1 and not f.flexible]
+        return [*self.leaders(tried), *pairs[:LEADING_PAIRS]]
+
+    def _by_its_laws(self, tried: Tried, anew: bool) -> Tried:
+        """With the error of its laws; fitted `anew` by each other law, as likely as by its own.
+
+        A large effect by another law may be far from the point that fits best by its own.
+        """
         if tried.fit is None or tried.hypothesis.flexible or not tried.hypothesis.effects:
             return tried
-        gain, fit = by_its_laws(self.problem, self.baseline, tried.fit, self.rng)
-        return replace(self._tried(fit), log_evidence=tried.log_evidence + gain)
+        fits = [tried.fit, *(self._by_other_laws(tried.fit) if anew else ())]
+        share = np.array([1.0, *(1 / len(fits[1:]) for _ in fits[1:])])
+        found = [by_its_laws(self.problem, self.baseline, fit, self.rng) for fit in fits]
+        log = np.array(
+            [fit.log_evidence + gain for fit, (gain, _) in zip(fits, found, strict=True)]
+        )
+        best = found[int(log.argmax())][1]
+        log_evidence = float(logsumexp(log, b=share / share.sum()))
+        return replace(self._tried(best), log_evidence=log_evidence)
+
+    def _by_other_laws(self, fit: Fit) -> list[Fit]:
+        self._tell(f"other laws of {fit.hypothesis.name}", 0.95)
+        return [fitted(self.problem, h, self.rng, fit.z[None]) for h in otherwise(fit.hypothesis)]
 
     def _tried(self, fit: Fit) -> Tried:
         return Tried.fitted(fit, len(self.baseline.z))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.gap.answer import answered
-from shm.gap.attribution import Attribution, attributed
+from shm.gap.attribution import Attribution, attributed, more_thorough
 from shm.gap.contract import Fit
 from shm.gap.gross_error import LeftOut, at, log_gross, log_ordinary, without_shape
 from shm.gap.options import GapOptions, Progress, silent
@@ -67,10 +67,7 @@ def cleared(
     found = found if all(_stands(found, each) for each in found.aside) else first
     if found.attribution.leads != "unexplained":
         return found
-    last = attributed(
-        found.problem, options, rng, lambda label, _: progress(label, 1.0), thorough=True
-    )
-    return replace(found, attribution=last)
+    return replace(found, attribution=more_thorough(found.attribution))
 
 
 def _stands(found: Cleared, error: GrossError) -> bool:

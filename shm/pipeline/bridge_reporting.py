@@ -16,8 +16,8 @@ from shm.report.bridge.content import BridgeReport, Course, HangerLine
 from shm.report.period import Period
 from shm.report.states import called_words
 from shm.report.summary import status_of
-from shm.store import Baseline, BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
-from shm.values import NAN, TENSION, Drift, Hanger
+from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
+from shm.values import TENSION, Change, Drift, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
 
@@ -72,7 +72,7 @@ class _Kept:
     latest: Mapping[int, TrendPoint]
     baselines: Mapping[int, BaselineGlance]
     watches: Mapping[int, StoredWatch]
-    called: Sequence[StoredWatch]
+    called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
 
     @classmethod
@@ -81,7 +81,7 @@ class _Kept:
             store.latest_trends(hangers),
             store.baselines_in_force(hangers),
             store.latest_watches(),
-            store.called_watches(),
+            store.called_changes(),
             store.open_alert_counts(),
         )
 
@@ -91,7 +91,7 @@ class _Kept:
             return HangerLine(hanger, None, open_alerts=opened)
         baseline = self.baselines.get(hanger.id)
         drifts = self.watches[hanger.id].watched.drifts if hanger.id in self.watches else ()
-        called = [each.watched.change for each in self.called if each.hanger == hanger.id]
+        called = self.called.get(hanger.id, ())
         return HangerLine(
             hanger,
             status_of(
@@ -139,12 +139,9 @@ def latest_drifts(store: Store, hanger: int, model: str | None = None) -> tuple[
 
     None where no test has been compared with it, as after the hanger was given a new one.
     """
-    watches = _watches(store, store.baseline(hanger, model))
-    return watches[-1].watched.drifts if watches else ()
-
-
-def _watches(store: Store, baseline: Baseline | None) -> Sequence[StoredWatch]:
-    return store.watches(baseline.hanger, baseline.id) if baseline else ()
+    baseline = store.baseline(hanger, model)
+    told = store.telling_watches(baseline) if baseline else ()
+    return told[-1].watched.drifts if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
@@ -157,31 +154,18 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
 
 def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]:
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
-    latest = store.latest_watches()
-    compared = [hanger for hanger in order if hanger in latest]
-    baselines = {hanger: store.baseline(hanger) for hanger in compared}
-    drifts = {hanger: _known_drifts(store, latest[hanger], baselines) for hanger in compared}
-    changes = {
-        hanger: latest[hanger].watched.temperature_c - _before_c(store, baselines[hanger])
-        for hanger in compared
-    }
-    return shifts_of(drifts, order, temperature_changes_k=changes)
+    latest, before_c = store.latest_watches(), store.baseline_temperatures()
+    compared = [latest[hanger] for hanger in order if hanger in latest]
+    drifts = {each.hanger: _known_drifts(store, each) for each in compared}
+    changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}
+    known = {hanger: change for hanger, change in changes.items() if math.isfinite(change)}
+    return shifts_of(drifts, order, temperature_changes_k=known)
 
 
-def _known_drifts(
-    store: Store, latest: StoredWatch, baselines: Mapping[int, Baseline | None]
-) -> Sequence[Drift]:
+def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
     """Those of the latest test; of all, where its shift of the tension is not known."""
     drifts = latest.watched.drifts
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
-    watches = _watches(store, baselines[latest.hanger])
+    watches = store.watches(latest.hanger, latest.baseline_id)
     return [drift for watch in watches for drift in watch.watched.drifts]
-
-
-def _before_c(store: Store, baseline: Baseline | None) -> float:
-    """Mean temperature of the baseline's tests; NaN where none is known."""
-    tests = store.tests_of(baseline) if baseline else ()
-    temperatures = [each.test.temperature_c for each in tests]
-    known = [value for value in temperatures if math.isfinite(value)]
-    return sum(known) / len(known) if known else NAN

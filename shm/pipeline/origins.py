@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
+from functools import cache
 from importlib.metadata import version
 
 from shm.pipeline.terms import identify_settings
@@ -29,6 +30,7 @@ def test_lineage(store: Store, test: StoredTest) -> dict[str, str]:
     }
 
 
+@cache
 def software() -> str:
     """`Python 3.11.2, numpy 2.4.1 ...`: what computes here."""
     libraries = [f"{name} {version(name)}" for name in _LIBRARIES]

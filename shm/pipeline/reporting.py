@@ -130,9 +130,8 @@ def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
 
 
 def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
-    if baseline is None:
-        return ()
-    found = store.watches(baseline.hanger, baseline.id)
+    """The watches that call a change, and the latest one."""
+    found = store.telling_watches(baseline) if baseline else ()
     return tuple(each.watched for each in found)
 
 

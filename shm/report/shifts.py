@@ -24,10 +24,14 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
     return (
         words.quantity(row.quantity),
         "no change seen" if unmoved else size,
-        "" if unmoved else span,
+        _about_none(row) if unmoved else span,
         threshold_cell(row),
         words.probability(row.probability),
     )
+
+
+def _about_none(row: Drift) -> str:
+    return "about 0 %" if row.quantity == TENSION else "about 1 times"
 
 
 def threshold_cell(row: Drift) -> str:

@@ -149,7 +149,7 @@ def called_words(change: Change) -> str:
         return f"{kind}: not known what"
     first = groups[0][0]
     size = (
-        f"{100 * first.shift_mean:+.1f} %"
+        f"{100 * first.shift_mean:+z.1f} %"
         if first.quantity == TENSION
         else f"{10**first.shift_mean:.2f} times"
     )

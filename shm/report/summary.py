@@ -20,6 +20,7 @@ from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
 _CONVERGED_R_HAT = 1.1
 _WATCH_PROBABILITY = 0.5
 _WORTH_DIAGNOSING_PERCENT = 0.5
+_MOST_NAMED = 3
 
 
 class Status(Enum):
@@ -168,8 +169,8 @@ def _change(data: HangerReport) -> str:
     top = max(data.drifts, key=lambda drift: drift.probability)
     return (
         f"No quantity has surely moved beyond its threshold: the likeliest is "
-        f"{words.quantity(top.quantity)}, with probability {words.probability(top.probability)} "
-        f"of a shift beyond {threshold_cell(top)}."
+        f"{words.quantity(top.quantity)}, with probability "
+        f"{words.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
     )
 
 
@@ -183,7 +184,7 @@ def _shift(drift: Drift) -> str:
     size = "" if drift.quantity == TENSION else f" to {shift} what it was (90 % interval {span})"
     return (
         f"The {words.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
-        f"beyond its threshold of {threshold} is {words.probability(drift.probability)}."
+        f"beyond its threshold of {threshold} is {words.told_probability(drift.probability)}."
     )
 
 
@@ -229,15 +230,46 @@ def _rms_percent(data: HangerReport) -> float:
 
 
 def _gap(data: HangerReport) -> str:
-    """What the model does not explain, as far as that was diagnosed."""
+    """What the model does not explain, and why as far as that was diagnosed."""
     if data.diagnosis is None:
-        return "Why it misses them was not diagnosed."
+        return _outside(data)
     told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data.diagnosis)]
     return " ".join([part for part in told if part] + [data.gap_watch] * bool(data.gap_watch))
 
 
+def _outside(data: HangerReport) -> str:
+    """The modes that the model class misses by more than the uncertainty of both explains."""
+    misfits = misfits_percent(data)
+    outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
+    if not misfits:
+        return ""
+    if not outside:
+        return "Each lies within its 90 % interval: nothing that was measured is left unexplained."
+    verb = "lies" if len(outside) == 1 else "lie"
+    start = f"{_modes(outside)} {verb} outside the 90 % interval"
+    if len(outside) <= _by_chance(len(misfits)):
+        return f"{start}, as chance alone would have it: nothing is clearly left unexplained."
+    return f"{start}: these the model does not explain, and why was not diagnosed."
+
+
+def _modes(modes: Sequence[PredictedFrequency]) -> str:
+    """`Transverse 2 and longitudinal 4`, `5 modes`."""
+    if len(modes) > _MOST_NAMED:
+        return words.counted(len(modes), "mode")
+    told = words.listed([f"{each.plane} {each.order}" for each in modes])
+    return told[0].upper() + told[1:]
+
+
+def _by_chance(modes: int) -> float:
+    """How many of so many may well lie outside their 90 % intervals: two standard deviations."""
+    return 0.1 * modes + 2 * math.sqrt(0.09 * modes)
+
+
 def _diagnosed_on(diagnosis: Diagnosis) -> str:
-    return f"Diagnosis of the gap on {told_tests(diagnosis.tests)}:"
+    return (
+        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
+        f"{told_tests(diagnosis.tests)}."
+    )
 
 
 def _allowing(diagnosis: Diagnosis) -> str:
@@ -261,7 +293,7 @@ def _chosen(data: HangerReport) -> str:
     best = "the most probable" if names[0] == model else f"not the most probable ({names[0]} is)"
     return (
         f"The model class is {model}, {best} of {', '.join(names)} "
-        f"(probability {words.probability(share)})"
+        f"(probability {words.told_probability(share)})"
     )
 
 

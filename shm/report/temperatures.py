@@ -22,13 +22,16 @@ def temperature_table(states: StatesOverTime) -> Table:
     """Each quantity's change per kelvin in percent of itself, or why it is not known."""
     why = _why_not_known(states)
     titles = {quantity.name: quantity.title for quantity in states.quantities}
+    rows = tuple(
+        _row(each, titles.get(each.quantity, words.quantity(each.quantity)), why)
+        for each in states.temperature_coefficients
+    )
+    if len(rows) > 1 and not any(each.is_known for each in states.temperature_coefficients):
+        rows = (("tension and end stiffness", f"not known: {why}", ""),)
     return Table(
         TITLE,
         ("quantity", "change per K", "90 % interval"),
-        tuple(
-            _row(each, titles.get(each.quantity, words.quantity(each.quantity)), why)
-            for each in states.temperature_coefficients
-        ),
+        rows,
         note="In percent of the quantity, mean and standard deviation, beside what the softening "
         "of steel explains (0.03 % of its modulus per K). Shifts and states have this swing taken "
         "out.",

@@ -100,6 +100,11 @@ def probability(value: float) -> str:
     return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
+def told_probability(value: float) -> str:
+    """The same in a sentence: `above 0.999`, `0.966`."""
+    return probability(value).replace("> ", "above ").replace("< ", "below ")
+
+
 def temperature(celsius: float) -> str:
     return number(celsius, ".1f") + " °C" if math.isfinite(celsius) else "temperature not recorded"
 

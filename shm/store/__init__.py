@@ -3,7 +3,9 @@
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
 from shm.store.glances import (
+    AlertRow,
     BaselineGlance,
+    DeliveryRow,
     EventKind,
     HangerEvent,
     Numbers,
@@ -48,10 +50,12 @@ __all__ = [
     "Acknowledgement",
     "ActiveLock",
     "Adoption",
+    "AlertRow",
     "Archive",
     "Baseline",
     "BaselineGlance",
     "Delivery",
+    "DeliveryRow",
     "DeliveryState",
     "Event",
     "EventKind",

@@ -175,8 +175,13 @@ def watch_from(
         time=time,
         temperature_c=number(document["temperature_c"]),
         drifts=tuple(drifts),
-        change=_change(document["change"]),
+        change=change_from(document),
     )
+
+
+def change_from(document: Mapping[str, Any]) -> Change:
+    """What the sequential test says after a test back from the document of its watch."""
+    return _change(document["change"])
 
 
 def _change(entry: Mapping[str, Any]) -> Change:

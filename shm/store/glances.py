@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 
-from shm.store.rows import Stage
+from shm.store.rows import Acknowledgement, DeliveryState, Stage
 from shm.values import Summary
 
 
@@ -73,6 +73,31 @@ class BaselineGlance(Numbers):
     model: str
     tests: tuple[str, ...]
     temperature_c: float
+
+
+@dataclass(frozen=True)
+class DeliveryRow:
+    """One alert on its way to one hook: how that went."""
+
+    hook: str
+    state: DeliveryState
+    attempts: int
+    last_error: str
+
+
+@dataclass(frozen=True)
+class AlertRow:
+    """An alert without its shifts; it is open while nobody has acknowledged it."""
+
+    id: int
+    hanger: int
+    raised_at: datetime
+    test: str
+    test_time: datetime
+    kinds: tuple[str, ...]
+    message: str
+    acknowledgement: Acknowledgement | None
+    deliveries: tuple[DeliveryRow, ...]
 
 
 class EventKind(StrEnum):

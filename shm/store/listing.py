@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 
 from shm.errors import NothingThere
+from shm.store.blobs import change_from
 from shm.store.files import in_force
 from shm.store.glances import EventKind, HangerEvent, TestRow
 from shm.store.queries import Queries, baselines_now, plain_tests
-from shm.store.rows import Stage, StoredTest, StoredWatch
+from shm.store.rows import Baseline, Stage, StoredTest, StoredWatch
 from shm.store.tables import acknowledgements, adoptions, alerts, baselines, tests, watches
 from shm.store.watching import Watching
+from shm.values import Change
 
 _ROW = tuple(tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage"))
 _LATEST = 3
@@ -77,14 +80,31 @@ class Listing(Queries, Watching):
             found = [id_ for id_ in connection.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self.watches_of(found)}
 
-    def called_watches(self, hanger: int | None = None) -> tuple[StoredWatch, ...]:
-        """The watches that call a change against the baseline in force, by time."""
-        query = sa.select(watches.c.id).where(
-            watches.c.called, watches.c.baseline_id.in_(baselines_now()), in_force(watches)
+    def called_watches(self, hanger: int) -> tuple[StoredWatch, ...]:
+        """The watches of a hanger that call a change against its baseline in force, by time."""
+        chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
+        return self.watches_of(chosen)
+
+    def called_changes(self) -> dict[int, tuple[Change, ...]]:
+        """The changes called of each hanger against its baseline in force, by time."""
+        query = sa.select(watches.c.hanger, watches.c.document).where(*_called())
+        found = defaultdict[int, list[Change]](list)
+        with self.reading() as connection:
+            for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
+                found[row.hanger].append(change_from(row.document))
+        return {hanger: tuple(changes) for hanger, changes in found.items()}
+
+    def telling_watches(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
+        """The watches that call a change against a baseline, and the latest against it, by time."""
+        against = sa.select(watches.c.id).where(
+            watches.c.hanger == baseline.hanger,
+            watches.c.baseline_id == baseline.id,
+            in_force(watches),
         )
-        if hanger is not None:
-            query = query.where(watches.c.hanger == hanger)
-        return self.watches_of(query)
+        latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
+        with self.reading() as connection:
+            ids = {*connection.scalars(against.where(watches.c.called)), connection.scalar(latest)}
+        return self.watches_of([id_ for id_ in ids if id_ is not None])
 
     def open_alert_counts(self) -> dict[int, int]:
         """How many alerts of each hanger nobody has acknowledged; hangers without are left out."""
@@ -108,6 +128,12 @@ class Listing(Queries, Watching):
 
 def _shown(hanger: int) -> sa.ColumnElement[bool]:
     return (tests.c.hanger == hanger) & in_force(tests) & (tests.c.stage != Stage.REFUSED)
+
+
+def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
+    """Which watches call a change against the baseline in force, of all hangers or of one."""
+    against = watches.c.baseline_id.in_(baselines_now(hanger))
+    return watches.c.called, against, in_force(watches)
 
 
 def _is_before(test_id: int) -> sa.ColumnElement[bool]:

@@ -283,11 +283,11 @@ def _in_force(hanger: int) -> sa.ColumnElement[bool]:
     return baselines.c.id.not_in(_undone_baselines) & (posteriors.c.model == model)
 
 
-def baselines_now() -> sa.Select[Any]:
-    """The numbers of the newest baselines of all hangers, each in its class in force."""
+def baselines_now(hanger: int | None = None) -> sa.Select[Any]:
+    """The numbers of the newest baselines of all hangers or of one, each in its class in force."""
     newest = sa.select(sa.func.max(selections.c.id)).group_by(selections.c.hanger)
     held = newest.where(selections.c.id.not_in(_undone_selections))
-    return (
+    found = (
         sa.select(sa.func.max(baselines.c.id))
         .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
         .join(
@@ -298,6 +298,7 @@ def baselines_now() -> sa.Select[Any]:
         .where(selections.c.id.in_(held), baselines.c.id.not_in(_undone_baselines))
         .group_by(baselines.c.hanger)
     )
+    return found if hanger is None else found.where(baselines.c.hanger == hanger)
 
 
 def baseline_in_force(hanger: int) -> sa.Select[Any]:

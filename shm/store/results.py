@@ -74,7 +74,7 @@ class Results(Database):
             ]
             probable = list(zip(ids, selection.probabilities, strict=True))
             insert_selection(connection, hanger, selection.selected.model, probable, at)
-            why = f"the first {len(chosen)} test(s)"
+            why = "the first test" if len(chosen) == 1 else f"the first {len(chosen)} tests"
             insert_baseline(connection, hanger, ids[0], "shm", why, at)
             move(connection, chosen, Stage.WATCHED, at)
 

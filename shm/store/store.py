@@ -13,6 +13,7 @@ from shm.errors import NothingThere
 from shm.store import schema
 from shm.store.acknowledging import Acknowledging
 from shm.store.adopting import Adopting
+from shm.store.alert_rows import AlertRows
 from shm.store.archive_copies import ArchiveCopies
 from shm.store.database import make_engine
 from shm.store.files import Files
@@ -30,6 +31,7 @@ class Store(
     Files,
     Results,
     Listing,
+    AlertRows,
     Trends,
     Acknowledging,
     Adopting,

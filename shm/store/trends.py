@@ -11,9 +11,10 @@ import hashlib
 import logging
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple
 from datetime import datetime
+from functools import lru_cache
 from statistics import fmean
 from typing import Any
 
@@ -22,6 +23,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
 from shm.store.blobs import number, posterior_from
+from shm.store.columns import Number
 from shm.store.database import Database
 from shm.store.files import in_force
 from shm.store.glances import BaselineGlance, Numbers, TrendPoint
@@ -33,6 +35,7 @@ from shm.values import NAN, Hanger, Posterior, Summary
 log = logging.getLogger(__name__)
 
 _AT_ONCE = 50
+_HANGERS_KNOWN = 4096
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
 _SUMMARY = (summaries.c.key, summaries.c.document.label("summary"))
@@ -66,14 +69,15 @@ class Trends(Database):
 
     def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
         """The baseline in force of each hanger that has one, in numbers, by hanger."""
+        known = {hanger.id: hanger for hanger in hangers}
+        now = baselines_now(next(iter(known)) if len(known) == 1 else None)
         query = (
             sa.select(baselines, posteriors.c.model, *_SUMMARY)
             .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
             .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
-            .where(baselines.c.id.in_(baselines_now()))
+            .where(baselines.c.id.in_(now))
             .order_by(baselines.c.hanger)
         )
-        known = {hanger.id: hanger for hanger in hangers}
         with self.reading() as connection:
             rows = [row for row in connection.execute(query) if row.hanger in known]
             numbers = _numbers(connection, rows, known)
@@ -82,6 +86,19 @@ class Trends(Database):
             row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
             for row in rows
         }
+
+    def baseline_temperatures(self) -> dict[int, float]:
+        """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""
+        mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
+        query: sa.Select[Any] = (
+            sa.select(baselines.c.hanger, mean_c.label("mean_c"))
+            .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
+            .join(tests, tests.c.id == posterior_tests.c.test_id)
+            .where(baselines.c.id.in_(baselines_now()))
+            .group_by(baselines.c.hanger)
+        )
+        with self.reading() as connection:
+            return {row.hanger: row.mean_c for row in connection.execute(query)}
 
     def keep_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
         """Keeps the summaries of a hanger that are not kept yet; how many there were.
@@ -110,7 +127,7 @@ class Trends(Database):
             summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key_of(hanger)
         )
         of_baselines = sa.select(baselines.c.posterior_id).where(
-            baselines.c.id.in_(baselines_now())
+            baselines.c.id.in_(baselines_now(hanger.id))
         )
         looked_at = posteriors.c.id.not_in(hidden) | posteriors.c.id.in_(of_baselines)
         query = sa.select(posteriors.c.id).where(
@@ -207,6 +224,7 @@ def summarised(posterior: Posterior, hanger: Hanger) -> Numbers:
     )
 
 
+@lru_cache(_HANGERS_KNOWN)
 def key_of(hanger: Hanger) -> str:
     """Tells one description of a hanger from another."""
     return hashlib.sha256(repr(hanger).encode()).hexdigest()
@@ -223,14 +241,30 @@ def _document(numbers: Numbers) -> dict[str, Any]:
 
 
 def _from_document(document: Mapping[str, Any]) -> Numbers:
-    named = {
-        part: {name: _summary(each) for name, each in document[part].items()} for part in _NAMED
-    }
     return Numbers(
         tension_n=_summary(document["tension_n"]),
         most_probable_tension_n=number(document["most_probable_tension_n"]),
-        **named,
+        **{part: _Summaries(document[part]) for part in _NAMED},
     )
+
+
+class _Summaries(Mapping[str, Summary]):
+    """Each made of its list where it is wanted: of thousands of tests few are asked for all."""
+
+    def __init__(self, lists: Mapping[str, Sequence[float | None]]):
+        self._lists = lists
+
+    def __getitem__(self, name: str) -> Summary:
+        return _summary(self._lists[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._lists)
+
+    def __len__(self) -> int:
+        return len(self._lists)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
 
 
 def _summary(values: Sequence[float | None]) -> Summary:

@@ -40,6 +40,7 @@ from shm.store.tables import (
 from shm.values import Alert, Drift, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
+_WATCH_COLUMNS = ("id", "test_id", "baseline_id", "hanger", "time", "document")
 _outbox = sa.select(deliveries, alerts.c.document).join(alerts)
 stored_alerts = sa.select(
     alerts, *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at"))
@@ -113,12 +114,15 @@ class Watching(Database):
 
     def watches_of(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
         """Watches that are `chosen` by their numbers, with their shifts, by time."""
+        of_watch = (watches.c[name] for name in _WATCH_COLUMNS)
         name = tests.c.name.label("test")
-        query = sa.select(watches, name).join(tests).where(watches.c.id.in_(chosen))
+        query: sa.Select[Any] = sa.select(*of_watch, name).select_from(watches).join(tests)
+        query = query.where(watches.c.id.in_(chosen))
         same_test = watches.c.test_id == drifts.c.test_id
         together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
-        shifts = (
-            sa.select(drifts, name)
+        of_shift = (drifts.c[name] for name in _DRIFT_COLUMNS)
+        shifts: sa.Select[Any] = (
+            sa.select(drifts.c.test_id, drifts.c.baseline_id, name, *of_shift)
             .select_from(drifts.join(tests).join(watches, together))
             .where(watches.c.id.in_(chosen), in_force(drifts))
             .order_by(drifts.c.id)
@@ -127,7 +131,9 @@ class Watching(Database):
             rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
             found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
             for row in connection.execute(shifts):
-                found[row.test_id, row.baseline_id].append(_drift(row))
+                test_id, baseline_id, test, *values = row
+                named = dict(zip(_DRIFT_COLUMNS, values, strict=True))
+                found[test_id, baseline_id].append(Drift(test=test, **named))
         return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
 
     def alerts(self, hanger: int | None = None) -> tuple[StoredAlert, ...]:
@@ -271,10 +277,15 @@ def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
 
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
-    noted = None
-    if row.ack_at is not None:
-        noted = Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
-    return StoredAlert(row.id, alert_from_document(row.document), row.raised_at, noted)
+    alert = alert_from_document(row.document)
+    return StoredAlert(row.id, alert, row.raised_at, acknowledgement_of(row))
+
+
+def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
+    """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
+    if row.ack_at is None:
+        return None
+    return Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
 
 
 def _delivery(row: Row[Any]) -> Delivery:

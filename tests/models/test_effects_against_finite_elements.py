@@ -127,12 +127,16 @@ def both(
     *effects: PlantedEffect,
     baseline: str = "beam1",
     springs: tuple[float, ...] = (),
+    law: int = 0,
 ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """Frequencies, shapes and damping that the joints add: general model, finite elements."""
-    model = ComposedHanger(
-        hanger, baseline, [(each.name, variant_of(each.name, each.at, hanger)) for each in effects],
-        PLACES,
-    )  # fmt: skip
+    """Frequencies, shapes and damping that the joints add: general model, finite elements.
+
+    With a `law` the general model's effects follow that other law, and the simulator its own.
+    """
+    acting = [
+        (each.name, replace(variant_of(each.name, each.at, hanger), law=law)) for each in effects
+    ]
+    model = ComposedHanger(hanger, baseline, acting, PLACES)
     tension = 1.05 * hanger.nominal_tension_n
     deviations = np.log1p([getattr(DEVIATIONS, name) for name in GLOBAL])
     own = [value for each in effects for value in each.values.values()]
@@ -142,7 +146,9 @@ def both(
     k1, k2, k3, k4 = (10.0**k for k in springs) if springs else (math.inf,) * 4
     state = HangerState(tension, k1, k2, k3, k4, damping_ratio=0.0)
     conditions = TestConditions(test, shift, level, mass)
-    truth = planted_modes(hanger, state, effects, conditions, MODES, PLACES, deviations=DEVIATIONS)
+    truth = planted_modes(
+        hanger, state, effects, conditions, MODES, PLACES, deviations=DEVIATIONS, own_laws=law > 0
+    )
     return (
         (found.frequency_hz[0], found.shape[0], found.damping_ratio[0]),
         (truth.frequency_hz, truth.shape, truth.damping_ratio),
@@ -199,6 +205,18 @@ def test_a_strong_effect_is_the_same_by_both(hanger: Hanger, name: str) -> None:
     effect = planted(hanger, name, at, STRONG[name])
     frequency, shape = STRONG_TOLERANCE.get(name, (1e-5, 1e-3))
     assert_alike(*both(hanger, effect), frequency=frequency, shape=shape)
+
+
+@pytest.mark.parametrize("values", [VALUES, STRONG])
+@pytest.mark.parametrize("springs", [(), (6.8, 7.3, 7.1, 6.6)])
+def test_a_bar_that_sags_as_it_bends_is_the_same_by_both(
+    hanger: Hanger, values: dict[str, dict[str, float]], springs: tuple[float, ...]
+) -> None:
+    sag = planted(hanger, "sag", "everywhere, longitudinal", values["sag"])
+    baseline = "beam2" if springs else "beam1"
+    assert_alike(
+        *both(hanger, sag, baseline=baseline, springs=springs, law=1), frequency=1e-5, shape=1e-3
+    )
 
 
 def test_end_springs_of_the_baseline_are_those_of_the_state(hanger: Hanger) -> None:

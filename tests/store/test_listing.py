@@ -12,7 +12,9 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere
 from shm.store import (
+    AlertRow,
     Baseline,
+    DeliveryRow,
     EventKind,
     IdentifiedTest,
     Lineage,
@@ -47,6 +49,10 @@ def with_baseline(store: Store, number: int = 1, hanger: int = 3) -> Baseline:
     first = identified(store, number, hanger)
     posterior = a_posterior("beam1", (first.test.id,))
     store.selected(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    return baseline_of(store, hanger)
+
+
+def baseline_of(store: Store, hanger: int = 3) -> Baseline:
     baseline = store.baseline(hanger)
     assert baseline is not None
     return baseline
@@ -147,7 +153,10 @@ def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Stor
     posterior = a_posterior("beam1", ("t2",))
     file_store.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
     assert file_store.latest_watches() == {}
-    assert file_store.called_watches() == ()
+    assert file_store.called_watches(3) == file_store.telling_watches(baseline_of(file_store)) == ()
+    assert file_store.called_changes() == {}
+    told = file_store.telling_watches(baseline)
+    assert [each.watched.test for each in told] == ["t2"]
 
 
 def test_only_called_changes_are_listed_as_called(store: Store) -> None:
@@ -158,9 +167,18 @@ def test_only_called_changes_are_listed_as_called(store: Store) -> None:
     watched(store, other, 6, 1.0)
     called = [each for each in store.watches() if each.watched.change.called]
     assert [each.watched.test for each in called] == ["t3", "t4"]
-    assert [each.id for each in store.called_watches()] == [each.id for each in called]
     assert [each.id for each in store.called_watches(3)] == [each.id for each in called]
+    assert store.called_changes() == {3: tuple(each.watched.change for each in called)}
     assert store.called_watches(4) == ()
+
+
+def test_calls_and_the_latest_watch_tell_what_there_is_to_tell(store: Store) -> None:
+    baseline = with_baseline(store)
+    for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 1.0), (5, 1.0)):
+        watched(store, baseline, number, evidence_years)
+    found = [(each.id, each.watched.test) for each in store.telling_watches(baseline)]
+    assert found == [(2, "t3"), (4, "t5")]
+    assert store.telling_watches(baseline)[-1].watched.drifts == store.drifts(3, "t5") != ()
 
 
 def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
@@ -172,6 +190,57 @@ def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
     for alert in store.alerts(3):
         store.acknowledge(alert.id, "engineer", "seen", NOW)
     assert store.open_alert_counts() == {4: 3}
+
+
+def raise_alerts(store: Store) -> None:
+    """Alerts 1 to 4 of hanger 3, then 5 and 6 of hanger 4."""
+    for hanger, count in ((3, 4), (4, 2)):
+        baseline = with_baseline(store, 10 * hanger, hanger)
+        for number in range(1, count + 1):
+            watched(store, baseline, 10 * hanger + number)
+
+
+def numbers(rows: tuple[AlertRow, ...]) -> list[int]:
+    return [row.id for row in rows]
+
+
+def test_alerts_are_listed_page_by_page_newest_first(store: Store) -> None:
+    raise_alerts(store)
+    first = store.alert_rows(limit=4)
+    second = store.alert_rows(limit=4, before=first[-1].id)
+    assert numbers((*first, *second)) == [6, 5, 4, 3, 2, 1]
+    assert numbers(store.alert_rows()) == [6, 5, 4, 3, 2, 1]
+    assert numbers(store.alert_rows(3, limit=2)) == [4, 3]
+    assert store.alert_rows(5) == store.alert_rows(before=1) == ()
+
+
+def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
+    raise_alerts(store)
+    for days, alert in enumerate((4, 1, 5)):
+        store.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
+    assert numbers(store.alert_rows(is_open=True)) == [6, 3, 2]
+    assert numbers(store.alert_rows(3, is_open=True, before=3)) == [2]
+    assert numbers(store.alert_rows(is_open=False)) == [5, 1, 4]
+    assert numbers(store.alert_rows(is_open=False, limit=1, before=5)) == [1]
+    assert numbers(store.alert_rows(is_open=False, before=1)) == [4]
+
+
+def test_a_row_says_what_the_alert_says_and_who_was_told(store: Store) -> None:
+    raise_alerts(store)
+    noted = store.acknowledge(2, "engineer", "seen", NOW)
+    (delivery,) = (each for each in store.deliveries() if each.alert == noted.alert)
+    store.delivery_failed(delivery, "no power", NOW, NOW)
+    (owed,) = (each for each in store.deliveries() if each.alert == noted.alert)
+    row = store.alert_row(2)
+    alert = noted.alert
+    assert (row.hanger, row.test, row.kinds) == (alert.hanger, alert.test, alert.kinds)
+    assert (row.raised_at, row.message) == (noted.raised_at, alert.message)
+    assert row.acknowledgement == noted.acknowledgement
+    assert row.deliveries == (DeliveryRow("mail", owed.state, 1, "no power"),)
+    assert row in store.alert_rows(3)
+    assert replace(row, id=1) != store.alert_row(1)
+    with pytest.raises(NothingThere, match="no alert 9"):
+        store.alert_row(9)
 
 
 def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 
 from shm.pipeline import utc_now
-from shm.store import Delivery, Store, StoredAlert
+from shm.store import AlertRow
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import answers
 from shm_daemon.web.models import Acknowledge, Alerts, AlertState
 
 router = APIRouter(prefix="/api/alerts", tags=["alerts"])
 _LARGEST = 2**31 - 1
+_MOST = 1000
 
 
 @router.get(
@@ -29,11 +28,27 @@ def alerts(
     _: Reader,
     hanger: Annotated[int | None, Query(ge=0, le=_LARGEST)] = None,
     open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
+    limit: Annotated[
+        int | None, Query(ge=1, le=_MOST, description="So many of the newest, the newest first.")
+    ] = None,
+    before: Annotated[
+        int | None,
+        Query(ge=0, le=_LARGEST, description="With `limit`: `next_before` of the answer before."),
+    ] = None,
 ) -> Any:
-    """All alerts, the oldest first, with their deliveries."""
-    found = site.store.alerts(hanger)
-    chosen = [alert for alert in found if alert.acknowledgement is None or not open]
-    return {"alerts": alert_rows(site.store, chosen)}
+    """With their deliveries. Without `limit` all that were ever raised, the oldest first.
+
+    With `limit` page by page, the newest first: after years that is the quicker question.
+    """
+    is_open = True if open else None
+    if limit is None:
+        found = site.store.alert_rows(hanger, is_open=is_open)[::-1]
+        return {"alerts": [alert_document(each) for each in found], "next_before": None}
+    rows = site.store.alert_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
+    return {
+        "alerts": [alert_document(each) for each in rows[:limit]],
+        "next_before": rows[limit - 1].id if len(rows) > limit else None,
+    }
 
 
 @router.post(
@@ -50,38 +65,23 @@ def acknowledge(
 ) -> Any:
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
-    noted = site.store.acknowledge(alert_id, who, told.why, utc_now())
-    return alert_rows(site.store, [noted])[0]
+    site.store.acknowledge(alert_id, who, told.why, utc_now())
+    return alert_document(site.store.alert_row(alert_id))
 
 
-def alert_rows(store: Store, alerts: Sequence[StoredAlert]) -> list[dict[str, Any]]:
-    """Alerts as documents, with what became of their deliveries."""
-    deliveries = defaultdict(list)
-    for each in store.deliveries() if alerts else ():
-        deliveries[each.alert.key].append(each)
-    return [_row(alert, deliveries[alert.alert.key]) for alert in alerts]
-
-
-def _row(stored: StoredAlert, deliveries: Sequence[Delivery]) -> dict[str, Any]:
-    noted, alert = stored.acknowledgement, stored.alert
+def alert_document(alert: AlertRow) -> dict[str, Any]:
+    """An alert with what became of its deliveries."""
+    noted = alert.acknowledgement
     return {
-        "id": stored.id,
+        "id": alert.id,
         "hanger": alert.hanger,
-        "raised_at": stored.raised_at,
+        "raised_at": alert.raised_at,
         "test": alert.test,
-        "test_at": alert.time,
+        "test_at": alert.test_time,
         "kinds": list(alert.kinds),
         "message": alert.message,
         "acknowledged": None
         if noted is None
         else {"who": noted.who, "why": noted.why, "at": noted.at},
-        "deliveries": [
-            {
-                "hook": each.hook,
-                "state": each.state.value,
-                "attempts": each.attempts,
-                "last_error": each.last_error,
-            }
-            for each in deliveries
-        ],
+        "deliveries": [{**vars(each), "state": each.state.value} for each in alert.deliveries],
     }

@@ -49,6 +49,13 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
     return HTMLResponse(text, status)
 
 
+def prepare_templates() -> None:
+    """Reads all pages' templates, so that no visitor waits for it."""
+    templates = _environment()
+    for name in templates.list_templates(extensions=["j2"]):
+        templates.get_template(name)
+
+
 def problem(
     request: Request, status: int, message: str, remedy: str, headers: dict[str, str] | None
 ) -> HTMLResponse:
@@ -72,6 +79,7 @@ def asset(name: str) -> str:
     return f"/static/{name}?v={_checksum(name)}"
 
 
+@cache
 def plotly_address() -> str:
     """The address of plotly's script, of the version that is installed."""
     try:

@@ -134,6 +134,11 @@ class Alerts(BaseModel):
     """Alerts as they were raised."""
 
     alerts: list[AlertState]
+    next_before: int | None = Field(
+        default=None,
+        description="Ask for older ones with `before` of this; null where there are none, and "
+        "without `limit`.",
+    )
 
 
 class Acknowledge(BaseModel):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,10 +36,13 @@ def serve(
     """
     with needing("web"):
         from shm_daemon.web.app import make_app
+        from shm_daemon.web.warming import warm_up
     refuse_unguarded(workspace, address)
     if not address.is_loopback and certificate is None:
         log.warning("tokens and data go over the network in clear: give --certificate and --key")
-    make_server(make_app(workspace, address), address, certificate, key).run()
+    app = make_app(workspace, address)
+    threading.Thread(target=warm_up, args=(app,), name="warm-up", daemon=True).start()
+    make_server(app, address, certificate, key).run()
 
 
 def make_server(

@@ -23,6 +23,7 @@ class Sag(Effect):
     source = "Irvine and Caughey (1974), The linear theory of free vibrations of a suspended cable."
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
+    other_laws = ("it sags as its bending and its ends let it, not as a string",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
@@ -55,4 +56,5 @@ class Sag(Effect):
     ) -> PhysicalHanger:
         parameter = physical.sag_parameter.copy()
         parameter[:, list(variant.planes)] += values[:, :1]
-        return replace(physical, sag_parameter=parameter)
+        as_it_bends = physical.sags_as_it_bends or variant.law == 1
+        return replace(physical, sag_parameter=parameter, sags_as_it_bends=as_it_bends)

@@ -25,7 +25,10 @@ class SectionLoss(Effect):
     )
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
-    other_laws = ("the loss begins and ends gradually, over two fifths of its extent at each end",)
+    other_laws = (
+        "the loss begins and ends gradually, over two fifths of its extent at each end",
+        "pits reach into the section: the stiffness falls as the area, not as its square",
+    )
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -58,13 +61,14 @@ class SectionLoss(Effect):
         hanger: Hanger,
     ) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        reaches = GRADUAL if variant.law else (1.0,)
+        reaches = GRADUAL if variant.law == 1 else (1.0,)
+        power = 1 if variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
         zones = tuple(
             Zone(
                 start_m=middle_m - reach * extent_m / 2,
                 end_m=middle_m + reach * extent_m / 2,
-                stiffness_factor=left**2,
+                stiffness_factor=left**power,
                 mass_factor=left,
             )
             for reach in reaches

@@ -25,7 +25,10 @@ class StiffEndZones(Effect):
     source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
     seen_by = ("frequencies", "shapes near the ends")
     imitated_by = ("effective_length", "bending_stiffness", "shear_and_rotary_inertia")
-    other_laws = ("the stiffness falls gradually, as in a socket that tapers",)
+    other_laws = (
+        "the stiffness falls gradually, as in a socket that tapers",
+        "the compliance rises gradually, as in a socket that is cut to a cone",
+    )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.ends_and_planes(survey)
@@ -64,15 +67,23 @@ class StiffEndZones(Effect):
         deck_m, arch_m = physical.deck_end_m, physical.arch_end_m
         reach_m, ratio = values.T
         same = np.ones_like(ratio)
-        steps = GRADUAL if variant.law else (1.0,)
-        factor = np.ones((len(ratio), len(PLANES)))
-        factor[:, list(variant.planes)] = ratio[:, None] ** (1 / len(steps))
-        zones = [
-            (
+        zones = []
+        for step, times in _steps(ratio, variant.law):
+            factor = np.ones((len(ratio), len(PLANES)))
+            factor[:, list(variant.planes)] = times[:, None]
+            both = (
                 Zone(deck_m, deck_m + step * reach_m, factor, same),
                 Zone(arch_m - step * reach_m, arch_m, factor, same),
-            )[end]
-            for step in steps
-            for end in variant.ends
-        ]
+            )
+            zones += [both[end] for end in variant.ends]
         return replace(physical, zones=(*physical.zones, *zones))
+
+
+def _steps(ratio: FloatArray, law: int) -> list[tuple[float, FloatArray]]:
+    """The reaches of steps one in another, each with the factor by which it stiffens."""
+    if law == 0:
+        return [(1.0, ratio)]
+    if law == 1:
+        return [(reach, ratio ** (1 / len(GRADUAL))) for reach in GRADUAL]
+    left = 1 / ratio + (1 - 1 / ratio) * np.array([[0.0], [0.25], [0.75], [1.0]])
+    return list(zip(GRADUAL, left[1:] / left[:-1], strict=True))

@@ -68,10 +68,11 @@ class PhysicalHanger:
     `support_mass_kg` (n, ends, planes) moves with an end that is not held: together they are a
     support's first mode. The deflections of its `support_modes` add to it.
     `shear_compliance_1_n` (n,) is 1/(kappa G A), 0 for a bar that does not shear;
-    `rotary_inertia_kg_m` (n,) is rho I. `sag_parameter` (n, planes) is Irvine's lambda squared.
-    `joint_loss_factor` (n, ends) is that of the end springs. `clock_factor` (n,) multiplies the
-    frequencies that the logger reports; `sensor_turn_rad` (n, places) is the angle by which each
-    sensor is turned about the hanger's axis, from the transverse axis to the longitudinal one.
+    `rotary_inertia_kg_m` (n,) is rho I. `sag_parameter` (n, planes) is Irvine's lambda squared,
+    of a string's parabola unless the bar `sags_as_it_bends`. `joint_loss_factor` (n, ends) is that
+    of the end springs. `clock_factor` (n,) multiplies the frequencies that the logger reports;
+    `sensor_turn_rad` (n, places) is the angle by which each sensor is turned about the hanger's
+    axis, from the transverse axis to the longitudinal one.
     """
 
     deck_end_m: FloatArray
@@ -92,6 +93,7 @@ class PhysicalHanger:
     masses: tuple[PointMass, ...] = ()
     springs: tuple[LateralSpring, ...] = ()
     support_modes: tuple[SupportMode, ...] = ()
+    sags_as_it_bends: bool = False
 
     @classmethod
     def clamped(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:

@@ -50,6 +50,8 @@ def system(physical: PhysicalHanger, bar: Bar) -> System:
         stiffness, mass = _condensed(stiffness, mass, bar.hats)
     first, kept = _kept(physical, stiffness.shape[-1])
     stiffness, mass = _window(stiffness, first, kept), _window(mass, first, kept)
+    if np.any(physical.sag_parameter):
+        stiffness = stiffness + _sag(physical, bar, stiffness, kept)
     found = swings(physical, kept)
     return System(*on_swings(stiffness, mass, found), kept, found)
 
@@ -88,21 +90,35 @@ def _kept(physical: PhysicalHanger, functions: int) -> tuple[int, IntArray]:
 
 
 def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
-    """Bar, shear, sag and lateral springs (n, planes, functions, functions)."""
+    """Bar, shear and lateral springs (n, planes, functions, functions)."""
     ratio = stiffness_ratio(physical)
     total = bar.bending + ratio[..., None, None] * bar.tension[:, None]
     if bar.counts.shear:
         flexibility = physical.shear_compliance_1_n[:, None] * bending_unit(physical, 2)
         rigid = 1 / np.maximum(flexibility, 1 / _RIGID_IN_SHEAR)
         total += rigid[..., None, None] * bar.shear[:, None]
-    if np.any(physical.sag_parameter):
-        dyad = bar.area[:, None, :, None] * bar.area[:, None, None, :]
-        total += (ratio * physical.sag_parameter)[..., None, None] * dyad
     for spring in physical.springs:
         w = bar.deflections(along(physical, spring.x_m[:, None]))
         share = spring.stiffness_n_m[:, : ratio.shape[1]] / bending_unit(physical, 3)
         total = _added(total, share[..., None, None] * (w.transpose(0, 2, 1) @ w)[:, None])
     return np.asarray(total)
+
+
+def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArray) -> FloatArray:
+    """What a hanger that hangs in a curve adds to its stiffness (n, planes, kept, kept).
+
+    A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
+    where it sags as it bends, the bar's own under its weight, as large as makes a motion by that
+    very curve stretch both alike (Irvine 1981, 2.4 and 3.3).
+    """
+    pull = np.broadcast_to(bar.area[:, None, kept], stiffness.shape[:3])
+    if physical.sags_as_it_bends:
+        rest = np.linalg.solve(stiffness, pull[..., None])[..., 0]
+        slope = np.einsum("npj,nij->npi", rest, bar.tension[:, kept[:, None], kept])
+        alike = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
+        pull = alike[..., None] * slope
+    dyad = pull[..., :, None] * pull[..., None, :]
+    return np.asarray((stiffness_ratio(physical) * physical.sag_parameter)[..., None, None] * dyad)
 
 
 def _mass(physical: PhysicalHanger, bar: Bar) -> FloatArray:

@@ -12,6 +12,8 @@ from shm.report.summary import Status, of_nominal
 from shm.values import Drift, Hanger
 from shm.watch.neighbours import BridgePattern
 
+_WIDE = 0.5
+
 
 @dataclass(frozen=True)
 class Course:
@@ -52,6 +54,11 @@ class HangerLine:
     def of_nominal(self) -> Interval | None:
         """The tension in percent of the nominal one."""
         return of_nominal(self.tension_n, self.hanger) if self.tension_n else None
+
+    @property
+    def is_hardly_known(self) -> bool:
+        """Whether the interval of the tension is so wide that a shift could hardly be seen."""
+        return self.tension_n is not None and self.tension_n.width > _WIDE * self.tension_n.mean
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,7 @@ def _since_baseline(data: BridgeReport) -> Table:
 
 def _shifted(drift: Drift) -> tuple[str, str, str]:
     _, size, span, threshold, probability = shift_cells(drift)
-    return (size, span or "about none", f"{probability} ({threshold})")
+    return (size, span, f"{probability} ({threshold})")
 
 
 def _courses(data: BridgeReport) -> Table:

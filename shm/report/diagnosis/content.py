@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from shm.values import Cause, Diagnosis, Hanger, Leads, Residual
+from shm.values import Cause, Diagnosis, Hanger, Residual
 
 _LIKELIER_THAN_NOT = 0.5
 
@@ -58,14 +58,6 @@ def claimed(diagnosis: Diagnosis) -> Claim | None:
     """The likeliest claim; None where no gap or something unknown is likelier than each."""
     leading = diagnosis.leading
     return next((claim for claim in claims(diagnosis) if claim.leading is leading), None)
-
-
-def after(diagnosis: Diagnosis) -> str:
-    """What the tension after the diagnosis allows for; empty where that is the baseline alone."""
-    told: dict[Leads, str] = {
-        "cause": "with the cause", "no gap": "", "unexplained": "allowing for the unknown",
-    }  # fmt: skip
-    return told[diagnosis.leads]
 
 
 def answer(diagnosis: Diagnosis) -> Answer:

@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from shm.report import words
-from shm.report.diagnosis.content import Answer, DiagnosisSheet, after, answer, claimed
+from shm.report.diagnosis.content import Answer, DiagnosisSheet, answer, claimed
 from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import consequences, name, verdict
@@ -94,7 +94,7 @@ def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     if math.isnan(plain.mean):
         return None
     unit = tension_unit(sheet.diagnosis)
-    if not after(sheet.diagnosis) or math.isnan(better.mean):
+    if math.isnan(better.mean):
         return ("Tension", _rounded(plain, unit), f"baseline: {unit.told(plain)}")
     return ("Tension", _rounded(better, unit), f"baseline alone: {unit.told(plain)}")
 

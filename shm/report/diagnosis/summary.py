@@ -10,13 +10,12 @@ from shm.report.diagnosis.content import (
     Answer,
     Claim,
     DiagnosisSheet,
-    after,
     answer,
     claimed,
     claims,
 )
 from shm.report.diagnosis.phrases import label, phrase
-from shm.report.diagnosis.tensions import tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_unit
 from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
@@ -174,7 +173,7 @@ def sure_trend(trend: Trend) -> bool:
 
 def _slope(trend: Trend) -> str:
     over = "from transverse to longitudinal" if trend.condition == "plane" else "over its range"
-    return f"{trend.slope_percent:+.2f} % {over}"
+    return f"{trend.slope_percent:+z.2f} % {over}"
 
 
 def slope(trend: Trend) -> Interval:
@@ -231,11 +230,10 @@ def _tension(diagnosis: Diagnosis) -> str:
         return ""
     unit = tension_unit(diagnosis)
     alone = f"the baseline {diagnosis.baseline} alone gives {unit.told(plain)}"
-    what = after(diagnosis)
-    if not what or math.isnan(better.mean):
+    if math.isnan(better.mean):
         return f"For the tension {alone}{_with_care(diagnosis)}."
     off = 100 * (plain.mean / better.mean - 1)
-    told = f"{what.capitalize()} the tension is {unit.told(better)}"
+    told = f"{AFTER.capitalize()}, the tension is {unit.told(better)}"
     return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
 
 

@@ -9,7 +9,6 @@ from shm.report import words
 from shm.report.diagnosis.content import (
     Answer,
     DiagnosisSheet,
-    after,
     answer,
     claimed,
     claims,
@@ -18,7 +17,7 @@ from shm.report.diagnosis.content import (
 from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
-from shm.report.diagnosis.tensions import TensionUnit, tension_unit
+from shm.report.diagnosis.tensions import AFTER, TensionUnit, tension_unit
 from shm.report.table import Table
 from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
 
@@ -85,9 +84,9 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
         label(cause),
         words.probability(cause.probability),
         "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
-        words.number(cause.log_bayes_factor, "+.1f"),
-        words.number(cause.log_fit, "+.1f"),
-        words.number(cause.log_occam, "+.1f"),
+        words.number(cause.log_bayes_factor, "+z.1f"),
+        words.number(cause.log_fit, "+z.1f"),
+        words.number(cause.log_occam, "+z.1f"),
         cause.method,
     )
 
@@ -134,6 +133,8 @@ def shrinkage(sheet: DiagnosisSheet) -> Table:
             for what, before, after in rows
             if math.isfinite(before)
         ),
+        note="Root mean square of measured over predicted frequencies, less 1: a figure of these "
+        "data, which has no interval.",
     )
 
 
@@ -142,7 +143,7 @@ def tension(sheet: DiagnosisSheet) -> Table:
     unit = tension_unit(diagnosis)
     rows = (
         (f"before: the baseline {diagnosis.baseline}", diagnosis.tension_before_n),
-        (f"after: {after(diagnosis)}", diagnosis.tension_after_n),
+        (f"after: {AFTER}", diagnosis.tension_after_n),
     )
     return Table(
         "Tension",
@@ -154,7 +155,7 @@ def tension(sheet: DiagnosisSheet) -> Table:
         tuple(
             _tension_row(what, each, nominal, unit)
             for what, each in rows
-            if math.isfinite(each.mean) and not what.endswith(": ")
+            if math.isfinite(each.mean)
         ),
     )
 
@@ -218,10 +219,10 @@ def _residual_row(residual: Residual, is_aside: bool) -> tuple[str, ...]:
         residual.test,
         words.number(residual.measured_hz, ".3f"),
         words.number(residual.predicted_hz, ".3f"),
-        words.number(residual.residual_percent, "+.2f"),
-        words.number(residual.z, "+.1f"),
+        words.number(residual.residual_percent, "+z.2f"),
+        words.number(residual.z, "+z.1f"),
         "set aside" if is_aside else _share(residual.share),
-        words.number(residual.after_percent, "+.2f", ""),
+        words.number(residual.after_percent, "+z.2f", ""),
     )
 
 
@@ -239,10 +240,10 @@ def trends(sheet: DiagnosisSheet) -> Table:
 
 def _trend_row(trend: Trend) -> tuple[str, ...]:
     interval = slope(trend)
-    bounds = f"{interval.low:+.2f} to {interval.high:+.2f}"
+    bounds = f"{interval.low:+z.2f} to {interval.high:+z.2f}"
     return (
         trend.condition,
-        words.number(trend.slope_percent, "+.2f"),
+        words.number(trend.slope_percent, "+z.2f"),
         bounds if math.isfinite(interval.width) else "not known",
         _share(trend.share),
     )

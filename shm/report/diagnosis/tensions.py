@@ -9,6 +9,10 @@ from shm.report import words
 from shm.report.content import Interval
 from shm.values import Diagnosis, TensionEstimate
 
+AFTER = "weighed over all that may be"
+"""What the tension after the diagnosis stands for: no gap, every cause and the unknown count by
+their probabilities."""
+
 _KILO = 1e3
 
 

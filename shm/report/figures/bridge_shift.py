@@ -186,7 +186,7 @@ def _caption(pattern: BridgePattern) -> str:
 
 def _alt(pattern: BridgePattern) -> str:
     moved = [
-        f"hanger {row.hanger} {row.shift_n / 1e3:+.0f} kN ({100 * row.shift_fraction:+.1f} %)"
+        f"hanger {row.hanger} {row.shift_n / 1e3:+z.0f} kN ({100 * row.shift_fraction:+z.1f} %)"
         for row in pattern.rows
         if row.way != "unchanged"
     ]

@@ -19,6 +19,8 @@ _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
 _MARGIN = 0.08
 _THINNEST = 0.004
+_LEAST_TESTS = 2
+"""One test alone has no course: its numbers stand elsewhere."""
 
 
 def _draw(data: StatesOverTime) -> Figure | None:
@@ -118,9 +120,9 @@ def _see(axes: Axes, quantity: QuantityOverTime, outlier: BoolArray, scale: floa
         [
             quantity.filtered.middle,
             quantity.smoothed.middle,
-            _inner(quantity.filtered.low),
-            _inner(quantity.filtered.high),
-            _inner(quantity.read.middle[~outlier]),
+            timeline.inner(quantity.filtered.low),
+            timeline.inner(quantity.filtered.high),
+            timeline.inner(quantity.read.middle[~outlier]),
             [quantity.baseline, quantity.lower_threshold, quantity.upper_threshold],
         ]
     )
@@ -146,16 +148,6 @@ def _out_of_view(axes: Axes, times: FloatArray, values: FloatArray) -> None:
                 zorder=4,
                 label="test out of view",
             )
-
-
-def _inner(values: FloatArray) -> FloatArray:
-    """The known ones, those far from the rest drawn near, as of a test that hardly sees a thing."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return known
-    lower, middle, upper = np.quantile(known, [0.1, 0.5, 0.9])
-    reach = 3 * max(upper - middle, middle - lower)
-    return np.clip(known, middle - reach, middle + reach)
 
 
 def _levels(axes: Axes, quantity: QuantityOverTime, scale: float) -> None:
@@ -262,11 +254,15 @@ def _last(quantity: QuantityOverTime) -> str:
     )
 
 
+def _draw_course(data: StatesOverTime) -> Figure | None:
+    return _draw(data) if len(data.times) >= _LEAST_TESTS else None
+
+
 STATES = Member("drift", "States over time", _draw, _caption, _alt)
 FIGURE = Member[HangerReport](
     STATES.name,
     STATES.title,
-    lambda data: _draw(data.states.within(data.period)),
+    lambda data: _draw_course(data.states.within(data.period)),
     lambda data: _caption(data.states.within(data.period)),
     lambda data: _alt(data.states.within(data.period)),
 )

@@ -15,6 +15,7 @@ from shm.report.figures import style
 from shm.values import FloatArray
 
 _LONE_MARGIN = timedelta(days=1)
+_REACH = 3.0
 
 
 @dataclass(frozen=True)
@@ -57,3 +58,16 @@ def dress_time(axes: Axes, times: Sequence[datetime]) -> None:
     if min(times) == max(times):
         lone = times[0]
         axes.set_xlim(*positions([lone - _LONE_MARGIN, lone + _LONE_MARGIN]))
+
+
+def inner(values: FloatArray) -> FloatArray:
+    """The known ones, those far from the rest drawn near, as of a test that hardly sees a thing.
+
+    For the limits of an axis: (n,) of any unit to (m,), m <= n.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return known
+    lower, middle, upper = np.quantile(known, [0.1, 0.5, 0.9])
+    reach = _REACH * max(upper - middle, middle - lower)
+    return np.asarray(np.clip(known, middle - reach, middle + reach))

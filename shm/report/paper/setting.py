@@ -86,15 +86,20 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
         found += [_panel(Paragraph(escape(part.summary), _BODY), colour), Spacer(1, 6)]
     if part.facts:
         found += [_facts(part.facts), Spacer(1, 8)]
-    found += [Paragraph(escape(each), _REMARK, bulletText="•") for each in part.remarks]
-    drawn = [_figure(each, next(figures)) for each in part.illustrations]
-    if drawn and not found:
+    remarks = [Paragraph(escape(each), _REMARK, bulletText="•") for each in part.remarks]
+    found += [*remarks, Spacer(1, 8)] if remarks else []
+    groups = [_figure(each, next(figures)) for each in part.illustrations]
+    groups += [_table(each, next(tables)) for each in part.tables]
+    if groups and not found:
         # Stated, because a heading is not kept with what is itself kept together.
-        drawn[0], heading = [*heading, *drawn[0]], []
-    found += [KeepTogether(each) for each in drawn]
-    for table in part.tables:
-        found += _table(table, next(tables))
-    return [*heading, *found]
+        groups[0], heading = [*heading, *groups[0]], []
+    return [*heading, *found, *(each for group in groups for each in _kept(group))]
+
+
+def _kept(group: list[Flowable]) -> list[Flowable]:
+    """On one page with its heading and its note, but for a table longer than that."""
+    height = sum(each.wrap(WIDTH, _TALLEST)[1] for each in group)
+    return [KeepTogether(group)] if height < _TALLEST else group
 
 
 def _mark(title: str) -> Flowable:
@@ -152,14 +157,21 @@ def _table(table: Table, number: int) -> list[Flowable]:
     rows += [[Paragraph(escape(cell), _CELL) for cell in row] for row in table.rows]
     set_table = SetTable(
         rows,
-        columns.widths(table, WIDTH, _CELL_SIZE, 2 * _PADDING),
+        _widths(table),
         repeatRows=1,
         splitInRow=1,
         hAlign="LEFT",
         style=_rules(table),
     )
-    note = [Paragraph(escape(table.note), _NOTE)] if table.note else [Spacer(1, 9)]
-    return [title, set_table, *note]
+    note = Paragraph(escape(table.note), _NOTE) if table.note else Spacer(1, 9)
+    return [title, set_table, note]
+
+
+def _widths(table: Table) -> list[float]:
+    """Points of each column; the second has room for its row's mark."""
+    mark = _PADDING if table.marks else 0.0
+    first, second, *rest = columns.widths(table, WIDTH - mark, _CELL_SIZE, 2 * _PADDING)
+    return [first, second + mark, *rest]
 
 
 def _rules(table: Table) -> list[tuple[Any, ...]]:
@@ -176,4 +188,5 @@ def _rules(table: Table) -> list[tuple[Any, ...]]:
         if mark in _VERDICT_COLOURS:
             colour = colors.HexColor(_VERDICT_COLOURS[mark])
             rules.append(("LINEBEFORE", (1, row), (1, row), 1.5, colour))
+            rules.append(("LEFTPADDING", (1, row), (1, row), _PADDING))
     return rules

@@ -14,6 +14,11 @@ from shm.report.sheet.timeline import channel_of, located_hits
 from shm.values import NAN, BoolArray, FloatArray
 
 REACH_DB = -20.0
+LOWEST_DB = -40.0
+"""Below which no spectrum of a force is drawn."""
+CURVE_BINS = 300
+"""Into which a curve of a hit is thinned."""
+_MOST_SHOWN = 12
 _BEFORE_S, _AFTER_S = 0.006, 0.02
 _FILTER_SAMPLES = 16
 """An anti-aliasing filter spreads a pulse over so many samples on either side."""
@@ -65,6 +70,18 @@ def blows(sheet: TestSheet) -> list[Blow]:
     row = strongest_row(sheet) if sheet.recordings else 0
     found = [_blow(sheet, number, hit, row) for number, hit in located_hits(sheet)]
     return [blow for blow in found if blow is not None]
+
+
+def shown_blows(sheet: TestSheet) -> list[Blow]:
+    """All hits, or some of them with every dropped one first."""
+    dropped_first = sorted(blows(sheet), key=lambda blow: blow.hit.used)
+    return sorted(dropped_first[:_MOST_SHOWN], key=lambda blow: blow.number)
+
+
+def blow_name(blow: Blow) -> str:
+    """`hit 2, dropped: double hit`."""
+    reason = "" if blow.hit.used else f", dropped: {blow.hit.reason}"
+    return f"hit {blow.number}{reason}"
 
 
 def _blow(sheet: TestSheet, number: int, hit: Hit, row: int) -> Blow | None:

@@ -33,8 +33,8 @@ def modes(sheet: TestSheet) -> Table:
         "Modes",
         ("plane", "order", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "amplitude, m/s²"),
         tuple(_mode_row(mode) for mode in sheet.modes),
-        note="Amplitude: with which the mode rings right after a hit, at the sensor that moves "
-        "most. sd: standard deviation.",
+        note="sd: standard deviation. Amplitude: with which the mode rings right after a hit, at "
+        "the sensor that moves most; as measured, without interval.",
     )
 
 
@@ -94,6 +94,7 @@ def hits(sheet: TestSheet) -> Table:
             )
             for number, hit in enumerate(sheet.hits, 1)
         ),
+        note="As recorded, without interval.",
     )
 
 

@@ -109,16 +109,6 @@ def level_trace(
     }  # fmt: skip
 
 
-def inner(values: FloatArray) -> FloatArray:
-    """The known ones, those far from the rest drawn near, as of a test that hardly sees a thing."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return known
-    lower, middle, upper = np.quantile(known, [0.1, 0.5, 0.9])
-    reach = 3 * max(upper - middle, middle - lower)
-    return np.asarray(np.clip(known, middle - reach, middle + reach))
-
-
 def limits(values: FloatArray) -> list[float]:
     """An axis that shows all known values, with a little room."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))

@@ -62,7 +62,7 @@ def _draw(view: HangerView) -> dict[str, Any]:
         showlegend=False,
         hovermode="closest",
         bargap=0,
-        margin={"l": 56, "r": 8, "t": 8, "b": 60},
+        margin={"l": 72, "r": 8, "t": 8, "b": 60},
     )
 
 
@@ -97,9 +97,9 @@ def _axes(columns: list[_Column]) -> dict[str, Any]:
     across = domains(count, _GAP)
     down = across[::-1]
     layout: dict[str, Any] = {}
-    small = {"nticks": 4, "tickfont": {"size": 10}, "automargin": False, "tickangle": 0}
+    small = {"nticks": 3, "tickfont": {"size": 10}, "automargin": False, "tickangle": 0}
     for number, column in enumerate(columns):
-        title = {"title": {"text": column.label, "font": {"size": 11}}}
+        title = {"title": {"text": column.label, "font": {"size": 11}, "standoff": 6}}
         is_last = number == count - 1
         below = axis("y", count + number) if is_last else axis("y", count - 1)
         layout[layout_name("x", number)] = {

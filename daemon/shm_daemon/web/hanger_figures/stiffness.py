@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shm.report import words
+from shm.report.figures.timeline import inner
 from shm.report.states import QuantityOverTime
 from shm.watch.history import Band
 from shm_daemon.web.hanger_figures import over_time
@@ -123,12 +124,12 @@ def _levels(view: HangerView, panel: _Panel, y: str) -> list[Trace]:
 def _range(view: HangerView, panel: _Panel) -> list[float]:
     """The baseline with its thresholds, and what is near them of tests and state."""
     reach = view.hanger.thresholds.stiffness_shift_decades
-    shown = [over_time.inner(panel.alone.middle), panel.baseline + np.array([-reach, reach])]
+    shown = [inner(panel.alone.middle), panel.baseline + np.array([-reach, reach])]
     if panel.state is not None:
         parts = (panel.state.filtered.low, panel.state.filtered.high)
-        shown += [over_time.inner(part) for part in parts]
+        shown += [inner(part) for part in parts]
     else:
-        shown += [over_time.inner(part) for part in (panel.alone.low, panel.alone.high)]
+        shown += [inner(part) for part in (panel.alone.low, panel.alone.high)]
     return over_time.limits(np.concatenate(shown))
 
 

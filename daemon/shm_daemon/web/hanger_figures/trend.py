@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shm.report import Interval, words
+from shm.report.figures.timeline import inner
 from shm.report.states import QuantityOverTime, StatesOverTime, called_words
 from shm.store import EventKind, HangerEvent, TrendPoint
 from shm.values import TENSION, FloatArray
@@ -176,11 +177,11 @@ def _range(view: HangerView, means: FloatArray, state: QuantityOverTime | None) 
         mean = view.baseline.tension_n.mean * _KN
         shown.append(np.array([mean * (1 - _reach(view)), mean * (1 + _reach(view))]))
     if state is not None:
-        shown += [over_time.inner(part * _KN) for part in (state.filtered.low, state.filtered.high)]
+        shown += [inner(part * _KN) for part in (state.filtered.low, state.filtered.high)]
     else:
         summaries = [point.tension_n for point in view.trend]
-        shown.append(over_time.inner(np.array([each.q05 for each in summaries]) * _KN))
-        shown.append(over_time.inner(np.array([each.q95 for each in summaries]) * _KN))
+        shown.append(inner(np.array([each.q05 for each in summaries]) * _KN))
+        shown.append(inner(np.array([each.q95 for each in summaries]) * _KN))
     return over_time.limits(np.concatenate(shown))
 
 

@@ -1,14 +1,14 @@
-"""The page of alerts: those that nobody has acknowledged, and the latest of the others."""
+"""The page of alerts: those that nobody has acknowledged, then the others, some at a time."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
-from shm.store import StoredAlert
+from shm.store import AlertRow, Store
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.alerts import alert_rows
+from shm_daemon.web.alerts import alert_document
 from shm_daemon.web.frame import page
 from shm_daemon.web.test_address import test_page
 
@@ -16,37 +16,51 @@ router = APIRouter(include_in_schema=False)
 
 _SHOWN = 50
 _MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert"}
+Number = Annotated[int | None, Query(ge=0, le=2**31 - 1)]
 
 
 @router.get("/alerts")
 def alerts_page(
-    request: Request, site: AtSite, _: Reader, hanger: int | None = None, all: bool = False
+    request: Request,
+    site: AtSite,
+    _: Reader,
+    hanger: Number = None,
+    open_before: Number = None,
+    noted_before: Number = None,
 ) -> Response:
-    """Alerts of all hangers or of one, the newest first."""
-    found = list(reversed(site.store.alerts(hanger)))
-    opened = [each for each in found if each.acknowledgement is None]
-    noted = sorted((each for each in found if each.acknowledgement), key=_noted_at, reverse=True)
-    shown = noted if all else noted[:_SHOWN]
-    rows = [_with_address(row) for row in alert_rows(site.store, [*opened, *shown])]
+    """Alerts of all hangers or of one, the newest first.
+
+    `open_before` goes on among the open ones alone, `noted_before` among those acknowledged.
+    """
+    opened, older_open = _some(site.store, hanger, open_before, is_open=True)
+    noted, older_noted = _some(site.store, hanger, noted_before, is_open=False)
+    counts = site.store.open_alert_counts()
     return page(
         request,
         "alerts.html.j2",
-        opened=rows[: len(opened)],
-        noted=rows[len(opened) :],
-        left_out=len(noted) - len(shown),
+        opened=None if noted_before is not None else opened,
+        noted=None if open_before is not None else noted,
+        older_open=older_open,
+        older_noted=older_noted,
+        open_count=sum(counts.values()) if hanger is None else counts.get(hanger, 0),
+        is_first=open_before is None and noted_before is None,
         hanger=hanger,
         has_hooks=bool(site.workspace.bridge.hooks),
         marks=_MARKS,
     )
 
 
-def _noted_at(alert: StoredAlert) -> Any:
-    assert alert.acknowledgement is not None
-    return alert.acknowledgement.at
+def _some(
+    store: Store, hanger: int | None, before: int | None, *, is_open: bool
+) -> tuple[list[dict[str, Any]], int | None]:
+    """Alerts as the page shows them, and the number to go on after, if there are more."""
+    rows = store.alert_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    shown = rows[:_SHOWN]
+    return [_with_address(each) for each in shown], shown[-1].id if len(rows) > _SHOWN else None
 
 
-def _with_address(row: dict[str, Any]) -> dict[str, Any]:
+def _with_address(alert: AlertRow) -> dict[str, Any]:
     """An alert that only tries a hook is of no test."""
-    is_trial = "test" in row["kinds"]
-    address = None if is_trial else test_page(row["hanger"], row["test"])
-    return {**row, "address": address}
+    is_trial = "test" in alert.kinds
+    address = None if is_trial else test_page(alert.hanger, alert.test)
+    return {**alert_document(alert), "address": address}

@@ -7,6 +7,7 @@
   const inCss = (name) =>
     getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const dark = matchMedia("(prefers-color-scheme: dark)");
+  const NARROW_PX = 480;
   const drawn = new Map(); // plot -> document
   let script = null;
 
@@ -62,19 +63,22 @@
     return found;
   }
 
-  function layoutOf(given, light) {
+  function layoutOf(given, light, narrow) {
     const ink = light ? "#1d2330" : inCss("ink");
     const grid = light ? "#d5d9e0" : inCss("grid");
     const paper = light ? "#ffffff" : inCss("page");
+    const size = narrow ? 11 : 13;
     const base = {
       paper_bgcolor: "rgba(0,0,0,0)",
       plot_bgcolor: "rgba(0,0,0,0)",
-      font: { color: ink, family: "system-ui, sans-serif", size: 13 },
-      margin: { l: 64, r: 16, t: 36, b: 52 },
-      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
+      font: { color: ink, family: "system-ui, sans-serif", size },
+      margin: narrow ? { l: 48, r: 8, t: 30, b: 44 } : { l: 64, r: 16, t: 36, b: 52 },
+      legend: { orientation: "h", x: 0, xref: "container", y: 1.02, yanchor: "bottom",
+        font: { size } },
       hoverlabel: { bgcolor: paper, bordercolor: grid, font: { color: ink } },
     };
-    const axis = { gridcolor: grid, linecolor: grid, zerolinecolor: grid, automargin: true };
+    const axis = { gridcolor: grid, linecolor: grid, zerolinecolor: grid, automargin: true,
+      title: { font: { size } } };
     const axes = new Set(["xaxis", "yaxis"]);
     Object.keys(given).filter((key) => /^[xy]axis\d*$/.test(key)).forEach((key) => axes.add(key));
     for (const name of axes) base[name] = axis;
@@ -88,7 +92,7 @@
     const turned = theme(light);
     const library = await plotly();
     await library.react(plot, inTheme(figure.data, turned),
-      layoutOf(inTheme(figure.layout ?? {}, turned), light),
+      layoutOf(inTheme(figure.layout ?? {}, turned), light, plot.clientWidth < NARROW_PX),
       { responsive: true, displaylogo: false, scrollZoom: false,
         modeBarButtonsToRemove: ["lasso2d", "select2d"] });
   }

@@ -35,7 +35,7 @@ class TestFigure:
 
     `source` says what it needs: what the store holds; the raw file, identified once more; or
     `both`, where the store has enough to begin with and the raw file adds to it. `caption` and
-    `alt` are asked only of what was drawn.
+    `alt` are asked only of what was drawn. `is_wide`: a phone shows it by and by, not narrower.
     """
 
     __test__ = False  # told to pytest
@@ -47,6 +47,7 @@ class TestFigure:
     caption: Callable[[Shown], str]
     alt: Callable[[Shown], str]
     height_px: Callable[[TestSheet], int] = lambda sheet: 420
+    is_wide: bool = False
 
     def document(self, shown: Shown) -> dict[str, Any] | None:
         """The figure with its words."""

@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 
 from shm.report import TestSheet
-from shm.report.sheet.blows import REACH_DB, Blow, blows
+from shm.report.sheet.blows import (
+    CURVE_BINS,
+    LOWEST_DB,
+    REACH_DB,
+    Blow,
+    blow_name,
+    shown_blows,
+)
 from shm.report.sheet.figures.hits import FIGURE as PRINTED
 from shm.report.sheet.spectra import searched_range
 from shm.report.sheet.thinning import envelope_places
@@ -16,16 +23,13 @@ from shm_daemon.web import plotting
 from shm_daemon.web.test_figures.contract import Shown, TestFigure
 from shm_daemon.web.test_figures.panels import Panel, apart, drawn, escaped, log_axis, numbers
 
-_MOST = 12
 _COLOURS = ("blue", "orange", "green", "purple")
 _DASHES = ("solid", "dash", "dot")
-_BINS = 300
-_LOWEST_DB = -40.0
 _FADE_ROOM = 1.3
 
 
 def _draw(shown: Shown) -> dict[str, Any] | None:
-    hits = _shown(shown.sheet)
+    hits = shown_blows(shown.sheet)
     if not hits:
         return None
     band_hz = _band_hz(shown.sheet, hits)
@@ -33,12 +37,6 @@ def _draw(shown: Shown) -> dict[str, Any] | None:
     layout["shapes"] = _guides(band_hz)
     traces = [trace for place, blow in enumerate(hits) for trace in _traces(blow, place)]
     return drawn(traces, layout)
-
-
-def _shown(sheet: TestSheet) -> list[Blow]:
-    """All hits, or some of them with every dropped one first."""
-    dropped_first = sorted(blows(sheet), key=lambda blow: blow.hit.used)
-    return sorted(dropped_first[:_MOST], key=lambda blow: blow.number)
 
 
 def _band_hz(sheet: TestSheet, hits: list[Blow]) -> tuple[float, float]:
@@ -55,7 +53,7 @@ def _pulse_panel(hits: list[Blow]) -> Panel:
 def _spectrum_panel(band_hz: tuple[float, float], hits: list[Blow]) -> Panel:
     end = min(2 * band_hz[1], float(hits[0].spectrum_hz[-1]))
     return Panel(
-        "force, relative (dB)", y={"range": [_LOWEST_DB, 2]}, x_label="frequency (Hz)",
+        "force, relative (dB)", y={"range": [LOWEST_DB, 2]}, x_label="frequency (Hz)",
         x={"range": [0, end]}, title="shaded: band; line: a tenth of the force",
     )  # fmt: skip
 
@@ -74,13 +72,12 @@ def _fade_panel(hits: list[Blow]) -> Panel:
 
 def _traces(blow: Blow, place: int) -> list[dict[str, Any]]:
     """A hit in every panel under one name; a dropped one is red."""
-    reason = "" if blow.hit.used else f", dropped: {blow.hit.reason}"
-    named = {"name": escaped(f"hit {blow.number}{reason}"), "legendgroup": f"hit {blow.number}"}
+    named = {"name": escaped(blow_name(blow)), "legendgroup": f"hit {blow.number}"}
     line = _line(blow, place)
-    pulses = envelope_places(blow.force_n, _BINS)
-    reach = blow.spectrum_db > _LOWEST_DB - 20
+    pulses = envelope_places(blow.force_n, CURVE_BINS)
+    reach = blow.spectrum_db > LOWEST_DB - 20
     hz, db = blow.spectrum_hz, np.where(reach, blow.spectrum_db, np.nan)
-    spectra = envelope_places(db, _BINS)
+    spectra = envelope_places(db, CURVE_BINS)
     curves: tuple[tuple[FloatArray, FloatArray], ...] = (
         (1e3 * blow.time_s[pulses], blow.force_n[pulses]),
         (hz[spectra], db[spectra]),

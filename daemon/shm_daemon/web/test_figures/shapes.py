@@ -5,35 +5,37 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from shm.report import TestSheet
 from shm.report.content import NORMAL_90
 from shm.report.figures.style import PLANE_COLOURS
 from shm.report.sheet.figures.shapes import FIGURE as PRINTED
-from shm.values import PLANES, FloatArray, Mode
+from shm.report.sheet.shapes import (
+    ROOM,
+    Guide,
+    extent_m,
+    guide,
+    guide_name,
+    panel_title,
+    shown_modes,
+)
+from shm.values import PLANES, Mode
 from shm_daemon.web import plotting
 from shm_daemon.web.test_figures.contract import Shown, TestFigure
 from shm_daemon.web.test_figures.marks import SYMBOLS
 from shm_daemon.web.test_figures.panels import axis, drawn, named_axis, numbers
 
 _MOST_COLUMNS = 4
-_MOST = 36
 _ROW_PX, _REST_PX = 118, 90
-_LEAST_POINTS = 2
-_NEAR = 0.4
-"""A string misses the points by no more than this share of them where it is drawn."""
-_ROOM = 1.35
 _GAP_X, _SHARE_OF_ROW = 0.04, 0.74
 """Between two panels, as a share of the width; height of a panel, as a share of its row's."""
 
 
 def _draw(shown: Shown) -> dict[str, Any] | None:
     sheet = shown.sheet
-    if not _shown(sheet):
+    if not shown_modes(sheet):
         return None
     rows = _rows(sheet)
-    low, high = _extent_m(sheet)
+    low, high = extent_m(sheet)
     layout: dict[str, Any] = {"annotations": [], "margin": {"t": 30}}
     traces: list[dict[str, Any]] = []
     seen: set[str] = set()
@@ -49,37 +51,18 @@ def _draw(shown: Shown) -> dict[str, Any] | None:
     return drawn(traces, layout)
 
 
-def _shown(sheet: TestSheet) -> list[Mode]:
-    """Modes measured at so many places or directions that there is a shape to see."""
-    return [mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS][:_MOST]
-
-
-def _known_values(mode: Mode) -> int:
-    values = [value for p in mode.shape if math.isfinite(p.x_m) for value in (p.value, p.cross)]
-    return sum(math.isfinite(value) for value in values)
-
-
 def _rows(sheet: TestSheet) -> list[list[Mode]]:
     """The modes row by row: a plane begins a new row."""
-    modes, columns = _shown(sheet), _columns(sheet)
+    modes, columns = shown_modes(sheet), _columns(sheet)
     planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
     return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
 
 
 def _columns(sheet: TestSheet) -> int:
     """So many, up to four, that the rows of a plane are about equally full."""
-    modes = _shown(sheet)
+    modes = shown_modes(sheet)
     longest = max((sum(mode.plane == plane for mode in modes) for plane in PLANES), default=0)
     return math.ceil(longest / math.ceil(longest / _MOST_COLUMNS)) if longest else 1
-
-
-def _extent_m(sheet: TestSheet) -> tuple[float, float]:
-    """From end to end of the hanger, or of the measured places where its length is not known."""
-    if sheet.hanger is not None:
-        return 0.0, sheet.hanger.length_m
-    places = [p.x_m for mode in sheet.modes for p in mode.shape if math.isfinite(p.x_m)]
-    low, high = min(places), max(places)
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
 def _place(
@@ -105,7 +88,7 @@ def _scale(
         "showticklabels": is_last, "tickfont": {"size": 10}, "fixedrange": True,
     }  # fmt: skip
     layout[named_axis("y", number)] |= {
-        "anchor": axis("x", number), "range": [-_ROOM, _ROOM], "tickvals": [-1, 0, 1],
+        "anchor": axis("x", number), "range": [-ROOM, ROOM], "tickvals": [-1, 0, 1],
         "showticklabels": is_first, "tickfont": {"size": 10}, "zeroline": True,
         "fixedrange": True,
     }  # fmt: skip
@@ -113,7 +96,7 @@ def _scale(
 
 def _title(mode: Mode, number: int) -> dict[str, Any]:
     return {
-        "text": f"{mode.order}: {mode.frequency_hz:.4g} Hz", "showarrow": False,
+        "text": panel_title(mode), "showarrow": False,
         "xref": f"{axis('x', number)} domain", "yref": f"{axis('y', number)} domain",
         "x": 0, "y": 1, "xanchor": "left", "yanchor": "bottom", "font": {"size": 11},
     }  # fmt: skip
@@ -152,28 +135,15 @@ def _named(name: str, seen: set[str]) -> dict[str, Any]:
 def _guide(
     sheet: TestSheet, mode: Mode, axes: dict[str, Any], seen: set[str]
 ) -> list[dict[str, Any]]:
-    """A taut string's shape of the mode's order in the measured size, where it comes near the
-    points; straight lines between the places where the hanger is not described."""
-    known = [p for p in mode.shape if math.isfinite(p.x_m) and math.isfinite(p.value)]
-    x_m, value = np.array([(p.x_m, p.value) for p in sorted(known, key=lambda p: p.x_m)]).T
-    if sheet.hanger is None:
-        return [_thin(x_m, value, axes, _named("places joined", seen))]
-    wave = mode.order * np.pi / sheet.hanger.length_m
-    string = np.sin(wave * x_m)
-    size = float(string @ value) / max(float(string @ string), 1e-9)
-    misses = float(np.linalg.norm(value - size * string))
-    if len(x_m) < _LEAST_POINTS or misses >= _NEAR * np.linalg.norm(value) or abs(size) > _ROOM:
-        return []
-    places = np.linspace(0, sheet.hanger.length_m, 12 * mode.order + 1)
-    return [_thin(places, size * np.sin(wave * places), axes, _named("guide: taut string", seen))]
+    found = guide(sheet, mode)
+    return [_thin(found, axes, _named(guide_name(sheet), seen))] if found else []
 
 
-def _thin(
-    x_m: FloatArray, values: FloatArray, axes: dict[str, Any], named: dict[str, Any]
-) -> dict[str, Any]:
+def _thin(drawn_guide: Guide, axes: dict[str, Any], named: dict[str, Any]) -> dict[str, Any]:
     line = {"color": plotting.colour("quiet"), "width": 1}
     return {
-        **axes, "mode": "lines", "x": numbers(x_m), "y": numbers(values), "line": line,
+        **axes, "mode": "lines", "x": numbers(drawn_guide.x_m),
+        "y": numbers(drawn_guide.value), "line": line,
         "hoverinfo": "skip", **named,
     }  # fmt: skip
 
@@ -182,4 +152,5 @@ FIGURE = TestFigure(
     "shapes", PRINTED.title, "store", _draw, lambda shown: PRINTED.caption(shown.sheet),
     lambda shown: PRINTED.alt(shown.sheet),
     height_px=lambda sheet: _REST_PX + _ROW_PX * len(_rows(sheet)),
+    is_wide=True,
 )  # fmt: skip

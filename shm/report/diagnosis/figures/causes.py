@@ -71,7 +71,7 @@ def _bars(diagnosis: Diagnosis) -> list[_Bar]:
             label(cause),
             cause.probability,
             style.BLUE,
-            words.number(cause.log_bayes_factor, "+.1f"),
+            words.number(cause.log_bayes_factor, "+z.1f"),
             claim if len(claim.causes) > 1 else None,
         )
         for claim, cause in shown

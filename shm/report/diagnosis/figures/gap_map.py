@@ -108,7 +108,7 @@ def _set_aside(axes: Axes, residuals: Sequence[Residual], tests: Sequence[str]) 
     for each, across, up in zip(residuals, x, y, strict=True):
         left = across > float(np.mean(axes.get_xlim()))
         axes.annotate(
-            f"{each.residual_percent:+.2f} %",
+            f"{each.residual_percent:+z.2f} %",
             (across, up),
             xytext=(-7 if left else 7, 0),
             textcoords="offset points",
@@ -158,7 +158,7 @@ def _caption(sheet: DiagnosisSheet) -> str:
 def _alt(sheet: DiagnosisSheet) -> str:
     residuals = measured(sheet)
     worst = sorted(residuals, key=lambda r: -abs(r.residual_percent))[:3]
-    told = ", ".join(f"{r.plane} {r.order} in {r.test} {r.residual_percent:+.2f} %" for r in worst)
+    told = ", ".join(f"{r.plane} {r.order} in {r.test} {r.residual_percent:+z.2f} %" for r in worst)
     places = "; ".join(
         f"as {title(place.kind)} it would sit at {words.number(place.x_m, '.2f')} m"
         for place in local(sheet)

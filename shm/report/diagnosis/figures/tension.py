@@ -7,8 +7,8 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report.diagnosis.content import DiagnosisSheet, after
-from shm.report.diagnosis.tensions import TensionUnit, tension_unit
+from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.diagnosis.tensions import AFTER, TensionUnit, tension_unit
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.values import TensionEstimate
@@ -41,9 +41,9 @@ def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
     diagnosis = sheet.diagnosis
     rows = [
         (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, style.QUIET),
-        (after(diagnosis), diagnosis.tension_after_n, style.BLUE),
+        (AFTER, diagnosis.tension_after_n, style.BLUE),
     ]
-    return [row for row in rows if row[0] and math.isfinite(row[1].mean)]
+    return [row for row in rows if math.isfinite(row[1].mean)]
 
 
 def _interval(
@@ -80,14 +80,11 @@ def _nominal(axes: Axes, nominal: float) -> None:
 
 
 def _caption(sheet: DiagnosisSheet) -> str:
-    what = after(sheet.diagnosis)
-    both = (
-        f"by the baseline alone and {what}: mean and 90 % interval. Where the two bars do not "
-        "overlap, the gap moves the tension by more than the baseline admits."
-        if what
-        else "by the baseline, which explains the measurements best: mean and 90 % interval."
+    return (
+        f"Tension by the baseline alone and {AFTER}: mean and 90 % interval. Where the two bars do "
+        "not overlap, the gap moves the tension by more than the baseline admits. The interval "
+        "holds what the scatter of manufacture leaves open."
     )
-    return f"Tension {both} The interval holds what the scatter of manufacture leaves open."
 
 
 def _alt(sheet: DiagnosisSheet) -> str:

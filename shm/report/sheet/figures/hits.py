@@ -12,21 +12,25 @@ from matplotlib.ticker import NullFormatter
 from shm.report import words
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.sheet.blows import REACH_DB, Blow, blows
+from shm.report.sheet.blows import (
+    CURVE_BINS,
+    LOWEST_DB,
+    REACH_DB,
+    Blow,
+    blow_name,
+    shown_blows,
+)
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.spectra import searched_range
 from shm.report.sheet.thinning import envelope_places
 
-_MOST = 12
 _COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
 _DASHES = ("-", "--", ":")
 _DROPPED_DASHES = ((4, 1.5), (1, 1), (6, 1, 1, 1), (2, 2))
-_BINS = 300
-_LOWEST_DB = -40.0
 
 
 def _draw(sheet: TestSheet) -> Figure | None:
-    shown = _shown(sheet)
+    shown = shown_blows(sheet)
     if not shown:
         return None
     figure = style.new_figure(5.4)
@@ -39,12 +43,6 @@ def _draw(sheet: TestSheet) -> Figure | None:
     return figure
 
 
-def _shown(sheet: TestSheet) -> list[Blow]:
-    """All hits, or some of them with every dropped one first."""
-    dropped_first = sorted(blows(sheet), key=lambda blow: blow.hit.used)
-    return sorted(dropped_first[:_MOST], key=lambda blow: blow.number)
-
-
 def _line(blow: Blow, place: int) -> dict[str, Any]:
     """Colour and dashes of a hit: a dropped one is red."""
     if not blow.hit.used:
@@ -54,21 +52,16 @@ def _line(blow: Blow, place: int) -> dict[str, Any]:
     return {"color": _COLOURS[place % len(_COLOURS)], "linestyle": dashed, "linewidth": 0.9}
 
 
-def _label(blow: Blow) -> str:
-    reason = "" if blow.hit.used else f", dropped: {blow.hit.reason}"
-    return f"hit {blow.number}{reason}"
-
-
 def _pulses(axes: Axes, shown: list[Blow]) -> None:
     style.dress(axes, "time from the start of the hit (ms)", "force (N)")
     spans = np.array([blow.near_s for blow in shown])
     axes.set_xlim(1e3 * spans[:, 0].min(), 1e3 * spans[:, 1].max())
     for place, blow in enumerate(shown):
-        places = envelope_places(blow.force_n, _BINS)
+        places = envelope_places(blow.force_n, CURVE_BINS)
         axes.plot(
             1e3 * blow.time_s[places],
             blow.force_n[places],
-            label=_label(blow),
+            label=blow_name(blow),
             **_line(blow, place),
         )
 
@@ -82,7 +75,7 @@ def _spectra(axes: Axes, sheet: TestSheet, shown: list[Blow]) -> None:
     for place, blow in enumerate(shown):
         lines = blow.spectrum_hz <= end
         spectrum_hz, spectrum_db = blow.spectrum_hz[lines], blow.spectrum_db[lines]
-        places = envelope_places(spectrum_db, _BINS)
+        places = envelope_places(spectrum_db, CURVE_BINS)
         axes.plot(spectrum_hz[places], spectrum_db[places], **_line(blow, place))
     axes.axhline(REACH_DB, color=style.INK, linewidth=0.8, linestyle="-.")
     axes.text(
@@ -90,7 +83,7 @@ def _spectra(axes: Axes, sheet: TestSheet, shown: list[Blow]) -> None:
         va="top", fontsize=style.TINY, color=style.INK,
     )  # fmt: skip
     axes.axvspan(low, high, color=style.GREEN, alpha=0.10, linewidth=0)
-    axes.set_ylim(_LOWEST_DB, 2)
+    axes.set_ylim(LOWEST_DB, 2)
     axes.set_xlim(0, end)
     band = "band" if sheet.band_hz else "where modes were found"
     axes.set_title(
@@ -110,7 +103,7 @@ def _fades(axes: Axes, shown: list[Blow]) -> None:
 
 
 def _caption(sheet: TestSheet) -> str:
-    some = words.some(len(_shown(sheet)), len(sheet.hits), "hits")
+    some = words.some(len(shown_blows(sheet)), len(sheet.hits), "hits")
     return (
         "Above, the force of each hit and its spectrum, each relative to its largest value: it "
         "should stay above a tenth (-20 dB) up to the end of the band. Below, the largest "
@@ -120,7 +113,7 @@ def _caption(sheet: TestSheet) -> str:
 
 
 def _alt(sheet: TestSheet) -> str:
-    shown = _shown(sheet)
+    shown = shown_blows(sheet)
     reaches = [b.reach_hz for b in shown if b.hit.used and np.isfinite(b.reach_hz)]
     forces = [blow.hit.peak_force_n for blow in shown]
     reach = f" A tenth of the force is left at {np.median(reaches):.0f} Hz." if reaches else ""

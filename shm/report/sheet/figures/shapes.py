@@ -13,20 +13,24 @@ from shm.report.content import NORMAL_90
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.sheet.content import TestSheet
-from shm.values import PLANES, FloatArray, Mode
+from shm.report.sheet.shapes import (
+    ROOM,
+    extent_m,
+    guide,
+    guide_name,
+    modes_with_shape,
+    panel_title,
+    shown_modes,
+)
+from shm.values import PLANES, Mode
 
 _MOST_COLUMNS = 7
 _LEAST_COLUMNS = 4
-_MOST = 36
 _PANEL_INCHES = 1.12
-_LEAST_POINTS = 2
-_NEAR = 0.4
-"""A string misses the points by no more than this share of them where it is drawn."""
-_ROOM = 1.35
 
 
 def _draw(sheet: TestSheet) -> Figure | None:
-    modes = _shown(sheet)
+    modes = shown_modes(sheet)
     if not modes:
         return None
     groups = [[m for m in modes if m.plane == plane] for plane in PLANES]
@@ -57,22 +61,12 @@ def _columns(longest: int) -> int:
     return max(_LEAST_COLUMNS, math.ceil(longest / math.ceil(longest / _MOST_COLUMNS)))
 
 
-def _shown(sheet: TestSheet) -> list[Mode]:
-    """Modes measured at so many places or directions that there is a shape to see."""
-    return [mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS][:_MOST]
-
-
-def _known_values(mode: Mode) -> int:
-    values = [value for p in mode.shape if math.isfinite(p.x_m) for value in (p.value, p.cross)]
-    return sum(math.isfinite(value) for value in values)
-
-
 def _panel(axes: Axes, sheet: TestSheet, mode: Mode) -> None:
     style.dress(axes, "", "")
     colour = style.PLANE_COLOURS[mode.plane]
     x_m, value, cross, sd = np.array([(p.x_m, p.value, p.cross, p.sd) for p in mode.shape]).T
-    low, high = _extent(sheet)
-    _guide(axes, sheet, mode, x_m, value)
+    low, high = extent_m(sheet)
+    _draw_guide(axes, sheet, mode)
     axes.errorbar(
         x_m, value, yerr=NORMAL_90 * np.nan_to_num(sd), fmt=style.PLANE_MARKERS[mode.plane],
         color=colour, markersize=3.6, elinewidth=1.0, capsize=1.8, label=mode.plane,
@@ -84,46 +78,17 @@ def _panel(axes: Axes, sheet: TestSheet, mode: Mode) -> None:
     axes.axhline(0, color=style.INK, linewidth=0.5)
     margin = 0.03 * (high - low)
     axes.set_xlim(low - margin, high + margin)
-    axes.set_ylim(-_ROOM, _ROOM)
+    axes.set_ylim(-ROOM, ROOM)
     axes.set_xticks((low, (low + high) / 2, high))
     axes.xaxis.set_major_formatter(lambda position, _: f"{position:.3g}")
     axes.set_yticks((-1, 0, 1))
     axes.tick_params(labelsize=style.TINY - 0.5, length=2, pad=1.5)
-    axes.set_title(_title(mode), fontsize=style.TINY, color=colour, pad=2)
+    axes.set_title(panel_title(mode), fontsize=style.TINY, color=colour, pad=2)
 
 
-def _title(mode: Mode) -> str:
-    return f"{mode.order}: {mode.frequency_hz:.4g} Hz"
-
-
-def _extent(sheet: TestSheet) -> tuple[float, float]:
-    """From end to end of the hanger, or of the measured places where its length is not known."""
-    if sheet.hanger is not None:
-        return 0.0, sheet.hanger.length_m
-    places = [p.x_m for mode in sheet.modes for p in mode.shape if math.isfinite(p.x_m)]
-    low, high = min(places), max(places)
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def _guide(axes: Axes, sheet: TestSheet, mode: Mode, x_m: FloatArray, value: FloatArray) -> None:
-    """A taut string's shape of the mode's order in the measured size, where it comes near the
-    points; straight lines between the places where the hanger is not described."""
-    known = np.isfinite(x_m) & np.isfinite(value)
-    x_m, value = x_m[known], value[known]
-    if sheet.hanger is None:
-        order = np.argsort(x_m)
-        axes.plot(x_m[order], value[order], color=style.QUIET, linewidth=0.8, label="places joined")
-        return
-    wave = mode.order * np.pi / sheet.hanger.length_m
-    string = np.sin(wave * x_m)
-    size = float(string @ value) / max(float(string @ string), 1e-9)
-    misses = float(np.linalg.norm(value - size * string))
-    if len(x_m) >= _LEAST_POINTS and misses < _NEAR * np.linalg.norm(value) and abs(size) < _ROOM:
-        places = np.linspace(0, sheet.hanger.length_m, 12 * mode.order + 1)
-        axes.plot(
-            places, size * np.sin(wave * places), color=style.QUIET, linewidth=0.8,
-            label="guide: taut string",
-        )  # fmt: skip
+def _draw_guide(axes: Axes, sheet: TestSheet, mode: Mode) -> None:
+    if found := guide(sheet, mode):
+        axes.plot(found.x_m, found.value, color=style.QUIET, linewidth=0.8, label=guide_name(sheet))
 
 
 def _legend(figure: Figure) -> None:
@@ -143,8 +108,7 @@ def _caption(sheet: TestSheet) -> str:
         if sheet.hanger is not None
         else "Thin lines only join the measured places."
     )
-    there = len([mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS])
-    some = words.some(len(_shown(sheet)), there, "shapes")
+    some = words.some(len(shown_modes(sheet)), len(modes_with_shape(sheet)), "shapes")
     return (
         "Each panel is a mode: its order and frequency, its component in its own plane with the "
         "90 % interval where it is known, and that in the other plane as diamonds. The deck end "
@@ -153,7 +117,7 @@ def _caption(sheet: TestSheet) -> str:
 
 
 def _alt(sheet: TestSheet) -> str:
-    shown = _shown(sheet)
+    shown = shown_modes(sheet)
     places = len({point.x_m for mode in shown for point in mode.shape})
     listed = ", ".join(f"{mode.plane} {mode.order}" for mode in shown)
     return f"Shapes of {len(shown)} modes at {words.counted(places, 'place')}: {listed}."

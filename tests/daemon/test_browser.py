@@ -1,0 +1,190 @@
+"""A person's walk over the dashboard in a real browser, beside a daemon at work.
+
+The bridge has one hanger of four tests: three came as modes and show a loss, which raised an
+alert; the fourth is a recording, so that its page has every figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from shm.read import write
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.store import Stage, Workspace
+from shm_daemon.web.test_address import test_page as page_of
+from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
+from tests.helpers.daemons import real_daemon
+from tests.helpers.flows import ingest
+from tests.helpers.web_servers import Served, served
+from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
+
+RECORDED = "recorded"
+PAGES = {
+    "sign-in": "/sign-in",
+    "bridge": "/",
+    "hanger": "/hangers/3",
+    "tests": "/hangers/3/tests",
+    "modes": page_of(3, "t1"),
+    "recording": page_of(3, RECORDED),
+    "alerts": "/alerts",
+    "upload": "/upload",
+    "operation": "/operation",
+}
+PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
+
+
+@dataclass(frozen=True)
+class Site:
+    """The interface at work."""
+
+    served: Served
+    workspace: Workspace
+
+    @property
+    def url(self) -> str:
+        return self.served.url
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with a_browser() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    folder = tmp_path_factory.mktemp("browser") / "bridge"
+    workspace = make_workspace(folder, settings={"cross_check": "none", "workers": 1})
+    write_loss(workspace.spool, workspace)
+    write_recording(workspace)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert {each.stage for each in store.recordings()} == {Stage.DONE}
+        assert [each.test.id for each in store.tests(3)][-1] == RECORDED
+    with real_daemon(folder), served(workspace) as running:
+        yield Site(running, workspace)
+
+
+@pytest.fixture(autouse=True)
+def content(browser: Browser) -> Iterator[None]:
+    """After each test the browser has nothing to complain of."""
+    yield
+    complaints = list(browser.complaints)
+    browser.complaints.clear()
+    for page in browser.context.pages:
+        page.close()
+    assert complaints == []
+
+
+@pytest.fixture(scope="module")
+def signed_in(browser: Browser, site: Site) -> Browser:
+    page = browser.open(f"{site.url}/sign-in?next=/upload")
+    page.get_by_label("Token").fill(site.served.write_token)
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("heading", level=1)).to_have_text("Upload recordings")
+    expect(page.get_by_role("banner")).to_contain_text("write")
+    return browser
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
+    signed_in: Browser, site: Site, name: str
+) -> None:
+    page = signed_in.open(site.url + PAGES[name])
+    assert faults(page) == []
+    page.emulate_media(color_scheme="dark")
+    assert faults(page, colours_only=True) == []
+    page.set_viewport_size(PHONE)  # type: ignore[arg-type]
+    assert undrawn_charts(page) == []
+    assert faults(page) == []
+    assert width_px(page) == PHONE["width"]
+    page.emulate_media(media="print", color_scheme="dark")
+    assert style(page, "body", "backgroundColor") == PAPER
+
+
+def test_all_figures_are_there_and_printed_in_ink(signed_in: Browser, site: Site) -> None:
+    page = signed_in.open(site.url + PAGES["recording"])
+    assert page.locator("figure.chart").count() >= 6
+    page = signed_in.open(site.url + PAGES["hanger"])
+    assert page.locator("figure.chart").count() >= 4
+    expect(page.locator("figure.chart").first).to_contain_text("state from all tests")
+    page.emulate_media(color_scheme="dark")
+    page.evaluate(
+        """addEventListener("beforeprint", () => {
+             window.printed = getComputedStyle(document.querySelector(".xtitle")).fill;
+           })"""
+    )
+    page.pdf()
+    assert page.evaluate("window.printed") == INK
+    expect(page.locator(".xtitle").first).not_to_have_css("fill", INK)
+
+
+def test_the_keyboard_reaches_the_content_and_every_hanger(signed_in: Browser, site: Site) -> None:
+    page = signed_in.open(site.url)
+    page.keyboard.press("Tab")
+    skip = page.get_by_role("link", name="Skip to the content")
+    expect(skip).to_be_focused()
+    expect(skip).to_be_in_viewport()
+    page.keyboard.press("Enter")
+    expect(page.locator("main")).to_be_focused()
+    hanger = page.locator("svg.elevation a.hanger")
+    for _ in range(10):
+        page.keyboard.press("Tab")
+        if hanger.evaluate("each => each === document.activeElement"):
+            break
+        assert style(page, ":focus", "outlineStyle") == "solid"
+    expect(hanger).to_be_focused()
+    assert style(page, "a.hanger:focus .hit", "strokeWidth") == "3px"
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/hangers/3")
+    assert undrawn_charts(page) == []
+
+
+def test_an_uploaded_file_becomes_a_test(signed_in: Browser, site: Site, tmp_path: Path) -> None:
+    path = tmp_path / "sent by hand.modes.json"
+    write_test(path, site.workspace, day=120, tension=0.8)
+    page = signed_in.open(f"{site.url}/upload")
+    page.get_by_label("Recordings of hammer tests").set_input_files(path)
+    card = page.locator("#list li")
+    expect(card).to_contain_text("Done.")
+    card.get_by_role("link", name="Test sent by hand").click()
+    expect(page.get_by_role("heading", level=1)).to_contain_text("sent by hand")
+
+
+def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, site: Site) -> None:
+    page = signed_in.open(f"{site.url}/alerts")
+    before = page.locator("article.card.open").count()
+    card = page.locator("article.card").last
+    card.get_by_text("Acknowledge", exact=True).click()
+    card.get_by_label("Your name").fill("Anna Meier")
+    card.get_by_label("What came of it").fill("A clamp had slipped; <set> right.")
+    card.get_by_role("button").click()
+    expect(card).to_contain_text("Acknowledged by Anna Meier")
+    expect(card).to_contain_text("A clamp had slipped; <set> right.")
+    expect(card).to_be_focused()
+    assert faults(page) == []
+    page.reload()
+    expect(page.get_by_text("A clamp had slipped; <set> right.")).to_be_visible()
+    assert page.locator("article.card.open").count() == before - 1
+
+
+def write_recording(workspace: Workspace) -> None:
+    plan, rng = HammerPlan(hits=3, seconds_per_hit=6.0), np.random.default_rng(5)
+    state = HangerState(tension_n=0.8 * 711e3, damping_ratio=0.002)
+    struck = hammer_test(
+        workspace.bridge.hanger(3), state, plan, rng,
+        time=START + timedelta(days=90), temperature_c=12.5,
+    )  # fmt: skip
+    write(replace(struck, hanger=3), workspace.spool / f"{RECORDED}.uff")
+
+
+def style(page: Page, selector: str, name: str) -> str:
+    element = page.locator(selector).first
+    return str(element.evaluate(f"each => getComputedStyle(each).{name}"))
