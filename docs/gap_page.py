@@ -25,7 +25,7 @@ _CASES = (
 )
 _HEAD = (
     "baseline", "catalogue", "likeliest cause", "probability", "with its group", "none of them",
-    "no gap", "residuals, rms (%)", "held out (%)", "tension (kN): baseline", "and weighed over all",
+    "no gap", "residuals, rms (%)", "held out (%)", "tension (kN): baseline", "weighed over all",
 )  # fmt: skip
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from tests.helpers.postgres import Databases, postgresql_server
 
+os.environ.pop("COLUMNS", None)  # the processes of pytest-xdist set it, a single one does not
+
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:

@@ -32,6 +32,7 @@ from shm.watch.neighbours import BridgePattern
 
 NORMAL_90 = 1.6448536269514722
 """Half width of the central 90 % of a normal distribution, in standard deviations."""
+_WIDE = 0.5
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,11 @@ class Interval:
     @property
     def width(self) -> float:
         return self.high - self.low
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it is wider than half its mean, so that a shift could hardly be seen in it."""
+        return self.width > _WIDE * abs(self.mean)
 
     def since(self, then: Interval) -> Interval:
         """The relative change from `then`, of two independent estimates: widths in squares."""

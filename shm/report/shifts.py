@@ -31,7 +31,7 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
 
 
 def _about_none(row: Drift) -> str:
-    return "about 0 %" if row.quantity == TENSION else "about 1 times"
+    return "about 0 %" if row.quantity == TENSION else "about 1.00 times"
 
 
 def threshold_cell(row: Drift) -> str:

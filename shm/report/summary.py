@@ -10,9 +10,8 @@ import numpy as np
 
 from shm.report import words
 from shm.report.content import HangerReport, Interval
-from shm.report.diagnosis.content import after
 from shm.report.diagnosis.summary import next_step, verdict
-from shm.report.diagnosis.tensions import tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_unit
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
@@ -171,6 +170,16 @@ def _change(data: HangerReport) -> str:
         f"No quantity has surely moved beyond its threshold: the likeliest is "
         f"{words.quantity(top.quantity)}, with probability "
         f"{words.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
+        f"{_unseen(data)}"
+    )
+
+
+def _unseen(data: HangerReport) -> str:
+    if not data.tension_n.is_wide:
+        return ""
+    return (
+        " The tension is hardly known: that it has not moved was held probable before, and this "
+        "test could hardly show otherwise."
     )
 
 
@@ -243,21 +252,21 @@ def _outside(data: HangerReport) -> str:
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
-    if not outside:
-        return "Each lies within its 90 % interval: nothing that was measured is left unexplained."
-    verb = "lies" if len(outside) == 1 else "lie"
-    start = f"{_modes(outside)} {verb} outside the 90 % interval"
-    if len(outside) <= _by_chance(len(misfits)):
-        return f"{start}, as chance alone would have it: nothing is clearly left unexplained."
-    return f"{start}: these the model does not explain, and why was not diagnosed."
+    if len(outside) > _by_chance(len(misfits)):
+        return f"{_outliers(outside)}: these the model does not explain, and why was not diagnosed."
+    chance = f"{_outliers(outside)}, as chance alone would have it" if outside else ""
+    start = chance or "Each lies within its interval"
+    if _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+        return f"{start}, but the intervals are so wide that they may hide what is not explained."
+    return f"{start}: nothing that was measured is clearly left unexplained."
 
 
-def _modes(modes: Sequence[PredictedFrequency]) -> str:
-    """`Transverse 2 and longitudinal 4`, `5 modes`."""
-    if len(modes) > _MOST_NAMED:
-        return words.counted(len(modes), "mode")
+def _outliers(modes: Sequence[PredictedFrequency]) -> str:
+    """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
     told = words.listed([f"{each.plane} {each.order}" for each in modes])
-    return told[0].upper() + told[1:]
+    named = f"{told[0].upper()}{told[1:]}"
+    who = named if len(modes) <= _MOST_NAMED else words.counted(len(modes), "mode")
+    return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
 
 
 def _by_chance(modes: int) -> float:
@@ -273,13 +282,13 @@ def _diagnosed_on(diagnosis: Diagnosis) -> str:
 
 
 def _allowing(diagnosis: Diagnosis) -> str:
-    """The tension with the cause, or allowing for the unknown."""
-    tension_n, what = diagnosis.tension_after_n, after(diagnosis)
-    if not what or math.isnan(tension_n.mean):
+    """The tension that the diagnosis arrives at."""
+    tension_n = diagnosis.tension_after_n
+    if math.isnan(tension_n.mean):
         return ""
     unit = tension_unit(diagnosis)
     told = words.with_interval(unit.interval(tension_n), unit.name)
-    return f"{what.capitalize()} the tension is {told}."
+    return f"{AFTER.capitalize()}, the tension is {told}."
 
 
 def _chosen(data: HangerReport) -> str:

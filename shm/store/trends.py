@@ -8,6 +8,7 @@ answered is the same, only later.
 from __future__ import annotations
 
 import hashlib
+import json
 import logging
 import math
 from collections import defaultdict
@@ -38,7 +39,8 @@ _AT_ONCE = 50
 _HANGERS_KNOWN = 4096
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
-_SUMMARY = (summaries.c.key, summaries.c.document.label("summary"))
+_NUMBERS_HELD = 1024
+_SUMMARY = (summaries.c.key, sa.type_coerce(summaries.c.document, sa.Text).label("summary"))
 
 
 class Trends(Database):
@@ -186,7 +188,7 @@ def _numbers(
     """Of each row's posterior: as they are kept, or made from its samples."""
     keys = {number_: key_of(hanger) for number_, hanger in hangers.items()}
     kept = {
-        row.posterior_id: _from_document(row.summary) for row in rows if row.key == keys[row.hanger]
+        row.posterior_id: _from_text(row.summary) for row in rows if row.key == keys[row.hanger]
     }
     missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
     for begin in range(0, len(missing), _AT_ONCE):
@@ -240,7 +242,10 @@ def _document(numbers: Numbers) -> dict[str, Any]:
     return {"tension_n": astuple(numbers.tension_n), "most_probable_tension_n": plain, **named}
 
 
-def _from_document(document: Mapping[str, Any]) -> Numbers:
+@lru_cache(_NUMBERS_HELD)
+def _from_text(text: str) -> Numbers:
+    """A summary as it is kept; the latest of all hangers are asked for again and again."""
+    document = json.loads(text)
     return Numbers(
         tension_n=_summary(document["tension_n"]),
         most_probable_tension_n=number(document["most_probable_tension_n"]),

@@ -5,12 +5,14 @@
 A real server answers on this machine. Every page is asked for of several hangers, one after the
 other, with all figures and parts that it fetches, and all else that can be read under `/api`. What
 is worked out beside (202, or Retry-After) is waited for and asked for again; each answer is timed.
-Fails where one takes longer than the limit.
+Fails where one takes longer than the limit; where others keep the machine busy, where one has had
+more than that of the processor: the page says which of the two was judged.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import socket
 import statistics
@@ -36,6 +38,8 @@ from tests.helpers.footprint import resident_mb
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "operation.md"
 LIMIT_MS = 300.0
 PATIENCE_S = 120.0
+QUIET_LOAD = 0.25
+"""Of each processor: with more, others hold answers up."""
 PAGES = ("/", "/alerts", "/upload", "/operation", "/hangers/{hanger}", "/hangers/{hanger}/tests")
 TEST_PAGE = "/hangers/{hanger}/tests/{test}"
 _FETCHED = re.compile(r'(?:data-figure|data-fragment|src)="(/[^"]+)"|<link[^>]+href="(/[^"]+)"')
@@ -162,15 +166,37 @@ def ask(workspace: Workspace, rounds: int) -> tuple[Visitor, float]:
 
 
 def table(times: Times) -> Iterable[str]:
-    yield "| address | answers | median, ms | worst, ms | of it the processor, median, ms |"
-    yield "|---|---|---|---|---|"
-    for label, each in sorted(times.items(), key=lambda item: (-_worst_ms(item[1]), item[0])):
-        middle, worked = (statistics.median(values) for values in zip(*each, strict=True))
-        yield f"| `{label}` | {len(each)} | {middle:.0f} | {_worst_ms(each):.0f} | {worked:.0f} |"
+    yield (
+        "| address | answers | median, ms | worst, ms "
+        "| of it the processor, median, ms | processor, worst, ms |"
+    )
+    yield "|---|---|---|---|---|---|"
+    for label, each in sorted(times.items(), key=lambda item: (-_worst_ms(item[1])[0], item[0])):
+        taken, worked = (statistics.median(values) for values in zip(*each, strict=True))
+        worst_taken, worst_worked = _worst_ms(each)
+        yield (
+            f"| `{label}` | {len(each)} | {taken:.0f} | {worst_taken:.0f} "
+            f"| {worked:.0f} | {worst_worked:.0f} |"
+        )
 
 
-def _worst_ms(each: Iterable[tuple[float, float]]) -> float:
-    return max(taken_ms for taken_ms, _ in each)
+def _worst_ms(each: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """The longest answer, and the most that one had of the processor."""
+    taken, worked = zip(*each, strict=True)
+    return max(taken), max(worked)
+
+
+def _on_what(load: float, is_busy: bool, held_mb: float) -> str:
+    """How busy the machine was, and so what was judged."""
+    judged = (
+        "others kept it busy, so the limit was held against the time of the processor"
+        if is_busy
+        else "the limit was held against the time until the answer"
+    )
+    return (
+        f"Measured with a load of {load:.1f} on {os.cpu_count()} processors before it began: "
+        f"{judged}. The server held {held_mb:.0f} MB."
+    )
 
 
 def main() -> None:
@@ -189,11 +215,12 @@ def main() -> None:
         else:
             workspace = filled(folder, options.hangers, options.tests)
             print(f"filled in {time.monotonic() - began:.0f} s")
+        load = os.getloadavg()[0]
         visitor, held_mb = ask(workspace, options.rounds)
-    late = [label for label, each in visitor.times.items() if _worst_ms(each) > LIMIT_MS]
-    text = "\n".join(table(visitor.times))
+    is_busy = load > QUIET_LOAD * (os.cpu_count() or 1)
+    late = [label for label, each in visitor.times.items() if _worst_ms(each)[is_busy] > LIMIT_MS]
+    text = "\n".join([_on_what(load, is_busy, held_mb), "", *table(visitor.times)])
     print(text)
-    print(f"memory of the server: {held_mb:.0f} MB")
     if visitor.failed or late:
         print("\n".join([*sorted(visitor.failed), *(f"over {LIMIT_MS:.0f} ms: {x}" for x in late)]))
         raise SystemExit(1)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.cli.conftest import Shm
 from tests.helpers.command_lines import fenced_commands, words_of
+from tests.helpers.painting import unpaint
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "first_report.md"
 COMMANDS = [line for line in fenced_commands(PAGE) if not line.endswith("--help")]
@@ -17,12 +18,13 @@ COMMANDS = [line for line in fenced_commands(PAGE) if not line.endswith("--help"
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the reader is: with the description, and fewer samples than usual to be quick."""
+    """Where the reader is: with the description; fewer samples and blank figures, to be quick."""
     described = re.search(r"^```toml\n(.*?)^```$", PAGE.read_text(), re.M | re.S)
     assert described is not None
     (tmp_path / "mill.toml").write_text(described[1])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SHM_SAMPLES", "200")
+    unpaint(monkeypatch)
     return tmp_path
 
 

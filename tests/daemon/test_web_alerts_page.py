@@ -7,9 +7,13 @@ from collections.abc import Iterator
 
 import httpx
 import pytest
+import sqlalchemy as sa
 
 from shm.store import Workspace
+from shm.store.database import insert
+from shm.store.tables import alerts
 from shm_daemon.web.access import COOKIE
+from shm_daemon.web.pages import alerts as alerts_page
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace, write_loss
@@ -92,3 +96,28 @@ def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: i
     assert "no alert is open" in page
     assert "Ada &lt;b&gt; (token write)" in page
     assert "Nut tightened." in page
+
+
+def test_older_alerts_are_a_link_away(
+    bridge: Workspace, site: Served, alert: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(alerts_page, "_SHOWN", 1)
+    first, second = (copied(bridge, alert, key) for key in ("again", "once more"))
+    with site.client(**BROWSER) as client:
+        page = client.get("/alerts?hanger=3").text
+        assert f'id="alert-{second}"' in page
+        assert f'id="alert-{first}"' not in page
+        older = f"/alerts?open_before={second}&amp;hanger=3"
+        assert older in page
+        page = client.get(older.replace("&amp;", "&")).text
+        assert f'id="alert-{first}"' in page
+        assert f'id="alert-{second}"' not in page
+        assert "The newest alerts" in page
+        assert client.get(f"/alerts?noted_before={alert}").status_code == 200
+
+
+def copied(bridge: Workspace, alert: int, key: str) -> int:
+    """The same alert raised for another reason; its number."""
+    with bridge.store() as store, store.writing() as connection:
+        row = connection.execute(sa.select(alerts).where(alerts.c.id == alert)).one()
+        return insert(connection, alerts, {**row._mapping, "id": None, "key": key})

@@ -79,6 +79,10 @@ def test_an_alert_is_listed_and_acknowledged_once(site: Served) -> None:
         assert client.get("/api/alerts?open=true").json()["alerts"] == []
         assert client.get("/api/alerts?hanger=3").json()["alerts"] == [noted]
         assert client.get("/api/alerts?hanger=4").json()["alerts"] == []
+        assert client.get("/api/alerts").json() == {"alerts": [noted], "next_before": None}
+        assert client.get("/api/alerts?limit=1").json() == {"alerts": [noted], "next_before": None}
+        older = client.get(f"/api/alerts?limit=1&before={alert['id']}").json()
+        assert older == {"alerts": [], "next_before": None}
         again = client.post(path, json={"why": "once more"})
         assert again.status_code == 409
         nothing = client.post("/api/alerts/99/acknowledgement", json={"why": "what?"})

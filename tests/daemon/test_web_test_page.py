@@ -10,7 +10,6 @@ import json
 import re
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from html import unescape
@@ -24,12 +23,13 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
+from shm_daemon.web.test_address import name_in
 from shm_daemon.web.test_address import test_json as document_of
 from shm_daemon.web.test_address import test_page as page_of
 from shm_daemon.web.test_figures.registry import FIGURES, FROM_RECORDS
 from shm_daemon.web.working_out import Workshop
 from tests.helpers.flows import ingest
-from tests.helpers.web_servers import Served, served
+from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 ODD = "odd #1 50% <b>Hänger?"
@@ -78,10 +78,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         patch.setattr("shm_daemon.web.app.Workshop", partial(Workshop, pool=a_thread))
         with served(workspace) as running:
             yield Site(workspace, running, names[0], largest_n)
-
-
-def a_thread(workers: int) -> ProcessPoolExecutor:
-    return ThreadPoolExecutor(workers)  # type: ignore[return-value]
 
 
 @pytest.fixture
@@ -228,9 +224,11 @@ def test_what_is_none_is_not_there(site: Site, client: httpx.Client) -> None:
 
 
 def test_an_address_holds_any_name() -> None:
-    for name in (ODD, "a/b", "ü?#&%2F", " "):
+    for name in (ODD, "a/b", "ü?#&%2F", " ", ".", "..", "...", "a/"):
         path = httpx.URL(f"http://x{page_of(3, name)}").raw_path.decode()
-        assert unquote(path.removeprefix("/hangers/3/tests/")) == name
+        last = unquote(path.removeprefix("/hangers/3/tests/"))
+        assert name_in(last) == name
+        assert last not in (".", "..")  # a browser takes it for a way up
         assert path.count("/") == 4
 
 

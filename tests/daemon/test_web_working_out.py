@@ -7,13 +7,14 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import pytest
 
 from shm.errors import BadInput, ShmError
 from shm_daemon.web.working_out import Workshop
+from tests.helpers.web_servers import a_thread
 
 _MADE: list[str] = []
 _LET_GO = threading.Event()
@@ -44,10 +45,6 @@ class Order:
         if self.how == "dies":
             os._exit(3)
         return Text(self.word, self.size_bytes)
-
-
-def a_thread(workers: int) -> ProcessPoolExecutor:
-    return ThreadPoolExecutor(workers)  # type: ignore[return-value]
 
 
 def a_process(workers: int) -> ProcessPoolExecutor:

@@ -23,7 +23,7 @@ _FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
-_LONGEST_MS = 30_000
+_LONGEST_MS = 60_000
 _DRAW_ALL = """async (longest_ms) => {
   const undrawn = (chart) => !chart.querySelector(".plot svg.main-svg")
     || chart.querySelector(".told").textContent

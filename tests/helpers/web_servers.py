@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -47,3 +48,8 @@ def served(workspace: Workspace, address: Address | None = None) -> Iterator[Ser
         finally:
             server.should_exit = True
             thread.join()
+
+
+def a_thread(workers: int) -> ProcessPoolExecutor:
+    """Where a workshop works without a process of its own."""
+    return ThreadPoolExecutor(workers)  # type: ignore[return-value]

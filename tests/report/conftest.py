@@ -7,10 +7,10 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from shm.report import HangerReport, trend_row
-from shm.report.figures.member import Illustration
+from shm.report.figures import member
+from shm.report.figures.member import Illustration, Member, illustration
 from shm.values import (
     Alert,
     Drift,
@@ -23,6 +23,7 @@ from shm.values import (
     ResponsePoint,
     Selection,
 )
+from tests.helpers.painting import unpaint
 
 NOMINAL_N = 711e3
 START = datetime(2026, 5, 1, 10, tzinfo=UTC)
@@ -139,6 +140,18 @@ def bare(hanger: Hanger) -> HangerReport:
 @pytest.fixture
 def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are drawn but not painted, which takes most of a report's time."""
-    painted = Illustration("blank", "", "", "", Figure((1, 1))).png(10)
-    monkeypatch.setattr(Illustration, "svg", lambda _: "<svg></svg>")
-    monkeypatch.setattr(Illustration, "png", lambda *_: painted)
+    unpaint(monkeypatch)
+
+
+@pytest.fixture
+def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The forms of one report share their figures, instead of drawing them anew."""
+    kept: dict[tuple[int, str], tuple[object, Illustration | None]] = {}
+
+    def shared(of: Member[object], data: object) -> Illustration | None:
+        key = (id(data), of.name)
+        if key not in kept:
+            kept[key] = (data, illustration(of, data))
+        return kept[key][1]
+
+    monkeypatch.setattr(member, "illustration", shared)

@@ -93,3 +93,13 @@ def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
     assert "shm report --bridge" in table.note
     assert "Over the bridge: Hanger 3 has lost 34 kN" in summary(called)
     assert neighbours(season).rows == ()
+
+
+def test_a_hanger_whose_tension_is_hardly_known_is_to_be_tested_for_more_modes(
+    report: BridgeReport,
+) -> None:
+    first, *rest = report.hangers
+    wide = replace(first, tension_n=Interval(700e3, 400e3, 1900e3))
+    told = " ".join(bridge_text(replace(report, hangers=(wide, *rest))).split())
+    assert "Find more modes of hanger 1: the interval of the tension is wider than half" in told
+    assert "Find more modes" not in bridge_text(report)

@@ -13,12 +13,15 @@ from shm.report.paper import columns
 from shm.report.paper.hanger import hanger_paper
 from shm.report.paper.setting import WIDTH
 from shm.report.table import Table
+from tests.helpers.painting import paint_blank
 from tests.helpers.pdf_words import Pdf
 
 
 @pytest.fixture(scope="module")
 def content(season: HangerReport) -> bytes:
-    return report.pdf(season)
+    with pytest.MonkeyPatch.context() as patch:
+        paint_blank(patch)
+        return report.pdf(season)
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +56,9 @@ def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, par
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(
-    season: HangerReport,
-) -> None:
+def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(bare: HangerReport) -> None:
     signs = "α → ± ² · ≤ ✓ ✗ – … ° é Ł ω"  # noqa: RUF001
-    told = Pdf.parse(report.pdf(replace(season, bridge=signs)))
+    told = Pdf.parse(report.pdf(replace(bare, bridge=signs)))
     assert signs in told.words
     used = {name for name in told.fonts if name.startswith(("F1", "F2"))}
     assert all(b"FontFile2" in told._referred(told.fonts[name], b"FontDescriptor") for name in used)
@@ -75,17 +76,19 @@ def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_a_long_table_goes_on_under_repeated_headings(season: HangerReport) -> None:
-    long = replace(season, trend=season.trend * 12)
+def test_a_long_table_goes_on_under_repeated_headings(
+    bare: HangerReport, season: HangerReport
+) -> None:
+    long = replace(bare, trend=season.trend * 12)
     pages = Pdf.parse(report.pdf(long)).pages
     with_heading = [page for page in pages if "90 % interval, kN" in page and "beam2" in page]
     assert len([page for page in with_heading if "t004" in page]) >= 2
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_a_cell_longer_than_a_page_is_set(season: HangerReport) -> None:
+def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
     alert = replace(season.alerts[0], message="The tension fell. " * 700)
-    told = Pdf.parse(report.pdf(replace(season, alerts=(alert,)))).words
+    told = Pdf.parse(report.pdf(replace(bare, alerts=(alert,)))).words
     assert told.count("fell.") == 700
 
 

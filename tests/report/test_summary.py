@@ -118,3 +118,44 @@ def test_a_called_change_below_its_threshold_is_to_be_watched(season: HangerRepo
     assert status(calm) is Status.STEADY
     assert status(replace(calm, is_called=True)) is Status.WATCH
     assert "set a new baseline once it is explained" in summary(replace(calm, is_called=True))
+
+
+def misfitted(data: HangerReport, parts: list[float], sd: float) -> HangerReport:
+    """Its modes predicted so much off, as a part of themselves, with so large a deviation."""
+    rows = data.posterior.predicted
+    predicted = tuple(
+        replace(row, mean_hz=row.measured_hz * (1 + part), sd_hz=row.measured_hz * sd)
+        for row, part in zip(rows, parts, strict=True)
+    )
+    return replace(data, posterior=replace(data.posterior, predicted=predicted))
+
+
+def test_modes_within_their_intervals_leave_nothing_unexplained(season: HangerReport) -> None:
+    told = summary(misfitted(season, [0.001] * 12, sd=0.002))
+    assert "Each lies within its interval: nothing that was measured is clearly left" in told
+
+
+def test_one_mode_of_many_may_lie_outside_by_chance(season: HangerReport) -> None:
+    told = summary(misfitted(season, [0.006, *[0.0] * 11], sd=0.001))
+    assert "Transverse 1 lies outside the 90 % interval, as chance alone would have it" in told
+
+
+def test_more_modes_outside_than_chance_has_are_left_unexplained(season: HangerReport) -> None:
+    told = summary(misfitted(season, [0.01] * 6 + [0.0] * 6, sd=0.001))
+    assert "6 modes lie outside the 90 % interval: these the model does not explain" in told
+
+
+def test_wide_intervals_are_not_praised_for_holding_a_large_misfit(season: HangerReport) -> None:
+    told = summary(misfitted(season, [0.01] * 12, sd=0.02))
+    assert "so wide that they may hide what is not explained" in told
+
+
+def test_a_hanger_whose_tension_is_hardly_known_is_not_said_to_stand_still(
+    season: HangerReport,
+) -> None:
+    still = with_probability(season, 0.01)
+    wide = still.posterior.samples.copy()
+    wide[:, 0] = np.linspace(0.5, 2.5, len(wide))
+    unsure = replace(still, posterior=replace(still.posterior, samples=wide))
+    assert "this test could hardly show otherwise" in summary(unsure)
+    assert "could hardly show otherwise" not in summary(still)

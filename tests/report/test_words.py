@@ -41,6 +41,11 @@ def test_a_probability_pretends_no_certainty(value: float, expected: str) -> Non
     assert words.probability(value) == expected
 
 
+def test_a_probability_is_spelled_out_in_a_sentence() -> None:
+    told = [words.told_probability(value) for value in (0.99999, 0.5, 1e-9)]
+    assert told == ["above 0.999", "0.500", "below 0.001"]
+
+
 def test_what_is_unknown_is_said_in_words() -> None:
     assert words.number(float("nan"), ".3f") == "not known"
     assert words.temperature(float("nan")) == "temperature not recorded"

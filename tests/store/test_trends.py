@@ -184,6 +184,7 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
         assert (glance.since, glance.tests) == (baseline.since, baseline.posterior.tests)
         assert glance.temperature_c == 11.5
         assert glance.tension_n == Summary.of(baseline.posterior.tension_n)
+    assert file_store.baseline_temperatures() == {3: 11.5, 4: 11.5}
 
 
 def test_only_what_is_not_kept_is_made_from_samples(file_store: Store) -> None:

@@ -15,6 +15,7 @@ from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.hangers import Number
+from shm_daemon.web.test_address import name_in
 from shm_daemon.web.test_figures.registry import FIGURES
 from shm_daemon.web.test_models import Hits, PlotlyFigure, TestState, Waiting
 from shm_daemon.web.test_origin import formers_of, steps_of
@@ -37,7 +38,8 @@ Point = Annotated[
 
 def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    return TestView.of(site.workspace, site.store, workshop_of(request), hanger_id, test)
+    workshop = workshop_of(request)
+    return TestView.of(site.workspace, site.store, workshop, hanger_id, name_in(test))
 
 
 View = Annotated[TestView, Depends(view_of)]

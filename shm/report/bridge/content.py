@@ -12,8 +12,6 @@ from shm.report.summary import Status, of_nominal
 from shm.values import Drift, Hanger
 from shm.watch.neighbours import BridgePattern
 
-_WIDE = 0.5
-
 
 @dataclass(frozen=True)
 class Course:
@@ -58,7 +56,7 @@ class HangerLine:
     @property
     def is_hardly_known(self) -> bool:
         """Whether the interval of the tension is so wide that a shift could hardly be seen."""
-        return self.tension_n is not None and self.tension_n.width > _WIDE * self.tension_n.mean
+        return self.tension_n is not None and self.tension_n.is_wide
 
 
 @dataclass(frozen=True)

@@ -133,8 +133,6 @@ def shrinkage(sheet: DiagnosisSheet) -> Table:
             for what, before, after in rows
             if math.isfinite(before)
         ),
-        note="Root mean square of measured over predicted frequencies, less 1: a figure of these "
-        "data, which has no interval.",
     )
 
 

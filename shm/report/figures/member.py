@@ -46,8 +46,13 @@ class Illustration:
 
 def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ...]:
     """Every figure that `data` holds enough for, in the order of `members`."""
-    return tuple(
-        Illustration(member.name, member.title, member.caption(data), member.alt(data), figure)
-        for member in members
-        if (figure := member.draw(data)) is not None
-    )
+    made = (illustration(member, data) for member in members)
+    return tuple(each for each in made if each is not None)
+
+
+def illustration(member: Member[Data], data: Data) -> Illustration | None:
+    """The figure with its words; None where `data` lacks what it shows."""
+    figure = member.draw(data)
+    if figure is None:
+        return None
+    return Illustration(member.name, member.title, member.caption(data), member.alt(data), figure)

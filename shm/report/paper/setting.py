@@ -93,13 +93,7 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
     if groups and not found:
         # Stated, because a heading is not kept with what is itself kept together.
         groups[0], heading = [*heading, *groups[0]], []
-    return [*heading, *found, *(each for group in groups for each in _kept(group))]
-
-
-def _kept(group: list[Flowable]) -> list[Flowable]:
-    """On one page with its heading and its note, but for a table longer than that."""
-    height = sum(each.wrap(WIDTH, _TALLEST)[1] for each in group)
-    return [KeepTogether(group)] if height < _TALLEST else group
+    return [*heading, *found, *(KeepTogether(each) for each in groups)]
 
 
 def _mark(title: str) -> Flowable:
@@ -151,7 +145,8 @@ def _figure(item: Illustration, number: int) -> list[Flowable]:
 
 
 def _table(table: Table, number: int) -> list[Flowable]:
-    """Rows break over pages under repeated headings."""
+    """With title and note; rows break over pages, under repeated headings, only where one does not
+    hold them all."""
     title = Paragraph(f"Table {number}. {escape(table.title)}", _SUBHEADING)
     rows = [[Paragraph(escape(cell), _HEAD) for cell in table.headings]]
     rows += [[Paragraph(escape(cell), _CELL) for cell in row] for row in table.rows]

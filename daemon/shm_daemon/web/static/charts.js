@@ -73,7 +73,7 @@
       plot_bgcolor: "rgba(0,0,0,0)",
       font: { color: ink, family: "system-ui, sans-serif", size },
       margin: narrow ? { l: 48, r: 8, t: 30, b: 44 } : { l: 64, r: 16, t: 36, b: 52 },
-      legend: { orientation: "h", x: 0, xref: "container", y: 1.02, yanchor: "bottom",
+      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom",
         font: { size } },
       hoverlabel: { bgcolor: paper, bordercolor: grid, font: { color: ink } },
     };
