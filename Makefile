@@ -14,8 +14,9 @@ export OPENBLAS_NUM_THREADS ?= 1
 demo: .venv/runtime
 	$(BIN)/shm demo
 
+# A third process, because many tests wait for a daemon, a server or a browser.
 test: lint
-	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile
 
 lint: .venv/development
 	$(BIN)/ruff check .
@@ -24,6 +25,7 @@ lint: .venv/development
 	$(BIN)/lint-imports
 
 bench: .venv/development
+	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
 	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \
 		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
 

@@ -24,7 +24,7 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
+from rich.table import Column, Table
 
 from shm.bridge import load_hanger
 from shm.documents import dump, load_modes
@@ -109,9 +109,17 @@ def show_table(table: Table) -> None:
         console.width = max(console.width, _WIDTH_OF_A_FILE)
     console.print(table.title, style="bold", soft_wrap=True, markup=False)
     table.title = None
+    for column in table.columns:
+        column.no_wrap = _is_one_word(column)
     unbounded = console.options.update(max_width=_BEYOND_ANY)
     narrowest = Measurement.get(console, unbounded, table).minimum
     console.print(table if narrowest <= console.width else _as_lists(table))
+
+
+def _is_one_word(column: Column) -> bool:
+    """Whether nothing in a column can be broken, as a bar that is drawn: it must not be cut."""
+    cells = [str(cell) for cell in column.cells]
+    return len(str(column.header)) <= max(map(len, cells), default=0) and " " not in "".join(cells)
 
 
 def _as_lists(table: Table) -> Group:

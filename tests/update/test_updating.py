@@ -112,6 +112,7 @@ def test_beam_2_has_the_evidence_of_quadrature_on_one_plane() -> None:
     )
 
 
+@pytest.mark.trial
 def test_the_claimed_error_of_the_evidence_is_that_between_seeds() -> None:
     runs = [
         update([modal_test(TABLE_1_1)], build("beam2", HANGER_3), UpdateOptions(400, seed))

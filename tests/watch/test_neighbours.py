@@ -158,6 +158,7 @@ def test_the_probabilities_add_to_one() -> None:
 # ---------------------------------------------------------------- simulated bridges
 
 
+@pytest.mark.trial
 def test_shed_load_is_named_with_the_right_hanger() -> None:
     rng, right = np.random.default_rng(1), 0
     for _ in range(CALIBRATION_RUNS):
@@ -168,6 +169,7 @@ def test_shed_load_is_named_with_the_right_hanger() -> None:
     assert right >= 0.95 * CALIBRATION_RUNS
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(("stated", "false_names"), [(1.0, 1), (0.6, 3)])
 def test_a_bridge_at_rest_is_not_accused_even_where_the_noise_is_understated(
     stated: float, false_names: int

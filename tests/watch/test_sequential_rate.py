@@ -32,6 +32,7 @@ def statistics(history: History, options: WatchOptions, n: int) -> FloatArray:
     return np.array(found)
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("beginnings", [40, 8])
 def test_without_change_the_statistic_is_the_time_watched_on_average(beginnings: int) -> None:
     history = History((tension(WEAK_STEP),), tests=16, days_between=30, scatter=0.003, outliers=0)
@@ -49,6 +50,7 @@ def test_without_change_the_statistic_is_the_time_watched_on_average(beginnings:
     assert abs(np.mean(statistic - time)) < 3 * error
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize("scatter", [0.003, 0.0055])
 def test_false_calls_are_no_more_than_stated(scatter: float) -> None:
     limit, hangers = 2.0, 50
