@@ -14,9 +14,11 @@ os.environ.pop("COLUMNS", None)  # the processes of pytest-xdist set it, a singl
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
-    """Each run makes its own bases, once, and leaves the user's alone."""
+    """Each run makes its own bases, once for all its processes, and leaves the user's alone."""
     before = os.environ.get("SHM_CACHE")
-    os.environ["SHM_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+    own = tmp_path_factory.getbasetemp()
+    several = "PYTEST_XDIST_WORKER" in os.environ
+    os.environ["SHM_CACHE"] = str((own.parent if several else own) / "cache")
     yield
     if before is None:
         del os.environ["SHM_CACHE"]

@@ -19,7 +19,7 @@ from tests.helpers import clusters
 from tests.helpers.canonical import canonical
 from tests.helpers.workspaces import make_workspace, put, write_test
 
-FILES = 2
+FILES = 1
 
 
 @pytest.fixture(scope="module")

@@ -63,6 +63,7 @@ def _brute_force(
     return float(logsumexp(log) - np.log(len(log)))
 
 
+@pytest.mark.trial
 @pytest.mark.parametrize(
     ("effect", "values", "points"),
     [
