@@ -13,6 +13,7 @@ from shm.gap import GapOptions, diagnose
 from shm.values import ModalTest, Mode
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.trial
 FREE_BAR_HZ = (111.992, 306.855, 596.367, 974.141)
 """By a roving hammer (ModeLAB); ratios 0.6, 1.5 and 2.6 % below those of Euler and Bernoulli."""
 
