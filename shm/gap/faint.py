@@ -14,7 +14,7 @@ import numpy as np
 
 from shm.gap.chances import Family
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.likelihood import Likelihood
+from shm.gap.imitation import beyond
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray
@@ -67,7 +67,4 @@ def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
     z = np.concatenate([fit.z[:own], fit.z[first:]]) if index == 0 else fit.z[:first]
     shift = fit.predicted - problem.predict(other, z[None])[0]
     least = min(problem.likelihood(Hypothesis()).nodes, key=lambda node: node.model_error)
-    errors = Likelihood([least])
-    products = errors.gram(np.column_stack([baseline.slopes, shift])[None])[0, 0]
-    inner, outer = products[:own, :own] + np.eye(own), products[:own, own]
-    return float(np.sqrt(max(products[own, own] - outer @ np.linalg.solve(inner, outer), 0.0)))
+    return float(np.sqrt(max(beyond(shift[None], baseline, least)[0, 0], 0.0)))

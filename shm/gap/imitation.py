@@ -56,10 +56,16 @@ def visible_shifts(scans: Mapping[Hypothesis, Scan]) -> dict[str, FloatArray]:
 
 def _correlation(shifts: FloatArray, baseline: Fit, likeliest: Fit) -> FloatArray:
     """Of shifts with each other (m, m), beyond what the baseline's parameters can follow."""
-    errors = Likelihood([NoiseNode(likeliest.noise, 0.0, likeliest.model_error)])
-    products = errors.gram(np.column_stack([baseline.slopes, shifts.T])[None])[0, 0]
-    d = len(baseline.z)
-    inner, outer = products[:d, :d] + np.eye(d), products[:d, d:]
-    own = products[d:, d:] - outer.T @ np.linalg.solve(inner, outer)
+    own = beyond(shifts, baseline, NoiseNode(likeliest.noise, 0.0, likeliest.model_error))
     length = np.sqrt(np.maximum(np.diag(own), np.finfo(float).tiny))
     return np.asarray(own / np.outer(length, length))
+
+
+def beyond(shifts: FloatArray, baseline: Fit, errors: NoiseNode) -> FloatArray:
+    """Products (m, m) of shifts (m, data), in standard deviations, beyond what the baseline's
+    parameters can follow."""
+    columns = np.column_stack([baseline.slopes, shifts.T])[None]
+    products = Likelihood([errors]).gram(columns)[0, 0]
+    d = len(baseline.z)
+    inner, outer = products[:d, :d] + np.eye(d), products[:d, d:]
+    return np.asarray(products[d:, d:] - outer.T @ np.linalg.solve(inner, outer))
