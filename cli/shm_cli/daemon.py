@@ -59,7 +59,7 @@ def command(
         click.echo(unit_text(workspace.folder, Path(sys.prefix), options), nl=False)
         return
     begin_logging(workspace.settings, log_file)
-    with web_beside(workspace, Address(host, port) if web else None):
+    with web_beside(workspace, Address(host, port) if web else None, log_file):
         run(workspace, once=once, standby=standby)
 
 

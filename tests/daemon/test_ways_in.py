@@ -25,12 +25,28 @@ from tests.helpers.workspaces import make_workspace, modelled_test
 
 ALONE = """
 import sys, time
+from pathlib import Path
 from shm.store import Workspace
 from shm_daemon.web.address import Address
 from shm_daemon.web.beside import web_beside
-with web_beside(Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2]))):
+with web_beside(Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2])), Path(sys.argv[3])):
     time.sleep(300)
 """
+ENDED = """
+import multiprocessing, os, signal
+from shm_daemon.web.address import Address
+from shm_daemon.web.serving import ending_in_order, make_server
+held = multiprocessing.get_context("forkserver").Lock()
+async def app(scope, receive, send):
+    await receive()
+    await send({"type": "lifespan.startup.complete"})
+    os.kill(os.getpid(), signal.SIGTERM)
+    await receive()
+    await send({"type": "lifespan.shutdown.complete"})
+with ending_in_order():
+    make_server(app, Address(port=0)).run()
+"""
+ENVIRONMENT = {**os.environ, "PYTHONPATH": ".:daemon"}
 
 
 def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
@@ -68,18 +84,25 @@ def test_a_web_interface_that_dies_comes_again_and_ends_with_its_daemon(
 ) -> None:
     taken = socket.create_server(("127.0.0.1", 0))
     port = taken.getsockname()[1]
-    command = [sys.executable, "-c", ALONE, str(workspace.folder), str(port)]
-    environment = {**os.environ, "PYTHONPATH": ".:daemon"}
-    with taken, subprocess.Popen(command, cwd=ROOT, env=environment) as owner:
+    log = workspace.folder / "daemon.log"
+    command = [sys.executable, "-c", ALONE, str(workspace.folder), str(port), str(log)]
+    with taken, subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT) as owner:
         try:
             until(lambda: servers_of(workspace))
             until(lambda: not servers_of(workspace))  # it could not have the port
             taken.close()
             until(lambda: answers(port))
             assert owner.poll() is None
+            assert "GET '/health'" in (workspace.folder / "daemon.web.log").read_text()
         finally:
             owner.kill()
     until(lambda: not servers_of(workspace))
+
+
+def test_what_its_processes_hold_is_given_back_when_it_is_ended() -> None:
+    command = [sys.executable, "-c", ENDED]
+    ended = subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 def test_it_does_not_open_to_others_without_a_token(workspace: Workspace) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
@@ -43,6 +44,9 @@ class Order:
         if self.how == "slow":
             _LET_GO.wait(10)
         if self.how == "dies":
+            os._exit(3)
+        if self.how == "dies once" and not Path(self.word).exists():
+            Path(self.word).touch()
             os._exit(3)
         return Text(self.word, self.size_bytes)
 
@@ -132,6 +136,15 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
         workshop.close()
 
 
+def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
+    workshop: Workshop[Text] = Workshop(longest_s=20.0, pool=a_process)
+    order = Order(str(tmp_path / "ended"), "dies once")
+    try:
+        assert until(lambda: workshop.wanted(order)) == Text(order.word)
+    finally:
+        workshop.close()
+
+
 def test_closing_ends_the_work_at_once() -> None:
     workshop: Workshop[Text] = Workshop(longest_s=60.0, pool=a_process)
     _LET_GO.clear()
@@ -140,5 +153,6 @@ def test_closing_ends_the_work_at_once() -> None:
     began = time.monotonic()
     workshop.close()
     assert time.monotonic() - began < 5
+    assert workshop.wanted(Order("endless", "slow")) is None
     assert workshop.wanted(Order("another")) is None
     until(lambda: None if multiprocessing.active_children() else Text("all gone"))

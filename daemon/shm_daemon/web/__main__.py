@@ -1,4 +1,4 @@
-"""`python -m shm_daemon.web WORKSPACE HOST PORT`: ends with its standard input."""
+"""`python -m shm_daemon.web WORKSPACE HOST PORT [LOG]`: ends with its standard input."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+from pathlib import Path
 
 from shm.errors import ShmError, UsageError
 from shm.store import Workspace
@@ -20,11 +21,11 @@ def main(arguments: list[str]) -> int:
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
     threading.Thread(target=_end_with_input, daemon=True).start()
     try:
-        if len(arguments) != 3:
-            raise UsageError("three arguments are expected.", remedy="Begin it with `shm web`.")
-        folder, host, port = arguments
+        if len(arguments) not in (3, 4):
+            raise UsageError("3 or 4 arguments are expected.", remedy="Begin it with `shm web`.")
+        folder, host, port, *log_file = arguments
         workspace = Workspace.open(folder)
-        begin_logging(workspace.settings)
+        begin_logging(workspace.settings, Path(log_file[0]) if log_file else None)
         serve(workspace, Address(host, int(port)))
     except ShmError as error:
         logging.getLogger("shm").error("%s", error)

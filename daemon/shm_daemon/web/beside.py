@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from shm.store import Workspace
 from shm_daemon.extras import needing
@@ -21,11 +22,14 @@ log = logging.getLogger(__name__)
 
 
 @contextmanager
-def web_beside(workspace: Workspace, address: Address | None) -> Iterator[None]:
+def web_beside(
+    workspace: Workspace, address: Address | None, log_file: Path | None = None
+) -> Iterator[None]:
     """Serves the web interface while the context lasts; without an address, nothing.
 
-    What befalls it does not touch the daemon; it ends with the daemon, however that ends. Raises
-    UsageError where it may not be begun at all.
+    What befalls it does not touch the daemon; it ends with the daemon, however that ends. Where the
+    daemon writes its log to a file, the interface has one beside it: two processes cannot put one
+    file aside. Raises UsageError where it may not be begun at all.
     """
     if address is None:
         yield
@@ -39,6 +43,7 @@ def web_beside(workspace: Workspace, address: Address | None) -> Iterator[None]:
         [
             *(sys.executable, "-m", "shm_daemon.web", str(workspace.folder)),
             *(address.host, str(address.port)),
+            *([str(log_beside(log_file))] if log_file else []),
         ]
     )
     thread = threading.Thread(target=keeper.keep, name="web", daemon=True)
@@ -48,6 +53,11 @@ def web_beside(workspace: Workspace, address: Address | None) -> Iterator[None]:
     finally:
         keeper.stop()
         thread.join(_ENDING_S)
+
+
+def log_beside(file: Path) -> Path:
+    """Where the web interface writes its log beside a daemon's: daemon.web.log by daemon.log."""
+    return file.with_name(f"{file.stem}.web{file.suffix}")
 
 
 class _Keeper:

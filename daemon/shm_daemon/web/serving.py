@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import logging
+import signal
+import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +46,23 @@ def serve(
         log.warning("tokens and data go over the network in clear: give --certificate and --key")
     app = make_app(workspace, address)
     threading.Thread(target=warm_up, args=(app,), name="warm-up", daemon=True).start()
-    make_server(app, address, certificate, key).run()
+    with ending_in_order():
+        make_server(app, address, certificate, key).run()
+
+
+@contextmanager
+def ending_in_order() -> Iterator[None]:
+    """Ends the process of SIGTERM as of itself: once it has ended, uvicorn sends us the signal that
+    ended it, and killed by that we would give nothing back that our processes hold.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def make_server(

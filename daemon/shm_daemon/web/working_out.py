@@ -68,6 +68,7 @@ class Workshop(Generic[Made]):
         self._kept: OrderedDict[Order, Made] = OrderedDict()
         self._failures: dict[Order, _Failure] = {}
         self._waiting: OrderedDict[Order, None] = OrderedDict()
+        self._lost: Order | None = None
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
         self._closed = False
@@ -149,7 +150,7 @@ class Workshop(Generic[Made]):
             self._failed(order, _too_long(self._longest_s))
             return False
         except BrokenProcessPool:
-            self._failed(order, _lost())
+            self._tried_again(order)
             return False
         except ShmError as error:
             self._failed(order, error)
@@ -176,9 +177,23 @@ class Workshop(Generic[Made]):
                     break
                 self._kept.popitem(last=False)
 
+    def _tried_again(self, order: Order) -> None:
+        """An order fails whose process died twice.
+
+        Once may be no fault of its own: who ends all our processes often ends that one first, and
+        whoever asks in the moment before we end as well must not be told of a fault.
+        """
+        if self._lost != order:
+            self._lost = order
+            return
+        self._lost = None
+        self._failed(order, _died())
+
     def _failed(self, order: Order, error: ShmError) -> None:
         now = time.monotonic()
         with self._changed:
+            if self._closed:  # that is why it was not made
+                return
             self._waiting.pop(order, None)
             fresh = {o: f for o, f in self._failures.items() if now - f.at_s < _FAILURE_LASTS_S}
             self._failures = {**fresh, order: _Failure(error, now)}
@@ -198,7 +213,7 @@ def _too_long(longest_s: float) -> ShmError:
     )
 
 
-def _lost() -> ShmError:
+def _died() -> ShmError:
     return ShmError(
         "the process that worked on it died.",
         remedy="It may lack memory: see the log, and try again in a minute.",
