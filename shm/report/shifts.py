@@ -18,7 +18,7 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
         unknown = ("not known", "not known", threshold_cell(row), words.probability(NAN))
         return (words.quantity(row.quantity), *unknown)
     interval = Interval.normal(row.shift_mean, row.shift_sd)
-    # Nearly all of the probability is that nothing has changed: a spread about 0 has no width.
+    # Of the baseline's own test, and where the data leave no room for a shift.
     unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
     size, span = _tension(interval) if row.quantity == TENSION else _stiffness(interval)
     return (

@@ -249,6 +249,26 @@ def test_a_small_shift_that_is_not_called_is_told_with_its_uncertainty() -> None
     assert np.mean(shifts) == pytest.approx(gained, abs=0.002)
 
 
+@pytest.mark.parametrize("gained", [0.0, 0.01, -0.02])
+def test_the_first_test_since_the_baseline_tells_no_less_than_it_leaves_open(gained: float) -> None:
+    for seed in range(6):
+        history = History(tests=2, change_at=1, step=[math.log(1 + gained)], outliers=0)
+        drift = last(watch(history, seed).tests).drifts[0]
+        assert drift.probability < 0.05
+        assert drift.shift_mean == pytest.approx(gained, abs=3 * drift.shift_sd)
+        assert 0.003 < drift.shift_sd < 0.03
+
+
+def test_a_test_that_sees_nothing_leaves_the_shift_as_open_as_it_was_before() -> None:
+    first, second = History(tests=2, outliers=0).readings(1)
+    blind = replace(second, information=np.zeros((1, 1)))
+
+    drift = last(watched([first, blind], TENSION_ALONE, HANGER_3)).drifts[0]
+
+    assert drift.shift_mean == pytest.approx(0, abs=0.01)
+    assert 1 < drift.shift_sd / TENSION_ALONE[0].step_sd < 2
+
+
 def test_the_drift_is_the_state_with_the_swing_of_the_temperature_taken_out() -> None:
     history = History(tests=60, seasons_k=25, change_at=40, step=lost(0.08), outliers=0)
 

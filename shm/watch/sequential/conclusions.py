@@ -178,12 +178,14 @@ def _given_any_change(bank: Bank, j: int, weights: FloatArray) -> FloatArray:
     """The probability of each filter (B,), given that quantity `j` changed since the baseline.
 
     What a call said to have moved has changed, whatever came since; `weights` are not given that.
-    A change that the last test alone speaks for does not count: that may be a blunder.
+    A change that the last test alone speaks for counts only where no other can have been, as after
+    the first test since the baseline: it may be a blunder.
     """
     shares = bank.shares * bank.members[:, j]
-    if len(bank.beginnings) < 2 or not shares[:-1].any():
+    if shares[:-1].any():
+        shares[-1] = 0
+    if not shares.any():
         return weights
-    shares[-1] = 0
     called = float(bank.called[j])
     return called * weights + (1 - called) * _given(bank, shares)
 

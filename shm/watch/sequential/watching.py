@@ -30,7 +30,7 @@ from shm.watch.sequential.segments import taken_over
 from shm.watch.sequential.state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 1
+_VERSION = 2
 # All is measured from a baseline of one test: taken for a blunder, every loss after it would be the
 # truth that it missed.
 _OUTLIER_IF_ALONE = 1e-6
