@@ -12,7 +12,7 @@ import rich_click as click
 
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
-from shm_cli.common import counting_bar, json_option, show, show_table, table
+from shm_cli.common import counting_bar, json_option, readable_width, show, show_table, table
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
@@ -218,7 +218,7 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     if as_json:
         show(trial_json(found))
     else:
-        click.echo(trial_text(found).rstrip())
+        click.echo(trial_text(found, readable_width()).rstrip())
     if gate:
         _refuse_missed(found)
 

@@ -109,11 +109,28 @@ def show_table(table: Table) -> None:
         console.width = max(console.width, _WIDTH_OF_A_FILE)
     console.print(table.title, style="bold", soft_wrap=True, markup=False)
     table.title = None
-    for column in table.columns:
-        column.no_wrap = _is_one_word(column)
+    console.print(table if _folded(table, console) else _as_lists(table))
+
+
+def _folded(table: Table, console: Console) -> bool:
+    """Whether the columns now fit the terminal with no word cut: the widest fold first."""
     unbounded = console.options.update(max_width=_BEYOND_ANY)
-    narrowest = Measurement.get(console, unbounded, table).minimum
-    console.print(table if narrowest <= console.width else _as_lists(table))
+    least, widths = [], []
+    for column in table.columns:
+        spans = [Measurement.get(console, unbounded, e) for e in (column.header, *column.cells)]
+        widths.append(max(span.maximum for span in spans))
+        is_whole = column.no_wrap = _is_one_word(column)
+        least.append(widths[-1] if is_whole else max(span.minimum for span in spans))
+    borders = Measurement.get(console, unbounded, table).maximum - sum(widths)
+    room = console.width - borders
+    if sum(least) > room:
+        return False
+    while sum(widths) > room:
+        loose = [index for index, width in enumerate(widths) if width > least[index]]
+        widths[max(loose, key=widths.__getitem__)] -= 1
+    for column, width in zip(table.columns, widths, strict=True):
+        column.width = width
+    return True
 
 
 def _is_one_word(column: Column) -> bool:
@@ -149,9 +166,14 @@ def show_texts(texts: Texts) -> None:
         click.echo(paragraph(texts.note))
 
 
+def readable_width() -> int:
+    """Columns of the terminal, or as many as one likes to read; those of a file too."""
+    return min(_READABLE, shutil.get_terminal_size((_READABLE, 24)).columns)
+
+
 def paragraph(text: str) -> str:
     """A text in lines that fit the terminal, and are not too long to read."""
-    return textwrap.fill(text, min(_READABLE, shutil.get_terminal_size((_READABLE, 24)).columns))
+    return textwrap.fill(text, readable_width())
 
 
 def table(title: str, *columns: str) -> Table:

@@ -32,6 +32,7 @@ from shm_cli.common import (
     json_option,
     one_hanger,
     opened_store,
+    readable_width,
     seed_option,
     show,
     tests_and_hanger,
@@ -135,7 +136,7 @@ def diagnose(
     if as_json:
         show(diagnosis_json(sheet))
     else:
-        click.echo(diagnosis_text(sheet).rstrip())
+        click.echo(diagnosis_text(sheet, readable_width()).rstrip())
 
 
 command.add_command(adopt)

@@ -24,6 +24,7 @@ from shm_cli.common import (
     hanger_option,
     json_option,
     one_hanger,
+    readable_width,
     show,
 )
 
@@ -162,7 +163,7 @@ def command(
         show(_document(sheets))
     else:
         for sheet in sheets:
-            click.echo(test_text(sheet).rstrip())
+            click.echo(test_text(sheet, readable_width()).rstrip())
 
 
 def _options(

@@ -19,25 +19,25 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
 from shm.report.period import Period, period_since
-from shm_cli.common import drawing, hanger_option, opened_store, waiting
+from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 _DRAWN = ("html", "pdf")
 _Writers = dict[str, Callable[[Any], str | bytes]]
 _OF_HANGER: _Writers = {
-    "text": report.text,
+    "text": lambda content: report.text(content, readable_width()),
     "html": report.html,
     "pdf": report.pdf,
     "json": lambda content: dump(report.json(content)),
 }
 _OF_BRIDGE: _Writers = {
-    "text": report.bridge_text,
+    "text": lambda content: report.bridge_text(content, readable_width()),
     "html": report.bridge_page,
     "pdf": report.bridge_pdf,
     "json": lambda content: dump(report.bridge_json(content)),
 }
 _OF_TEST: _Writers = {
-    "text": report.test_text,
+    "text": lambda sheet: report.test_text(sheet, readable_width()),
     "html": report.test_page,
     "pdf": report.test_pdf,
     "json": lambda sheet: dump(report.test_json(sheet)),

@@ -23,6 +23,7 @@ def widest(text: str) -> int:
         "alerts",
         "drift --hanger 3 --all",
         "db check",
+        "report --hanger 3",
         "status --of 1",
         "predict beam2 --hanger 3 --set log10_k1=8 --set log10_k2=8 --set log10_k3=8 "
         "--set log10_k4=8 --sweep theta_F=0.9:1.1:2 --modes 9",
@@ -55,6 +56,19 @@ def test_a_table_that_is_too_wide_becomes_a_list_for_each_row(
     assert ["quantity_8", "value_8"] in lines
     assert ["quantity_0", "other"] in lines
     assert sum(line[:1] == ["quantity_8"] for line in lines) == 1
+
+
+def test_the_widest_columns_fold_first_and_no_word_is_cut(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = table("folded", "hanger", "lost | gained", "shift, kN (90 %)", "it has", "test of")
+    made.add_row("7", "<=====|......", "-66.8 (-72.3 to -61.2)", "unchanged (0.907)", "2026-05-25")
+    monkeypatch.setenv("COLUMNS", "64")
+    show_table(made)
+    shown = capsys.readouterr().out
+    assert widest(shown) <= 64
+    assert "…" not in shown
+    assert {"unchanged", "2026-05-25", "<=====|......"} <= set(shown.split())
 
 
 def test_a_file_gets_the_whole_table_whatever_its_width(

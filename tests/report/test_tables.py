@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from shm.report import HangerReport, text
+from shm.report import HangerReport, Table, text
+from shm.report.table import laid_out
 from shm.report.tables import tables
 from shm.values import PredictedFrequency
 
@@ -73,3 +74,36 @@ def test_lineage_and_version_are_named(season: HangerReport) -> None:
     told = text(season)
     assert "SHA-256 ab12cd34" in told
     assert re.search(r"shm version +0\.1\.0", told)
+
+
+LONG = Table(
+    "Where the gap lies",
+    ("mode", "test", "measured, Hz", "off, %"),
+    (("transverse 3", "hanger03_20260413", "25.452 (25.441 to 25.463)", "-2.37"),),
+)
+
+
+@pytest.mark.parametrize("width", [72, 80, 100])
+def test_a_text_is_as_wide_as_its_terminal(season: HangerReport, width: int) -> None:
+    told = text(season, width)
+    assert max(map(len, told.splitlines())) <= width
+    assert set(text(season).split()) - set(told.split()) <= {"-" * n for n in range(1, 100)}
+
+
+def test_a_table_folds_its_widest_columns_and_cuts_no_word() -> None:
+    told = laid_out(LONG, 52)
+    assert max(map(len, told.splitlines())) <= 52
+    assert {"transverse", "hanger03_20260413", "25.463)", "-2.37"} <= set(told.split())
+
+
+def test_the_names_of_tests_break_before_any_word() -> None:
+    told = laid_out(LONG, 46)
+    assert max(map(len, told.splitlines())) <= 46
+    assert "hanger03_20260413" not in told
+    assert {"transverse", "measured,", "25.463)"} <= set(told.split())
+
+
+def test_a_table_without_room_for_its_words_stands_as_lists() -> None:
+    lines = [line.split() for line in laid_out(LONG, 34).splitlines()]
+    assert ["mode", "transverse", "3"] in lines
+    assert ["off,", "%", "-2.37"] in lines

@@ -7,7 +7,6 @@ import textwrap
 from shm.report.content import HangerReport
 from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.text import diagnosis_text
-from shm.report.table import WIDTH
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
@@ -25,10 +24,10 @@ def how_to_diagnose(data: HangerReport) -> str:
     )
 
 
-def diagnosis_part(data: HangerReport) -> list[str]:
+def diagnosis_part(data: HangerReport, width: int) -> list[str]:
     """The gap since an effect was adopted, then the latest diagnosis, for a terminal."""
     sheet = diagnosed(data)
-    watched = [textwrap.fill(data.gap_watch, WIDTH) + "\n"] if data.gap_watch else []
+    watched = [textwrap.fill(data.gap_watch, width) + "\n"] if data.gap_watch else []
     if sheet is None:
-        return [*watched, textwrap.fill(how_to_diagnose(data), WIDTH) + "\n"]
-    return [*watched, diagnosis_text(sheet)]
+        return [*watched, textwrap.fill(how_to_diagnose(data), width) + "\n"]
+    return [*watched, diagnosis_text(sheet, width)]

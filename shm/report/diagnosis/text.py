@@ -1,4 +1,4 @@
-"""A gap diagnosis for a terminal of 100 columns."""
+"""A gap diagnosis for a terminal."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from shm.report.table import WIDTH, Table, headed, laid_out
 _ROWS_SHOWN = 10
 
 
-def diagnosis_text(sheet: DiagnosisSheet) -> str:
+def diagnosis_text(sheet: DiagnosisSheet, width: int = WIDTH) -> str:
     """The answer, what is wrong with the data, then the tables."""
-    return "\n".join((headed(headline(sheet), summary(sheet)), *diagnosis_body(sheet)))
+    head = headed(headline(sheet), summary(sheet), width)
+    return "\n".join((head, *diagnosis_body(sheet, width)))
 
 
-def diagnosis_body(sheet: DiagnosisSheet) -> list[str]:
+def diagnosis_body(sheet: DiagnosisSheet, width: int) -> list[str]:
     """Remarks and tables, of long tables the first rows."""
-    remarks = [_remark(remark) for remark in sheet.diagnosis.remarks]
-    tables = [laid_out(_short(table)) for table in (*answers(sheet), *evidence(sheet))]
+    remarks = [_remark(remark, width) for remark in sheet.diagnosis.remarks]
+    tables = [laid_out(_short(table), width) for table in (*answers(sheet), *evidence(sheet))]
     return [*remarks, *([""] if remarks else []), *tables]
 
 
-def _remark(remark: str) -> str:
-    return textwrap.fill(remark, WIDTH, initial_indent="! ", subsequent_indent="  ")
+def _remark(remark: str, width: int) -> str:
+    return textwrap.fill(remark, width, initial_indent="! ", subsequent_indent="  ")
 
 
 def _short(table: Table) -> Table:

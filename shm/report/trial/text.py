@@ -1,4 +1,4 @@
-"""A blind trial for a terminal of 100 columns."""
+"""A blind trial for a terminal."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from shm.values import TrialScore
 _ROWS_SHOWN = 20
 
 
-def trial_text(score: TrialScore) -> str:
+def trial_text(score: TrialScore, width: int = WIDTH) -> str:
     """The summary, what is missed, the marks, the first of the wrong answers."""
     told = [
-        textwrap.fill(each, WIDTH, initial_indent="! ", subsequent_indent="  ")
+        textwrap.fill(each, width, initial_indent="! ", subsequent_indent="  ")
         for each in misses(score)
     ]
     tables = [marks(score), *(_short(table) for table in evidence(score))]
-    head = headed(f"{TITLE}: {verdict(score)}", summary(score))
-    return "\n".join((head, *told, *([""] if told else []), *map(laid_out, tables), _seal(score)))
+    head = headed(f"{TITLE}: {verdict(score)}", summary(score), width)
+    numbers = (laid_out(table, width) for table in tables)
+    return "\n".join((head, *told, *([""] if told else []), *numbers, _seal(score)))
 
 
 def _short(table: Table) -> Table:
