@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shm.report import words
 from shm.report.content import HangerReport
-from shm.report.summary import of_nominal, tension_change
+from shm.report.summary import is_found, of_nominal, tension_change
 
 
 def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
@@ -47,5 +47,6 @@ def _since_baseline(data: HangerReport) -> tuple[str, str, str]:
     return (
         "Since the baseline",
         f"{words.mean(percent, signed=True)} %",
-        f"90 % interval {words.span(percent, signed=True)} %",
+        f"90 % interval {words.span(percent, signed=True)} %"
+        f"{'' if is_found(data) else ', if it has moved at all'}",
     )

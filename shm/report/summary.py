@@ -150,7 +150,14 @@ def _against_baseline(data: HangerReport) -> str:
         return "There is no earlier test to compare with: this one is the baseline."
     tension = words.with_interval(words.kilonewtons(then), "kN")
     tests = told_tests(data.baseline.tests)
-    return f"Against the baseline, {tests} with {tension}, it is {words.signed_percent(change)}."
+    found = f"Against the baseline, {tests} with {tension}, it is {words.signed_percent(change)}"
+    return f"{found}{'' if is_found(data) else ', if it has moved at all'}."
+
+
+def is_found(data: HangerReport) -> bool:
+    """Whether a shift is found, not one that is told in case there is one."""
+    level = data.hanger.thresholds.alert_probability
+    return data.is_called or not data.drifts or any(e.probability >= level for e in data.drifts)
 
 
 def told_tests(tests: tuple[str, ...]) -> str:
@@ -175,12 +182,16 @@ def _change(data: HangerReport) -> str:
 
 
 def _unseen(data: HangerReport) -> str:
-    if not data.tension_n.is_wide:
-        return ""
-    return (
-        " The tension is hardly known: that it has not moved was held probable before, and this "
-        "test could hardly show otherwise."
-    )
+    """What keeps a shift of the tension from being seen, or from being trusted in percent."""
+    change, threshold = tension_change(data), data.hanger.thresholds.tension_shift_fraction
+    if change is not None and change.width / 2 > threshold:
+        return (
+            f" These tests could hardly show it if the tension had moved by {100 * threshold:.3g} "
+            "%: that it has not was held probable before them."
+        )
+    if data.tension_n.is_wide:
+        return " The tension itself is hardly known, and so is what percentage of it a shift is."
+    return ""
 
 
 def _over_the_bridge(data: HangerReport) -> str:
@@ -226,9 +237,9 @@ def _model(data: HangerReport) -> str:
     worst, off = max(misfits, key=lambda each: abs(each[1].mean))
     count = "one measured mode" if len(misfits) == 1 else f"{len(misfits)} measured modes"
     return (
-        f"{_chosen(data)}; over {count} it misses the frequencies by {_rms_percent(data):.2f} % "
-        f"(rms), at most {worst.plane} {worst.order} by {words.mean(off, signed=True)} % "
-        f"(90 % interval {words.span(off, signed=True)} %)."
+        f"{_chosen(data)}; over {count} it misses the frequencies by "
+        f"{words.plain(_rms_percent(data), 2)} % (rms), at most {worst.plane} {worst.order} by "
+        f"{words.mean(off, signed=True)} % (90 % interval {words.span(off, signed=True)} %)."
     )
 
 
@@ -316,8 +327,8 @@ def _urgent(data: HangerReport) -> str:
         case Status.WATCH if data.is_called:
             return (
                 "A change was called, though none is surely beyond its threshold: look after what "
-                "may have moved, and set a new baseline once it is explained (`shm drift "
-                "rebaseline`)."
+                "may have moved, and set a new baseline once it is explained (shm drift "
+                "rebaseline)."
             )
         case Status.WATCH:
             return "Test this hanger again soon: a shift is likelier than not."
@@ -363,7 +374,7 @@ def _diagnose(data: HangerReport) -> str:
         return ""
     return (
         "Learn what the model does not explain, and what that does to the tension "
-        f"(`shm gap diagnose --hanger {data.hanger.id}`)."
+        f"(shm gap diagnose --hanger {data.hanger.id})."
     )
 
 

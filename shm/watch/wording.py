@@ -329,7 +329,7 @@ def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
     if len(groups) > 1:
         return (
             "A sensor near each end and more modes tell them apart. Compare the hangers beside it "
-            "(`shm drift bridge`), and look at its anchorages."
+            "(shm drift bridge), and look at its anchorages."
         )
     quantity, shift = _leading(first, beyond)
     if quantity == TENSION:
@@ -351,10 +351,10 @@ def _leading(first: Moved | None, beyond: Sequence[Drift]) -> tuple[str, float]:
 def _look_at_tension(rose: bool) -> str:
     if rose:
         return (
-            "If it holds, compare the hangers beside it (`shm drift bridge`): one of them may have "
+            "If it holds, compare the hangers beside it (shm drift bridge): one of them may have "
             "shed load."
         )
     return (
-        "If it holds, compare the hangers beside it (`shm drift bridge`), which take up what it "
+        "If it holds, compare the hangers beside it (shm drift bridge), which take up what it "
         "sheds, and look at its anchorages and along the rod."
     )

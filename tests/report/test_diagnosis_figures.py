@@ -134,12 +134,12 @@ def test_tensions_below_one_kilonewton_are_drawn_in_newtons() -> None:
     assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([38.34, 41.04])
     assert axes.get_xlabel() == "tension (N)"
     assert [text.get_text() for text in axes.texts] == [
-        "38.3 N (37.1 to 40.0)",
-        "41.0 N (35.9 to 45.7)",
+        "38.3 N (90 % interval 37.1 to 40.0 N)",
+        "41.0 N (90 % interval 35.9 to 45.7 N)",
     ]
     (nominal,) = [line for line in axes.lines if line.get_label() == "nominal"]
     assert list(np.asarray(nominal.get_xdata())) == [37.5, 37.5]
-    assert "41.0 N (35.9 to 45.7)" in item.alt
+    assert "41.0 N (90 % interval 35.9 to 45.7 N)" in item.alt
 
 
 def test_a_nominal_tension_far_away_does_not_squeeze_the_intervals() -> None:

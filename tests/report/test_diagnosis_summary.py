@@ -68,11 +68,13 @@ def test_the_answer_in_a_word(name: str, found: Answer) -> None:
               "probability 0.930."),
         (LED, "With it the frequencies' error shrinks from 2.3 % to 0.21 % (rms) and, where they "
               "were held out of the fit, from 2.5 % to 0.34 %."),
-        (LED, "Weighed over all that may be, the tension is 702 kN (690 to 715); the "
-              "baseline beam1 alone gives 731.4 kN (728.0 to 734.9), +4.1 %."),
+        (LED, "Weighed over all that may be, the tension is 702 kN (90 % interval 690 to "
+              "715 kN); the baseline beam1 alone gives 731.4 kN (90 % interval 728.0 to 734.9 kN), "
+              "+4.1 %."),
         (LED, "To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m "
-              "(expected log Bayes factor 6.0)."),
-        (LED, "The gap changes with the order of the mode (+1.40 % over its range)."),
+              "(expected odds of 400 to 1)."),
+        (LED, "The gap changes with the order of the mode (+1.40 % over its range, "
+              "90 % interval +0.91 to +1.89 %)."),
         (ALIKE, "or what these data cannot tell from it: effective length (both ends) and "
                 "bending stiffness; together probability 0.900."),
         (NO_GAP, "No gap: the baseline beam1 explains the measurements, probability 0.920."),

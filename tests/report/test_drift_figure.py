@@ -73,7 +73,7 @@ def named(axes: Axes) -> set[str]:
 
 def test_each_quantity_has_a_panel_and_the_temperature_a_strip(data: StatesOverTime) -> None:
     labels = [axes.get_ylabel() for axes in drawn(data).axes]
-    assert labels == ["tension (kN)", "log10 of\nN m/rad", "°C"]
+    assert labels == ["tension (kN)", "log10 of\nN m/rad", "temp.\n(°C)"]
 
 
 def test_without_temperatures_there_is_no_strip(data: StatesOverTime) -> None:

@@ -225,10 +225,7 @@ def test_the_fit_lies_over_the_response_and_every_mode_is_marked(drawn: Drawn) -
     assert len(figure.axes) == 9
     for axes in magnitudes:
         assert [marks(axes, f"{plane} mode") for plane in PLANES] == [6, 6]
-        measured, fitted = (
-            lines_named(axes, "measured")[0],
-            lines_named(axes, "fit of the modes")[0],
-        )
+        (measured,), (fitted,) = (lines_named(axes, e) for e in ("measured", "fit of the modes"))
         assert np.max(fitted.get_ydata()) == pytest.approx(np.max(measured.get_ydata()), rel=0.02)
     assert figure.axes[-1].get_ylabel() == "coherence"
 

@@ -209,7 +209,7 @@ def test_a_sudden_loss_says_first_what_moved_and_last_what_to_do() -> None:
         "changed: probability 0.90; a hanger that does not change raises such an alert at most "
         "once in 200 years on the average. The threshold of the tension is 5 %: passed with "
         "probability 0.30. What to do: hit it again within days. If it holds, compare the hangers "
-        "beside it (`shm drift bridge`), which take up what it sheds, and look at its anchorages "
+        "beside it (shm drift bridge), which take up what it sheds, and look at its anchorages "
         "and along the rod."
     )
 

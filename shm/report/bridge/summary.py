@@ -31,11 +31,11 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
     if watch:
         found.append(f"Test {named(watch)} again soon.")
     if opened:
-        found.append(f"Take note of the open alerts of {named(opened)} (`shm alerts ack`).")
+        found.append(f"Take note of the open alerts of {named(opened)} (shm alerts ack).")
     if wide := [line for line in data.hangers if line.is_hardly_known]:
         found.append(
             f"Find more modes of {named(wide)}: the interval of the tension is wider than half the "
-            "tension itself, so that a shift could hardly be seen."
+            "tension itself, and what percentage of it a shift is, is as little known."
         )
     if untested := [line for line in data.hangers if line.status is None]:
         found.append(f"Test {named(untested)}, of which nothing is known.")

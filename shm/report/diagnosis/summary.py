@@ -22,6 +22,7 @@ _SURE = 0.9
 _POOR_FIT = 0.01
 _WORTH_MEASURING = 1.0
 _CERTAIN = 20.0
+_CERTAIN_ODDS = 1000
 _SHRUNK = 0.8
 """The largest share of a held-out gap that may remain where it is said to have shrunk."""
 _SURE_TREND_SD = 2.0
@@ -73,12 +74,12 @@ def verdict(diagnosis: Diagnosis) -> str:
             return (
                 f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
                 "explains the measurements, probability "
-                f"{words.probability(diagnosis.no_gap_probability)}."
+                f"{words.told_probability(diagnosis.no_gap_probability)}."
             )
         case Answer.UNEXPLAINED:
             return (
                 f"{_none_explains(diagnosis)}: the probability of something else is "
-                f"{words.probability(diagnosis.unexplained_probability)}."
+                f"{words.told_probability(diagnosis.unexplained_probability)}."
             )
         case Answer.UNDECIDED:
             return _undecided(diagnosis)
@@ -115,7 +116,7 @@ def _told(claim: Claim) -> str:
 
 
 def _odds(claim: Claim) -> str:
-    return f"probability {words.probability(claim.probability)}"
+    return f"probability {words.told_probability(claim.probability)}"
 
 
 def _undecided(diagnosis: Diagnosis) -> str:
@@ -128,7 +129,7 @@ def _undecided(diagnosis: Diagnosis) -> str:
     known = sorted((each for each in possible if math.isfinite(each[0])), reverse=True)
     if not known:
         return "Undecided: these data give no probability to any explanation."
-    told = [f"{what} ({words.probability(share)})" for share, what in known[:_MOST_NAMED]]
+    told = [f"{what} ({words.told_probability(share)})" for share, what in known[:_MOST_NAMED]]
     return f"Undecided: these data leave open {words.listed(told)}."
 
 
@@ -173,7 +174,8 @@ def sure_trend(trend: Trend) -> bool:
 
 def _slope(trend: Trend) -> str:
     over = "from transverse to longitudinal" if trend.condition == "plane" else "over its range"
-    return f"{trend.slope_percent:+z.2f} % {over}"
+    interval = words.span(slope(trend), signed=True)
+    return f"{words.mean(slope(trend), signed=True)} % {over}, 90 % interval {interval} %"
 
 
 def slope(trend: Trend) -> Interval:
@@ -220,8 +222,11 @@ def _percent(value: float) -> str:
 def _misfit(diagnosis: Diagnosis) -> str:
     if not diagnosis.fit_p_value < _POOR_FIT or answer(diagnosis) is Answer.UNEXPLAINED:
         return ""
-    p_value = words.probability(diagnosis.fit_p_value)
-    return f"Even so the fit is poor (posterior predictive p-value {p_value}): something is left."
+    chance = words.told_probability(diagnosis.fit_p_value)
+    return (
+        "Even so the fit is poor: were this all, measurements as far off would come with "
+        f"probability {chance} only. Something is left."
+    )
 
 
 def _tension(diagnosis: Diagnosis) -> str:
@@ -257,8 +262,8 @@ def next_step(diagnosis: Diagnosis) -> str:
     if best.expected_log_bayes_factor < _WORTH_MEASURING:
         return f"No measurement that was considered would tell {one} from {other} for sure."
     return (
-        f"To tell {one} from {other}, measure next: {best.what} (expected log Bayes factor "
-        f"{promise(best)})."
+        f"To tell {one} from {other}, measure next: {best.what} (expected odds of "
+        f"{_odds_to_expect(best)} to 1)."
     )
 
 
@@ -266,6 +271,12 @@ def promise(measurement: NextMeasurement) -> str:
     """The expected log Bayes factor; beyond certainty nobody counts."""
     factor = measurement.expected_log_bayes_factor
     return f"{factor:.1f}" if factor < _CERTAIN else f"{_CERTAIN:.0f} or more"
+
+
+def _odds_to_expect(measurement: NextMeasurement) -> str:
+    """The same in words for a sentence: `400`, `more than 1000`."""
+    odds = math.exp(min(measurement.expected_log_bayes_factor, _CERTAIN))
+    return f"{float(f'{odds:.1g}'):.0f}" if odds < _CERTAIN_ODDS else f"more than {_CERTAIN_ODDS}"
 
 
 def contender(effect: str) -> str:

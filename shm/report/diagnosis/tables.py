@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from shm.report import words
+from shm.report.content import Interval
 from shm.report.diagnosis.content import (
     Answer,
     DiagnosisSheet,
@@ -148,7 +149,7 @@ def tension(sheet: DiagnosisSheet) -> Table:
         (
             "tension",
             *(f"{what}, {unit.name}" for what in ("mean", "sd", "90 % interval")),
-            "% of nominal",
+            "% of nominal (90 %)",
         ),
         tuple(
             _tension_row(what, each, nominal, unit)
@@ -169,8 +170,16 @@ def _tension_row(
         f"{interval.low:.1f} to {interval.high:.1f}"
         if math.isfinite(estimate.q05)
         else "not known",
-        f"{100 * estimate.mean / nominal_n:.1f}",
+        _of_nominal(estimate, nominal_n),
     )
+
+
+def _of_nominal(estimate: TensionEstimate, nominal_n: float) -> str:
+    """In percent with its interval, which comes from the tension alone: nominal is given."""
+    if not nominal_n > 0:
+        return "no nominal"
+    share = Interval(estimate.mean, estimate.q05, estimate.q95).scaled(100 / nominal_n)
+    return words.with_span(share) if math.isfinite(share.width) else f"{share.mean:.1f}"
 
 
 def next_measurements(sheet: DiagnosisSheet) -> Table:

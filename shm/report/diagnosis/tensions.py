@@ -32,11 +32,11 @@ class TensionUnit:
         return Interval(estimate.mean, estimate.q05, estimate.q95).scaled(1 / self.newtons)
 
     def told(self, estimate: TensionEstimate) -> str:
-        """`702 kN (690 to 714)`."""
+        """`702 kN (90 % interval 690 to 714 kN)`."""
         interval = self.interval(estimate)
         if math.isnan(interval.width):
             return f"{interval.mean:.0f} {self.name}"
-        return f"{words.mean(interval)} {self.name} ({words.span(interval)})"
+        return words.with_interval(interval, self.name)
 
 
 def tension_unit(diagnosis: Diagnosis) -> TensionUnit:

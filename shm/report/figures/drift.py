@@ -204,7 +204,7 @@ def _words(axes: Axes, changes: Sequence[CalledChange]) -> None:
 
 
 def _temperature(axes: Axes, data: StatesOverTime) -> None:
-    style.dress(axes, "", "°C")
+    style.dress(axes, "", "temp.\n(°C)")
     known = np.isfinite(data.temperatures_c)
     times = timeline.positions(data.times)
     axes.plot(

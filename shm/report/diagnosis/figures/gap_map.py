@@ -140,7 +140,9 @@ def _caption(sheet: DiagnosisSheet) -> str:
         else ""
     )
     trends = (
-        " Diamonds: how the mean gap changes over the range of a condition." if known(sheet) else ""
+        " Diamonds: how the mean gap changes over the range of a condition, with 90 % intervals."
+        if known(sheet)
+        else ""
     )
     crosses = (
         " Crosses: gross errors, set aside; at the edge where they lie beyond it."
