@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Clock, Flow, Notifier, utc_now
+from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.active import ActiveLock
@@ -178,20 +178,20 @@ class Daemon:
 
     def _scan(self) -> None:
         self._heed_description()
-        until = time.monotonic() + _RECEIVING_S
+        until, sharing = time.monotonic() + _RECEIVING_S, Sharing()
         for path in self._tracker.whole(scan(self._flow.workspace.spool)):
             if self._bell.stopped or time.monotonic() > until:
                 break
-            self._receive(path)
+            self._receive(path, sharing)
         pause = min(
             self._flow.workspace.settings.spool_scan_seconds, self._tracker.seconds_to_next()
         )
         self._scan_at = time.monotonic() + pause
 
-    def _receive(self, path: Path) -> None:
+    def _receive(self, path: Path, sharing: Sharing) -> None:
         """One file that cannot be taken must not hold up the others; a store that cannot, must."""
         try:
-            self._flow.receive(path)
+            self._flow.receive(path, sharing)
         except StoreError:
             raise
         except (ShmError, OSError) as error:

@@ -5,6 +5,7 @@ wait, and `flow` begins them, keeps their results and refuses what fails.
 """
 
 from shm.pipeline.flow import Flow, utc_now
+from shm.pipeline.intake import Sharing
 from shm.pipeline.jobs import Clock, DeliveryRefused, Notifier
 
-__all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "utc_now"]
+__all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "Sharing", "utc_now"]

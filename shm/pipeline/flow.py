@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from shm.errors import ShmError, StoreError
-from shm.pipeline.intake import receive
+from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
@@ -94,9 +94,9 @@ class Flow:
             running.future.cancel()
         self._couriers.shutdown(wait=False, cancel_futures=True)
 
-    def receive(self, path: Path) -> Receipt:
+    def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
-        receipt = receive(path, self.workspace, self.store, self.clock())
+        receipt = receive(path, self.workspace, self.store, self.clock(), sharing)
         recording = receipt.recording
         about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
         log.info("%s: %s", recording.file.file_name, receipt.outcome, extra=about)
@@ -196,18 +196,23 @@ class Flow:
             self._refuse(job, error)
 
     def _refuse(self, job: Job, error: BaseException) -> None:
-        """Lays the files of a failed step in the quarantine, then marks them refused."""
+        """Lays the files of a failed step in the quarantine, then marks them refused.
+
+        Not where the step was done meanwhile, by a process that serves in place of this one.
+        """
         self._forget(job)
         if not isinstance(error, ShmError):
             log.error("%s %s failed", *job.key, exc_info=error, extra=_about(job))
         for recording_id in job.recordings:
+            if not self.store.waits(recording_id, job.stage, job.tests):
+                continue
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
             name, archive = recording.file.file_name, self.workspace.archive
             if archive.holds(recording.file):
                 with archive.opened(recording.file) as path:
                     self.workspace.quarantine.put(path, name, reason, sidecar_path(path))
-            self.store.refuse(recording_id, reason, now, job.tests)
+            self.store.refuse(recording_id, reason, now, job.tests, stage=job.stage)
             about = {**_about(job), "recording": recording_id, "file": name}
             why = (reason["message"], reason["remedy"])
             log.warning("%s is refused: %s %s", name, *why, extra=about)

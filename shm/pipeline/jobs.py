@@ -57,13 +57,15 @@ class Step:
 class Job:
     """A step that waits: its name, the recordings and tests it is for, how to begin it.
 
-    `hanger` and the `names` of the tests are for the log.
+    `stage` is where they stand as long as it is not done. `hanger` and the `names` of the tests are
+    for the log.
     """
 
     key: tuple[str, int]
     prepare: Callable[[], Step]
     recordings: tuple[int, ...] = ()
     tests: tuple[int, ...] = ()
+    stage: Stage = Stage.RECEIVED
     delivery: Delivery | None = None
     hanger: int | None = None
     names: tuple[str, ...] = ()
@@ -226,6 +228,7 @@ def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[Wa
         prepare,
         recordings,
         tuple(test.id for test in tests),
+        tests[0].stage,
         hanger=tests[0].hanger,
         names=tuple(test.name for test in tests),
     )

@@ -11,15 +11,16 @@ import hashlib
 import os
 import re
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from shm.documents import dump
-from shm.errors import ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError
 from shm.read import sidecar_path
 from shm.store.rows import ReceivedFile
 
@@ -54,11 +55,12 @@ def checksum(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Kept:
-    """A file that is safe in the archive."""
+    """A file that is safe in the archive; `entry` tells what was read from a later file there."""
 
     sha256: str
     size_bytes: int
     archived_as: str
+    entry: str = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -67,16 +69,18 @@ class Archive:
 
     folder: Path
 
-    def keep(self, source: Path) -> Kept:
+    def keep(self, source: Path, *, follow: bool = False) -> Kept:
         """Copies a file in under its checksum; bytes that are there already are left alone.
 
-        Raises ShmError with `retry_after_s` where the file changes while it is copied or where
-        the disk is full.
+        All is read from one descriptor. A link is refused unless it is to be followed: by one,
+        whoever writes into the spool could send in any file of this machine. Raises BadInput where
+        it is a link or no file, ShmError with `retry_after_s` where the file changes while it is
+        copied or where the disk is full.
         """
-        with self._incoming() as temporary:
-            before = _mark(source)
-            sha256, size = _copy_hashed(source, temporary)
-            if _mark(source) != before:
+        with self._incoming() as temporary, _opened(source, follow) as reading:
+            before = os.fstat(reading.fileno())
+            sha256, size = _copy_hashed(reading, temporary)
+            if _mark(source.stat(follow_symlinks=follow)) != _mark(before):
                 raise ShmError(
                     f"{source.name} changed while it was read.",
                     remedy="It is tried again.",
@@ -84,7 +88,7 @@ class Archive:
                 )
             relative = Path(sha256[:2]) / f"{sha256}{suffix_of(source.name)}"
             self._place(temporary, self.folder / relative)
-        return Kept(sha256, size, relative.as_posix())
+        return Kept(sha256, size, relative.as_posix(), entry_of(before))
 
     def holds(self, file: ReceivedFile) -> bool:
         """Whether the file is there, as it should be."""
@@ -92,7 +96,11 @@ class Archive:
 
     @contextmanager
     def opened(self, file: ReceivedFile) -> Iterator[Path]:
-        """The file under the name it came with, its sidecar beside it, while the context lasts."""
+        """The file under the name it came with, its sidecar beside it, while the context lasts.
+
+        What fails meanwhile because another process has begun to serve, and swept the archive,
+        is an ShmError with `retry_after_s`: the file itself is not to blame.
+        """
         if file.archived_as is None or not self.holds(file):
             raise StoreError(
                 f"{file.file_name} is not in the archive.",
@@ -105,7 +113,16 @@ class Archive:
             _link(self.folder / file.archived_as, path)
             if file.sidecar_as is not None:
                 _link(self.folder / file.sidecar_as, sidecar_path(path))
-            yield path
+            try:
+                yield path
+            except Exception as error:
+                if path.exists():
+                    raise
+                raise ShmError(
+                    f"{file.file_name} was put away while it was read: another process serves now.",
+                    remedy="It is tried again.",
+                    retry_after_s=1.0,
+                ) from error
 
     def sweep(self) -> None:
         """Removes what a killed process left; only for the holder of the workspace's lock."""
@@ -161,14 +178,38 @@ class Quarantine:
         return self.folder / f"{name[: len(name) - len(suffix)]}-{sha256[:8]}{suffix}"
 
 
-def _mark(path: Path) -> tuple[int, int, int]:
-    status = path.stat()
+def entry_of(status: os.stat_result) -> str:
+    """What tells one file of a folder from a later one of the same name and contents."""
+    return f"{status.st_ino}-{status.st_ctime_ns}"
+
+
+def _mark(status: os.stat_result) -> tuple[int, int, int]:
     return status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _copy_hashed(source: Path, target: Path) -> tuple[str, int]:
+@contextmanager
+def _opened(source: Path, follow: bool) -> Iterator[BinaryIO]:
+    """A regular file to read. Opening does not wait, as it would for a named pipe."""
+    flags = os.O_RDONLY | os.O_NONBLOCK | (0 if follow else os.O_NOFOLLOW)
+    try:
+        descriptor = os.open(source, flags)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        raise BadInput(
+            "it is a link, which may lead to any file of this machine and is not followed.",
+            file=source,
+            remedy="Put the file itself in its place.",
+        ) from None
+    with os.fdopen(descriptor, "rb") as reading:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise BadInput("it is no file.", file=source, remedy="Put a file in its place.")
+        yield reading
+
+
+def _copy_hashed(reading: BinaryIO, target: Path) -> tuple[str, int]:
     digest, size = hashlib.sha256(), 0
-    with source.open("rb") as reading, target.open("wb") as writing:
+    with target.open("wb") as writing:
         while chunk := reading.read(_CHUNK):
             digest.update(chunk)
             size += len(chunk)
@@ -181,7 +222,8 @@ def _copy_hashed(source: Path, target: Path) -> tuple[str, int]:
 def _copy_whole(source: Path, target: Path) -> None:
     temporary = target.with_name(f".{target.name}.part")
     temporary.unlink(missing_ok=True)
-    _copy_hashed(source, temporary)
+    with source.open("rb") as reading:
+        _copy_hashed(reading, temporary)
     temporary.rename(target)
     sync(target.parent)
 

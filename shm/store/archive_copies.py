@@ -83,7 +83,7 @@ def copy_archive(
             present += 1
         elif not (source.folder / name).is_file():
             missing.append(name)
-        elif target.keep(source.folder / name).archived_as == name:
+        elif target.keep(source.folder / name, follow=True).archived_as == name:
             copied += 1
         else:  # it went to where its content belongs, which is not where its name says
             damaged.append(name)

@@ -37,10 +37,19 @@ class Files(Database):
         reason: Mapping[str, Any],
         at: datetime,
         test_ids: Collection[int] = (),
+        *,
+        stage: Stage | None = None,
     ) -> None:
-        """Ends a recording with a reason; of its tests only those named, the others go on."""
+        """Ends a recording with a reason; of its tests only those named, the others go on.
+
+        With `stage` only where it, or those tests, still wait there: another process may have done
+        the step that failed here, or refused it already.
+        """
         with self.writing() as connection:
             row = _by_id(connection, recording_id)
+            if stage is not None and not _waits(connection, row, stage, test_ids):
+                return
+            test_ids = _own(connection, recording_id, test_ids)
             connection.execute(
                 sa.update(recordings)
                 .where(recordings.c.id == recording_id)
@@ -53,6 +62,11 @@ class Files(Database):
                 write_step(connection, recording_id, Stage.REFUSED, at, test_id)
             message = str(reason.get("message", ""))
             write_event(connection, at, "refused", row.id, row.file_name, message)
+
+    def waits(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
+        """Whether a recording, or its tests where some are named, are still at a stage."""
+        with self.reading() as connection:
+            return _waits(connection, _by_id(connection, recording_id), stage, test_ids)
 
     def recording(self, recording_id: int) -> StoredRecording:
         """Raises NothingThere."""
@@ -112,6 +126,22 @@ def _by_id(connection: Connection, recording_id: int) -> Row[Any]:
     if row is None:
         raise NothingThere(f"no recording {recording_id}.", remedy="See `shm status`.")
     return row
+
+
+def _waits(
+    connection: Connection, recording: Row[Any], stage: Stage, test_ids: Collection[int]
+) -> bool:
+    if not test_ids:
+        return bool(recording.stage == stage)
+    own = _own(connection, recording.id, test_ids)
+    waiting = sa.select(tests.c.id).where(in_force(tests), tests.c.stage == stage)
+    return len(connection.scalars(waiting.where(tests.c.id.in_(own))).all()) == len(own)
+
+
+def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -> Collection[int]:
+    """Those of the tests that are of one recording."""
+    own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
+    return connection.scalars(own.where(tests.c.id.in_(test_ids)).order_by(tests.c.id)).all()
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:

@@ -123,7 +123,7 @@ def fetch(store: Store, archive: Archive, recording: StoredRecording) -> str:
     for folder in folders:
         if all(_is_whole(Path(folder) / name) for name in _names(recording)):
             for name in _names(recording):
-                archive.keep(Path(folder) / name)
+                archive.keep(Path(folder) / name, follow=True)
             return folder
     raise StoreError(
         f"no whole copy of {recording.file.file_name} is in {', '.join(folders)}.",

@@ -160,7 +160,7 @@ class Watching(Database):
         return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
 
     def delivered(self, delivery: Delivery, at: datetime) -> None:
-        """Marks a delivery as done."""
+        """Marks a delivery as done; one that has come to its end stays as it is."""
         self._end(delivery, DeliveryState.DELIVERED, "", at)
 
     def delivery_failed(
@@ -176,8 +176,9 @@ class Watching(Database):
 
     def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
         with self.writing() as connection:
-            _note(connection, delivery, {"state": state, "last_error": error, "ended_at": at})
-            _note_notified(connection, delivery, at)
+            ended = {"state": state, "last_error": error, "ended_at": at}
+            if _note(connection, delivery, ended):
+                _note_notified(connection, delivery, at)
 
     def _deliveries(self, query: sa.Select[Any]) -> tuple[Delivery, ...]:
         with self.reading() as connection:
@@ -221,9 +222,12 @@ def _raise(
     return StoredAlert(alert_id, alert, at)
 
 
-def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> None:
-    changed = sa.update(deliveries).where(deliveries.c.id == delivery.id)
-    connection.execute(changed.values(attempts=deliveries.c.attempts + 1, **values))
+def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> bool:
+    """Whether it was still owed: another process may have had an answer of the hook before."""
+    owed = (deliveries.c.id == delivery.id) & (deliveries.c.state == DeliveryState.WAITING)
+    changed = sa.update(deliveries).where(owed)
+    noted = connection.execute(changed.values(attempts=deliveries.c.attempts + 1, **values))
+    return noted.rowcount == 1
 
 
 def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, steps
+from shm.pipeline import Flow, Sharing, steps
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Store, Workspace
 from shm_daemon import Bell, run
@@ -174,13 +174,13 @@ def test_a_file_that_cannot_be_taken_holds_up_nobody(
 ) -> None:
     receive, seen = Flow.receive, []
 
-    def fail_on_a(self: Flow, path: Path) -> object:
+    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
         seen.append(path.name)
         if path.name.startswith("a") and seen.count(path.name) == 1:
             raise ShmError("changed while it was read.", retry_after_s=0.2)
         if path.name.startswith("b") and seen.count(path.name) == 1:
             raise FileNotFoundError(path)
-        return receive(self, path)
+        return receive(self, path, sharing)
 
     monkeypatch.setattr(Flow, "receive", fail_on_a)
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
@@ -196,11 +196,11 @@ def test_a_store_that_cannot_be_used_for_now_is_waited_for(
 ) -> None:
     keep, full = Archive.keep, [True, True]
 
-    def full_twice(self: Archive, source: Path) -> object:
+    def full_twice(self: Archive, source: Path, **options: bool) -> object:
         if full:
             full.pop()
             raise StoreError("the disk is full.", remedy="Free some.", retry_after_s=0.1)
-        return keep(self, source)
+        return keep(self, source, **options)
 
     monkeypatch.setattr(Archive, "keep", full_twice)
     write_test(workspace.spool / "a.modes.json", workspace)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from shm.errors import ShmError
+from shm.errors import BadInput, ShmError
 from shm.pipeline import intake
-from shm.pipeline.intake import receive
+from shm.pipeline.intake import Sharing, receive
 from shm.store import Outcome, Receipt, Stage, Store, Workspace
 from tests.helpers.workspaces import START, put
 
@@ -146,3 +146,105 @@ def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
         take(workspace, "gone.csv")
     with workspace.store() as store:
         assert store.recordings() == ()
+
+
+def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    secret = tmp_path / "secret.csv"
+    secret.write_text("secret\n")
+    (workspace.spool / "h3.csv").symlink_to(secret)
+    with pytest.raises(BadInput, match=r"h3\.csv: it is a link"):
+        take(workspace, "h3.csv")
+    assert secret.exists()
+    assert files_in(workspace.archive.folder) == []
+
+
+def test_a_sidecar_swapped_for_a_link_after_the_look_sends_nothing_in(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    secret = tmp_path / "secret.toml"
+    secret.write_text("secret = 1\n")
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    (workspace.spool / "h3.toml").symlink_to(secret)
+    with monkeypatch.context() as patched:
+        patched.setattr(intake, "_is_plain", lambda sidecar: True)
+        with pytest.raises(BadInput, match=r"h3\.toml: it is a link"):
+            take(workspace, "h3.csv")
+    assert files_in(workspace.archive.folder) == []
+    assert take(workspace, "h3.csv").recording.file.sidecar_as is None
+
+
+def test_a_subfolder_swapped_for_a_link_after_the_scan_sends_nothing_in(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    (tmp_path / "private").mkdir()
+    put(tmp_path / "private" / "h3.csv", "secret\n")
+    (workspace.spool / "logger").symlink_to(tmp_path / "private")
+    with pytest.raises(BadInput, match="leads out of the spool"):
+        take(workspace, "logger/h3.csv")
+    assert files_in(workspace.archive.folder) == []
+
+
+def test_the_spool_itself_may_be_a_link_to_another_disk(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    workspace.spool.rmdir()
+    (tmp_path / "disk").mkdir()
+    workspace.spool.symlink_to(tmp_path / "disk")
+    put(workspace.spool / "h3.csv", "force,acc_1\n")
+    assert take(workspace, "h3.csv").recording.file.file_name == "h3.csv"
+    assert files_in(tmp_path / "disk") == []
+
+
+def test_a_link_that_a_person_names_is_followed(workspace: Workspace, tmp_path: Path) -> None:
+    (tmp_path / "mine.csv").write_text("force,acc_1\n")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "mine.csv")
+    with workspace.store() as store:
+        receipt = receive(tmp_path / "link.csv", workspace, store, START)
+    assert receipt.recording.file.file_name == "link.csv"
+
+
+def test_what_came_under_the_same_names_since_it_was_read_stays(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(workspace.spool / "h3.csv", "first\n")
+    enter = Store.receive
+
+    def enter_while_more_comes(self: Store, *args: object) -> Receipt:
+        put(workspace.spool / "h3.csv", "second\n")
+        put(workspace.spool / "h3.toml", "hanger = 3\n")
+        return enter(self, *args)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "receive", enter_while_more_comes)
+        assert take(workspace, "h3.csv").outcome is Outcome.NEW
+    assert sorted(path.name for path in files_in(workspace.spool)) == ["h3.csv", "h3.toml"]
+    second = take(workspace, "h3.csv")
+    assert second.outcome is Outcome.NEW
+    assert second.recording.file.sidecar_as is not None
+    assert files_in(workspace.spool) == []
+
+
+def test_a_folder_of_many_sidecars_is_listed_once_a_look(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3):
+        put(workspace.spool / f"h{number}.csv", f"{number}\n")
+        put(workspace.spool / f"h{number}.toml", "hanger = 3\n")
+    put(workspace.spool / "h0.uff", "0 too\n")
+    listed, listing = [], Path.iterdir
+
+    def counted(self: Path) -> object:
+        listed.append(self)
+        return listing(self)
+
+    sharing = Sharing()
+    with workspace.store() as store, monkeypatch.context() as patched:
+        patched.setattr(Path, "iterdir", counted)
+        for name in ("h0.csv", "h1.csv", "h2.csv"):
+            receive(workspace.spool / name, workspace, store, START, sharing)
+        assert sorted(path.name for path in files_in(workspace.spool)) == ["h0.toml", "h0.uff"]
+        receive(workspace.spool / "h0.uff", workspace, store, START, sharing)
+    assert listed.count(workspace.spool) == 1
+    assert files_in(workspace.spool) == []

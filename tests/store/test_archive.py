@@ -8,10 +8,11 @@ import json
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
-from shm.errors import ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError
 from shm.store import Archive, Quarantine, ReceivedFile, archive
 from shm.store.archive import checksum, safe_name, suffix_of
 
@@ -70,8 +71,8 @@ def test_a_file_that_changes_while_it_is_read_is_not_kept(
     source = a_source(tmp_path)
     copy = archive._copy_hashed
 
-    def copy_and_append(source: Path, target: Path) -> tuple[str, int]:
-        result = copy(source, target)
+    def copy_and_append(reading: BinaryIO, target: Path) -> tuple[str, int]:
+        result = copy(reading, target)
         with source.open("ab") as file:
             file.write(b"1,2\n")
         return result
@@ -145,6 +146,59 @@ def test_what_a_killed_process_left_is_swept(kept_in: Archive, tmp_path: Path) -
         (leftover / "file").write_text("half")
     kept_in.sweep()
     assert files_in(kept_in.folder) == [Path(kept.archived_as)]
+
+
+def test_a_file_swept_while_it_is_read_is_tried_again(kept_in: Archive, tmp_path: Path) -> None:
+    """A process that begins to serve sweeps; the one before must not blame the file."""
+    kept = kept_in.keep(a_source(tmp_path))
+    file = ReceivedFile(kept.sha256, "h3.csv", kept.size_bytes, kept.entry, kept.archived_as)
+
+    def read_while_another_begins() -> None:
+        with kept_in.opened(file) as path:
+            kept_in.sweep()
+            path.read_bytes()
+
+    with pytest.raises(ShmError, match="another process serves") as caught:
+        read_while_another_begins()
+    assert caught.value.retry_after_s == 1.0
+    with pytest.raises(ZeroDivisionError), kept_in.opened(file):
+        raise ZeroDivisionError
+
+
+def test_a_link_is_followed_only_where_that_is_asked_for(kept_in: Archive, tmp_path: Path) -> None:
+    link = tmp_path / "link.csv"
+    link.symlink_to(a_source(tmp_path, "secret.csv"))
+    with pytest.raises(BadInput, match=r"link\.csv: it is a link"):
+        kept_in.keep(link)
+    assert files_in(kept_in.folder) == []
+    assert kept_in.keep(link, follow=True).size_bytes == 12
+
+
+@pytest.mark.timeout(10)
+def test_a_named_pipe_is_refused_and_not_waited_for(kept_in: Archive, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(BadInput, match=r"pipe\.csv: it is no file"):
+        kept_in.keep(tmp_path / "pipe.csv")
+
+
+def test_a_name_given_to_a_link_while_it_is_read_is_noticed(
+    kept_in: Archive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, secret = a_source(tmp_path), a_source(tmp_path, "secret.csv", b"secret\n")
+    copy, copied = archive._copy_hashed, []
+
+    def swap_and_copy(reading: BinaryIO, target: Path) -> tuple[str, int]:
+        source.unlink()
+        source.symlink_to(secret)
+        sha256, size = copy(reading, target)
+        copied.append(target.read_bytes())
+        return sha256, size
+
+    monkeypatch.setattr(archive, "_copy_hashed", swap_and_copy)
+    with pytest.raises(ShmError, match="changed while it was read"):
+        kept_in.keep(source)
+    assert copied == [b"force,acc_1\n"]
+    assert files_in(kept_in.folder) == []
 
 
 def test_a_refused_file_lies_with_its_reason_and_sidecar(

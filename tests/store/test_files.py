@@ -58,6 +58,37 @@ def test_a_refused_file_keeps_its_reason(store: Store) -> None:
     assert store.events("refused")[0].message == "no sampling rate."
 
 
+def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) -> None:
+    """Two processes at the same step: the second neither doubles nor undoes what the first did."""
+    first, second = (store.receive(a_file(number), NOW).recording.id for number in (1, 2))
+    for _ in range(2):
+        store.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
+    assert len(store.events("refused")) == 1
+    assert [step.stage for step in store.steps(first)].count(Stage.REFUSED) == 1
+    store.identified(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
+    (test,) = store.tests()
+    assert not store.waits(second, Stage.RECEIVED)
+    store.refuse(second, REASON, NOW, stage=Stage.RECEIVED)
+    store.refuse(second, REASON, NOW, [test.id], stage=Stage.UPDATED)
+    assert store.recording(second).stage is Stage.IDENTIFIED
+    assert store.waits(second, Stage.IDENTIFIED, [test.id])
+    store.refuse(second, REASON, NOW, [test.id], stage=Stage.IDENTIFIED)
+    assert store.recording(second).stage is Stage.REFUSED
+    assert not store.waits(second, Stage.IDENTIFIED, [test.id])
+
+
+def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> None:
+    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2)]
+    for number in ids:
+        store.identified(number, [IdentifiedTest(a_test(f"t{number}"))], LINEAGE, NOW)
+    tests = [test.id for test in store.tests()]
+    for number in ids:
+        store.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
+    for number in ids:
+        stages = [step.stage for step in store.steps(number)]
+        assert stages.count(Stage.REFUSED) == 2  # the file and its test
+
+
 def test_a_refused_file_dropped_again_is_tried_again(store: Store) -> None:
     recording = store.receive(a_file(1), NOW).recording
     store.refuse(recording.id, REASON, NOW)

@@ -135,6 +135,21 @@ def test_an_ended_delivery_is_not_due_again(store: Store, updated: list[StoredTe
     assert (given_up.hook, given_up.last_error) == ("siren", "no such program")
 
 
+def test_a_delivery_that_two_have_made_is_ended_once(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    watch(store, updated[0], an_alert(test="t1"), "mail")
+    (owed,) = store.deliveries()
+    store.delivered(owed, NOW)
+    store.delivered(owed, NOW)
+    store.delivery_failed(owed, "no answer", NOW, None)
+    store.delivery_failed(owed, "no answer", NOW, NOW)
+    (ended,) = store.deliveries()
+    assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
+    reached = [step.stage for step in store.steps(updated[0].recording_id)]
+    assert reached.count("notified") == 1
+
+
 def test_what_the_watch_said_comes_back_as_it_was(store: Store, updated: list[StoredTest]) -> None:
     said = a_watched_test("t1")
     store.watched(updated[0], baseline(store), said, None, [], NOW)
