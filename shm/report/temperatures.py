@@ -11,30 +11,33 @@ from shm.report import words
 from shm.report.content import Interval
 from shm.report.states import StatesOverTime
 from shm.report.table import Table
-from shm.values import TENSION, TemperatureCoefficient
+from shm.values import TENSION, FloatArray, TemperatureCoefficient
 
 TITLE = "Change with the temperature"
 _PERCENT_A_DECADE = 100 * math.log(10)
 _WIDE_K = 10.0
+_FEWEST = 3
+"""Of two tests at two temperatures nobody can tell a swing from a change."""
 
 
 def temperature_table(states: StatesOverTime) -> Table:
     """Each quantity's change per kelvin in percent of itself, or why it is not known."""
     why = _why_not_known(states)
     titles = {quantity.name: quantity.title for quantity in states.quantities}
+    known = [_is_known(each, states) for each in states.temperature_coefficients]
     rows = tuple(
-        _row(each, titles.get(each.quantity, words.quantity(each.quantity)), why)
-        for each in states.temperature_coefficients
+        _row(each, titles.get(each.quantity, words.quantity(each.quantity)), "" if sure else why)
+        for each, sure in zip(states.temperature_coefficients, known, strict=True)
     )
-    if len(rows) > 1 and not any(each.is_known for each in states.temperature_coefficients):
+    if len(rows) > 1 and not any(known):
         rows = (("tension and end stiffness", f"not known: {why}", ""),)
     return Table(
         TITLE,
         ("quantity", "change per K", "90 % interval"),
         rows,
         note="In percent of the quantity, mean and standard deviation, beside what the softening "
-        "of steel explains (0.03 % of its modulus per K). Shifts and states have this swing taken "
-        "out.",
+        "of steel explains (0.03 % of its modulus per K). States over time have this swing taken "
+        "out; for the shifts the watch learns one of its own.",
     )
 
 
@@ -47,16 +50,16 @@ def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
             "mean": each.mean,
             "sd": each.sd,
             "prior_sd": each.prior_sd,
-            "known": each.is_known,
-            "why_not_known": "" if each.is_known else _why_not_known(states),
+            "known": _is_known(each, states),
+            "why_not_known": "" if _is_known(each, states) else _why_not_known(states),
         }
         for each in states.temperature_coefficients
     ]
 
 
-def _row(each: TemperatureCoefficient, title: str, why: str) -> tuple[str, ...]:
-    if not each.is_known:
-        return (title, f"not known: {why}", "")
+def _row(each: TemperatureCoefficient, title: str, why_not_known: str) -> tuple[str, ...]:
+    if why_not_known:
+        return (title, f"not known: {why_not_known}", "")
     scale = 100.0 if each.quantity == TENSION else _PERCENT_A_DECADE
     change = Interval.normal(each.mean, each.sd).scaled(scale)
     sd = f"{scale * each.sd:.{words.decimals(change.width)}f}"
@@ -67,8 +70,18 @@ def _row(each: TemperatureCoefficient, title: str, why: str) -> tuple[str, ...]:
     )
 
 
+def _is_known(each: TemperatureCoefficient, states: StatesOverTime) -> bool:
+    """Whether the tests tell it, and are enough to tell it from a change."""
+    return each.is_known and len(_known_c(states)) >= _FEWEST
+
+
+def _known_c(states: StatesOverTime) -> FloatArray:
+    """The temperatures (n,) of the tests that count."""
+    return states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
+
+
 def _why_not_known(states: StatesOverTime) -> str:
-    known = states.temperatures_c[np.isfinite(states.temperatures_c) & ~states.outlier]
+    known = _known_c(states)
     if len(known) < 2:
         return f"{words.counted(len(known), 'test')} with a temperature"
     span_k = float(np.ptp(known))

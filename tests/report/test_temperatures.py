@@ -53,6 +53,11 @@ def test_what_the_tests_do_not_say_is_said_with_the_reason(
     assert document["why_not_known"] == why
 
 
+def test_two_tests_tell_no_swing_from_a_change_however_sharp_they_are() -> None:
+    (row,) = temperature_table(states(TENSION, temperatures_c=(8.0, 20.0))).rows
+    assert row[1] == "not known: 2 tests over 12 K are too few to tell it from other changes"
+
+
 def test_text_and_document_of_a_report_hold_them(season: HangerReport) -> None:
     data = replace(season, states=states(TENSION))
     assert "CHANGE WITH THE TEMPERATURE" in text(data)

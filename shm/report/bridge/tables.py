@@ -47,9 +47,9 @@ def shift_table(pattern: BridgePattern, *, bars: bool = False) -> Table:
         for each in pattern.not_compared
     ]
     note = (
-        "Shift of the tension since the baseline at each hanger's latest test, the swing with the "
-        "temperature taken out, with 90 % intervals; whether it has lost or gained, with the "
-        "probability of that."
+        "Shift of the tension since the baseline at each hanger's latest test, if there is any, "
+        "the swing with the temperature taken out, with 90 % intervals; whether it has lost or "
+        "gained, with the probability of that."
     )
     if bars:
         drawn = [bar(share) for share in _shares(pattern)] + [""] * len(pattern.not_compared)
@@ -123,15 +123,21 @@ def _hanger(line: HangerLine) -> tuple[str, ...]:
 def _since_baseline(data: BridgeReport) -> Table:
     return Table(
         "Since the baseline",
-        ("hanger", "shift of the tension", "90 % interval", "probability beyond it", "called"),
+        (
+            "hanger",
+            "shift of the tension",
+            "90 % interval",
+            "probability beyond threshold",
+            "called",
+        ),
         tuple(
             (str(line.hanger.id), *_shifted(line.drift), line.called or "nothing")
             for line in data.hangers
             if line.drift
         ),
-        note="Shift of the tension at the latest test, the swing with the temperature taken out; "
-        "how probable it is that it lies beyond the hanger's threshold; what was called since. "
-        "Hangers that have nothing but their baseline are left out.",
+        note="Shift of the tension at the latest test, if there is any, the swing with the "
+        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; what "
+        "was called since. Hangers that have nothing but their baseline are left out.",
     )
 
 
