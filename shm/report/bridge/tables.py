@@ -136,8 +136,8 @@ def _since_baseline(data: BridgeReport) -> Table:
             if line.drift
         ),
         note="Shift of the tension at the latest test, if there is any, the swing with the "
-        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; what "
-        "was called since. Hangers that have nothing but their baseline are left out.",
+        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; "
+        "what was called since. Hangers that have nothing but their baseline are left out.",
     )
 
 
