@@ -43,6 +43,7 @@ PAGES = {
 }
 CHARTS = {"hanger": 4, "recording": 6}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
+PAPER_WIDE = "640px"
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
     assert width_px(page) == PHONE["width"]
     if name in CHARTS:
         assert printed(page, ".xtitle", "fill") == INK
+        assert printed(page, ".plot .main-svg", "width") == PAPER_WIDE
         expect(page.locator(".xtitle").first).not_to_have_css("fill", INK)
     page.emulate_media(media="print", color_scheme="dark")
     assert style(page, "body", "backgroundColor") == PAPER

@@ -8,8 +8,10 @@
     getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const NARROW_PX = 480;
+  const PAPER = { width: 640, share: 0.75 }; // fits A4 and letter; so much of its height on screen
   const drawn = new Map(); // plot -> document
   let script = null;
+  let onPaper = false; // while it is printed, a figure is light and no wider than paper
 
   function plotly() {
     script ??= new Promise((resolve, reject) => {
@@ -63,7 +65,7 @@
     return found;
   }
 
-  function layoutOf(given, light, narrow) {
+  function layoutOf(given, light, narrow, height) {
     const ink = light ? "#1d2330" : inCss("ink");
     const grid = light ? "#d5d9e0" : inCss("grid");
     const paper = light ? "#ffffff" : inCss("page");
@@ -85,14 +87,17 @@
     const found = merged(base, given);
     delete found.width;
     found.autosize = true;
-    return found;
+    if (!onPaper) return found;
+    return { ...found, autosize: false, width: PAPER.width, height: PAPER.share * height };
   }
 
-  async function draw(plot, figure, light = !dark.matches) {
+  async function draw(plot, figure) {
+    const light = onPaper || !dark.matches;
     const turned = theme(light);
     const library = await plotly();
+    const narrow = onPaper || plot.clientWidth < NARROW_PX;
     await library.react(plot, inTheme(figure.data, turned),
-      layoutOf(inTheme(figure.layout ?? {}, turned), light, plot.clientWidth < NARROW_PX),
+      layoutOf(inTheme(figure.layout ?? {}, turned), light, narrow, parseFloat(plot.style.height)),
       { responsive: true, displaylogo: false, scrollZoom: false,
         modeBarButtonsToRemove: ["lasso2d", "select2d"] });
   }
@@ -144,8 +149,13 @@
     }
   }
 
-  function redraw(light) {
-    for (const [plot, figure] of drawn) draw(plot, figure, light);
+  function redraw() {
+    for (const [plot, figure] of drawn) draw(plot, figure);
+  }
+
+  function print(begins) {
+    onPaper = begins;
+    redraw();
   }
 
   document.addEventListener("DOMContentLoaded", () => {
@@ -159,8 +169,8 @@
       }
     }, { rootMargin: "400px" });
     charts.forEach((chart) => watcher.observe(chart));
-    dark.addEventListener("change", () => redraw(!dark.matches));
-    addEventListener("beforeprint", () => redraw(true));
-    addEventListener("afterprint", () => redraw(!dark.matches));
+    dark.addEventListener("change", redraw);
+    addEventListener("beforeprint", () => print(true));
+    addEventListener("afterprint", () => print(false));
   });
 })();
