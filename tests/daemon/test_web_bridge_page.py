@@ -172,6 +172,16 @@ def test_a_hanger_is_drawn_as_long_as_it_is(hanger: Hanger) -> None:
     assert heights[1] == pytest.approx(2 * heights[0], abs=0.2)
 
 
+def test_the_arch_is_nowhere_higher_than_the_hangers(hanger: Hanger) -> None:
+    lengths = (12.0, 12.0, 5.0, 5.0, 12.0)
+    drawing = elevation(
+        [glance(replace(hanger, id=id, length_m=m)) for id, m in enumerate(lengths, start=1)]
+    )
+    numbers = [float(each) for each in re.findall(r"[\d.]+", drawing.arch)]
+    assert min(numbers[1::2]) == min(mark.top for mark in drawing.hangers)
+    assert max(numbers[1::2]) == drawing.deck
+
+
 def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Hanger) -> None:
     many = [glance(replace(hanger, id=number)) for number in range(1, 201)]
     many[96] = replace(many[96], line=replace(many[96].line, open_alerts=1))

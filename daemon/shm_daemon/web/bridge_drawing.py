@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from shm.report import words
 from shm_daemon.web.bridge_view import HangerGlance
@@ -159,12 +160,22 @@ def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[i
 
 
 def _curve(points: Sequence[tuple[float, float]]) -> str:
-    """A path through all points, round where they bend: Catmull and Rom's as Bezier pieces."""
+    """A path through all points, evenly spaced, round where they bend and with no hump that they
+    have not: a monotone cubic, as Bezier pieces.
+    """
+    slopes = _slopes([y for _, y in points])
     path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
-    for index in range(len(points) - 1):
-        before, begin = points[max(index - 1, 0)], points[index]
-        end, after = points[index + 1], points[min(index + 2, len(points) - 1)]
-        first = [b + (e - a) / 6 for a, b, e in zip(before, begin, end, strict=True)]
-        second = [e - (a - b) / 6 for b, e, a in zip(begin, end, after, strict=True)]
-        path += "C" + " ".join(f"{x:.1f} {y:.1f}" for x, y in (first, second, end))
+    for (begin, end), (first, last) in zip(pairwise(points), pairwise(slopes), strict=True):
+        third = (end[0] - begin[0]) / 3
+        path += f"C{begin[0] + third:.1f} {begin[1] + first / 3:.1f}"
+        path += f" {end[0] - third:.1f} {end[1] - last / 3:.1f} {end[0]:.1f} {end[1]:.1f}"
     return path
+
+
+def _slopes(heights: Sequence[float]) -> list[float]:
+    """The rise from point to point at each of three or more (Fritsch and Butland, 1984): flat at a
+    summit, and nowhere so steep as to overshoot.
+    """
+    rises = [after - before for before, after in pairwise(heights)]
+    inner = [2 * a * b / (a + b) if a * b > 0 else 0.0 for a, b in pairwise(rises)]
+    return [(3 * rises[0] - inner[0]) / 2, *inner, (3 * rises[-1] - inner[-1]) / 2]
