@@ -132,7 +132,8 @@ def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None
     assert "t4321" in dots["text"]
     assert dots["text"][0] == "t0"
     assert dots["text"][-1] == f"t{8 * MOST_POINTS - 1}"
-    assert "keep every extreme" in document["caption"]
+    for figure in (TREND, STIFFNESS, TEMPERATURE):
+        assert "keep every extreme; enlarging brings no more" in drawn(view, figure)["caption"]
 
 
 @pytest.mark.parametrize("seed", range(3))

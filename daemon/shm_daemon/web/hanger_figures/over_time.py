@@ -34,6 +34,13 @@ def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
     return np.unique(np.concatenate([*chosen, kept]))
 
 
+def thinned_words(count: int) -> str:
+    """What a caption says, after a space, of a figure of so many tests that shows only some."""
+    if count <= MOST_POINTS:
+        return ""
+    return f" Of {count} tests those are drawn that keep every extreme; enlarging brings no more."
+
+
 def tests_at(points: Sequence[TrendPoint], named: Collection[str]) -> list[int]:
     """The places of the tests with these names."""
     return [place for place, point in enumerate(points) if point.test in named]

@@ -144,6 +144,7 @@ def _caption(view: HangerView) -> str:
         "2/(1/k_deck + 1/k_arch) in each plane, because frequencies alone cannot tell the ends "
         "apart: mean and 90 % credible band."
     )
+    fewer = over_time.thinned_words(len(view.trend))
     levels = (
         f" Dashed: baseline; dash-dotted: thresholds, {reach:.3g} decades either side."
         if view.baseline
@@ -151,6 +152,7 @@ def _caption(view: HangerView) -> str:
     )
     return (
         f"{what}{levels} A wide band means that the measured modes hardly feel the stiffness."
+        f"{fewer}"
         f"{' The state over time is being worked out.' if view.states is None else ''}"
     )
 

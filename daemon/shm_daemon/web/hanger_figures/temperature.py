@@ -18,15 +18,20 @@ _FEWEST = 2
 
 
 def _known(view: HangerView) -> list[TrendPoint]:
-    """Tests with a temperature, thinned by their tension where there are very many."""
-    known = [point for point in view.trend if math.isfinite(point.temperature_c)]
+    """Tests with a temperature."""
+    return [point for point in view.trend if math.isfinite(point.temperature_c)]
+
+
+def _shown(view: HangerView) -> list[TrendPoint]:
+    """Those that are drawn: thinned by their tension where there are very many."""
+    known = _known(view)
     means = np.array([point.tension_n.mean for point in known])
     temperatures = np.array([point.temperature_c for point in known])
     return [known[i] for i in over_time.places(means, temperatures).tolist()] if known else []
 
 
 def _draw(view: HangerView) -> dict[str, Any]:
-    known = _known(view)
+    known = _shown(view)
     parts = (
         (known[:-1], "earlier tests", "blue", "circle"),
         (known[-1:], "latest", "orange", "diamond"),
@@ -44,11 +49,13 @@ def _trace(points: list[TrendPoint], name: str, hue: str, symbol: str) -> over_t
 
 
 def _caption(view: HangerView) -> str:
-    without = len(view.trend) - sum(math.isfinite(point.temperature_c) for point in view.trend)
+    known = len(_known(view))
+    without = len(view.trend) - known
     left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
     return (
         "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
         f"is lies along one line; what leaves it has another reason than the weather.{left}"
+        f"{over_time.thinned_words(known)}"
     )
 
 

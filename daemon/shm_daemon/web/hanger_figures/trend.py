@@ -22,6 +22,8 @@ from shm_daemon.web.plotting import colour, figure
 
 _KN = 1e-3
 _MARGIN = 0.04
+_LABEL_ROOM = 0.08
+"""Over the thresholds, so that none crosses what is written at the top of a called change."""
 _HANDS = {
     EventKind.BASELINE: ("baseline set", "square", "green"),
     EventKind.ADOPTED: ("effect adopted", "diamond", "purple"),
@@ -182,7 +184,8 @@ def _range(view: HangerView, means: FloatArray, state: QuantityOverTime | None) 
         summaries = [point.tension_n for point in view.trend]
         shown.append(inner(np.array([each.q05 for each in summaries]) * _KN))
         shown.append(inner(np.array([each.q95 for each in summaries]) * _KN))
-    return over_time.limits(np.concatenate(shown))
+    low, high = over_time.limits(np.concatenate(shown))
+    return [low, high + (_LABEL_ROOM * (high - low) if view.calls else 0.0)]
 
 
 def _wrapped(text: str) -> str:
@@ -226,11 +229,7 @@ def _marks(view: HangerView) -> str:
         "at the foot: what was set or adopted" if kinds & set(_HANDS) else "",
     ]
     found = "; ".join(filter(None, told))
-    fewer = (
-        f" Of {len(view.trend)} tests those are drawn that keep every extreme."
-        if len(view.trend) > over_time.MOST_POINTS
-        else ""
-    )
+    fewer = over_time.thinned_words(len(view.trend))
     undated = sum(point.taken_at is None for point in view.trend)
     received = (
         f" {words.counted(undated, 'test')} without a time drawn at the receipt." if undated else ""
