@@ -109,6 +109,7 @@ def test_older_alerts_are_a_link_away(
         assert f'id="alert-{first}"' not in page
         older = f"/alerts?open_before={second}&amp;hanger=3"
         assert older in page
+        assert "Open (1 of 2)" in page
         page = client.get(older.replace("&amp;", "&")).text
         assert f'id="alert-{first}"' in page
         assert f'id="alert-{second}"' not in page

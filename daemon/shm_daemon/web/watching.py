@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
+from datetime import timedelta
 from typing import Any
 
 from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse
 
 from shm.errors import ShmError
+from shm_daemon.doctor.contract import told
 from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
@@ -76,5 +78,5 @@ def _daemon(site: Site) -> list[str]:
     if ago is None:
         return ["The daemon has never run here."]
     if ago > patience_s(site.workspace):
-        return [f"The daemon was last seen {ago:.0f} s ago."]
+        return [f"The daemon was last seen {told(timedelta(seconds=ago))} ago."]
     return []
