@@ -10,11 +10,12 @@ from shm.documents import alert_document
 from shm.pipeline import utc_now
 from shm.store import StoredAlert
 from shm_cli.common import json_option, opened_store, show
+from shm_cli.record import Words
 
 
 @click.command("ack")
 @click.argument("alert_id", type=int, metavar="ID")
-@click.option("--why", required=True, help="What came of it, for the record.")
+@click.option("--why", type=Words(), required=True, help="What came of it, for the record.")
 @click.option("--who", show_default="the user's name", help="For the record.")
 @json_option
 @click.pass_context

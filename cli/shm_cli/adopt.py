@@ -23,8 +23,9 @@ from shm_cli.common import (
     show_table,
     table,
 )
+from shm_cli.record import Words
 
-_why_option = click.option("--why", required=True, help="For the record.")
+_why_option = click.option("--why", type=Words(), required=True, help="For the record.")
 _who_option = click.option("--who", show_default="the user's name", help="For the record.")
 
 

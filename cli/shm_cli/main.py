@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from shm import __version__
-from shm.errors import ShmError
+from shm.errors import BadInput, ShmError
 from shm.resources import one_thread_a_process
 
 if TYPE_CHECKING:
@@ -161,10 +161,21 @@ def run(arguments: Sequence[str]) -> int:
     except Exception as error:
         if "--debug" in arguments:
             raise
+        if isinstance(error, OSError) and error.filename is not None:
+            _say(f"[bold red]Error:[/] {escape(_about_file(error))}")
+            return BadInput.exit_code
         _say(f"[bold red]Unexpected {type(error).__name__}:[/] {escape(str(error))}")
         _say("This is a fault of shm. `shm --debug ...` shows where; please report it.")
         return UNEXPECTED
     return result if isinstance(result, int) else 0
+
+
+def _about_file(error: OSError) -> str:
+    """What a person can do about a file or folder that the system refuses to open or to make."""
+    return (
+        f"{error.filename}: {(error.strerror or 'it cannot be used').lower()}. Check the path, "
+        "that its folder is there, that you may read and write it, and that the disk has room."
+    )
 
 
 def _warn(message: Warning | str, *where: object, **_: object) -> None:

@@ -23,6 +23,8 @@ from shm_cli.common import (
     table,
 )
 
+_MOST_POINTS = 10_000
+
 
 @click.command()
 @click.argument("model", shell_complete=completers.models)
@@ -63,7 +65,7 @@ def command(
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:
-    frequencies = model.reference_frequencies_hz(model.pack(values)[None], modes)[0]
+    frequencies = _solved(model, model.pack(values), modes)
     if as_json:
         show({"model": model.name, "parameters": values, "frequencies": _rows(frequencies)})
         return
@@ -80,7 +82,7 @@ def _show_sweep(
     with progress_bar("solving") as progress:
         rows_hz = []
         for done, row in enumerate(theta, start=1):
-            rows_hz.append(model.reference_frequencies_hz(row[None], modes)[0])
+            rows_hz.append(_solved(model, row, modes))
             progress(model.name, done / len(theta))
     frequencies = np.array(rows_hz)
     if as_json:
@@ -95,6 +97,21 @@ def _show_sweep(
     for point, row in zip(points, frequencies, strict=True):
         made.add_row(f"{point:g}", *(f"{frequency:.3f}" for frequency in row.ravel()))
     show_table(made)
+
+
+def _solved(model: Model, theta: FloatArray, modes: int) -> FloatArray:
+    """Frequencies in Hz, planes by modes; raises UsageError where the parameters have none."""
+    with np.errstate(invalid="ignore"):
+        found: FloatArray = model.reference_frequencies_hz(theta[None], modes)[0]
+    if not np.isfinite(found[:, 0]).all():
+        given = ", ".join(
+            f"{name}={value:g}" for name, value in zip(model.parameter_names, theta, strict=True)
+        )
+        raise UsageError(
+            f"model class {model.name} has no frequencies at {given}.",
+            remedy="Give positive numbers: theta_F is a multiple of the nominal tension.",
+        )
+    return found
 
 
 def _rows(frequencies: FloatArray) -> list[dict[str, object]]:
@@ -119,9 +136,11 @@ def _range(text: str) -> tuple[str, FloatArray]:
     name, _, limits = text.partition("=")
     try:
         start, stop, count = limits.split(":")
+        if not 1 <= int(count) <= _MOST_POINTS:
+            raise ValueError(count)
         return name.strip(), np.linspace(float(start), float(stop), int(count))
     except ValueError:
         raise UsageError(
-            f"--sweep {text!r} is not NAME=FROM:TO:N.",
+            f"--sweep {text!r} is not NAME=FROM:TO:N, with N from 1 to {_MOST_POINTS}.",
             remedy="Write --sweep theta_F=0.5:2:16, say.",
         ) from None

@@ -12,6 +12,7 @@ from shm.pipeline.rebaselining import Order
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.store import Baseline
 from shm_cli.common import hanger_option, json_option, opened_store, progress_bar, show
+from shm_cli.record import Words
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
@@ -25,7 +26,7 @@ _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
     metavar="DAY",
     help="The first day (UTC) whose tests count, such as 2026-05-01.",
 )
-@click.option("--why", required=True, help="For the record.")
+@click.option("--why", type=Words(), required=True, help="For the record.")
 @click.option("--who", show_default="the user's name", help="For the record.")
 @json_option
 @click.pass_context

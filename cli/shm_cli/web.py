@@ -44,5 +44,6 @@ def command(
 
     workspace, address = open_workspace(ctx), Address(host, port)
     begin_logging(workspace.settings, log_file)
-    click.echo(f"The dashboard: {address.page(certificate is not None)}  (Ctrl+C ends it)")
-    serve(workspace, address, certificate, key)
+    page = address.page(certificate is not None)
+    said = f"The dashboard: {page}  (Ctrl+C ends it)"
+    serve(workspace, address, certificate, key, lambda: click.echo(said))

@@ -83,13 +83,17 @@ def load_hanger(path: Path, hanger_id: int | None = None) -> Hanger:
 def _parse(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise BadInput(
-            "no such file.",
+            f"no such file in {path.parent}.",
             file=path,
             remedy="Make a workspace with `shm init`, or name one with --workspace.",
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except OSError as error:
+        raise BadInput(
+            f"cannot be read: {error.strerror}.", file=path, remedy="Check its permissions."
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadInput(
             f"not a readable TOML file: {error}.", file=path, remedy="Correct the file."
         ) from error

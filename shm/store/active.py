@@ -85,7 +85,13 @@ class FileLock:
         self._file: IO[str] | None = None
 
     def take(self) -> None:
-        file = self._path.open("a+", encoding="utf-8")
+        try:
+            file = self._path.open("a+", encoding="utf-8")
+        except OSError as error:
+            raise StoreError(
+                f"{self._path} cannot be written ({error.strerror}).",
+                remedy="Give this user write access to its folder.",
+            ) from error
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

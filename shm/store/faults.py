@@ -95,7 +95,7 @@ def translated(location: str, errors: type[Exception] = sa.exc.SQLAlchemyError) 
         fault = _meaning(error, cause.lower())
         if fault is None:
             raise StoreError(
-                f"the store {location} refused a step: {cause}", remedy="Run `shm db check`."
+                f"the store {location} refused a step: {cause}.", remedy="Run `shm db check`."
             ) from error
         raise fault.error(
             f"the store {location} {fault.message} ({cause}).",

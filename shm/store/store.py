@@ -75,7 +75,11 @@ class Store(
 
 def _must_exist(location: str | Path) -> None:
     if "://" not in str(location) and not Path(location).is_file():
-        raise NothingThere(f"there is no store at {location}.", remedy="Make one with `shm init`.")
+        raise NothingThere(
+            f"there is no store at {location}.",
+            remedy="Bring it back with `shm db restore BACKUP`, or make the workspace anew: "
+            "`shm init DIR --from bridge.toml`.",
+        )
 
 
 def _ready(location: str | Path, prepare: Callable[[Engine], None]) -> Engine:

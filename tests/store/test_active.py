@@ -136,6 +136,14 @@ def test_who_is_cut_off_while_waiting_goes_on_waiting(
     assert type(told[1]) is StoreError
 
 
+def test_a_lock_that_cannot_be_made_is_told(sqlite: Path, tmp_path: Path) -> None:
+    with (
+        pytest.raises(StoreError, match=r"cannot be written .* Give this user write access"),
+        active(sqlite, tmp_path / "no such folder" / "shm.lock", None),
+    ):
+        pytest.fail("nobody can be active")
+
+
 def test_a_server_that_is_down_is_waited_for(tmp_path: Path) -> None:
     told: list[StoreError] = []
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import logging
 import signal
+import ssl
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shm.errors import UsageError
+from shm.errors import BadInput, UsageError
 from shm.store import Workspace
 from shm_daemon.extras import needing
 from shm_daemon.web.address import Address
@@ -32,16 +33,19 @@ def serve(
     address: Address,
     certificate: Path | None = None,
     key: Path | None = None,
+    announce: Callable[[], object] = lambda: None,
 ) -> None:
-    """Serves a workspace until SIGTERM or SIGINT.
+    """Serves a workspace until SIGTERM or SIGINT; `announce` is called once nothing forbids it.
 
     Raises UsageError where others could reach it and no token is in force, and where the extra
-    `[web]` is not installed.
+    `[web]` is not installed; BadInput where the certificate cannot be used.
     """
     with needing("web"):
         from shm_daemon.web.app import make_app
         from shm_daemon.web.warming import warm_up
     refuse_unguarded(workspace, address)
+    refuse_useless(certificate, key)
+    announce()
     if not address.is_loopback and certificate is None:
         log.warning("tokens and data go over the network in clear: give --certificate and --key")
     app = make_app(workspace, address)
@@ -87,6 +91,22 @@ def make_server(
     )
     logging.getLogger("uvicorn.access").disabled = True
     return uvicorn.Server(config)
+
+
+def refuse_useless(certificate: Path | None, key: Path | None) -> None:
+    """Raises BadInput where a certificate cannot be used, UsageError for a key without one."""
+    if certificate is None:
+        if key is not None:
+            raise UsageError("--key is of no use alone.", remedy="Give its --certificate as well.")
+        return
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+    except OSError as error:  # of which ssl.SSLError is a kind
+        raise BadInput(
+            "it holds no certificate with a key that fits.",
+            file=certificate,
+            remedy="Give both as PEM files, with --certificate and --key.",
+        ) from error
 
 
 def refuse_unguarded(workspace: Workspace, address: Address) -> None:
