@@ -11,6 +11,7 @@ import pytest
 
 from shm import documents, report
 from shm.report import DiagnosisSheet, HangerReport
+from shm.report.diagnosis.page import in_words
 from shm.values import TensionEstimate
 from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet
 from tests.report.outline import Outline
@@ -164,3 +165,10 @@ def test_a_frequency_set_aside_leads_the_table_and_is_marked() -> None:
     assert marked[0].split()[:3] == ["transverse", "3", "t4"]
     others = [line for line in rows if re.search(r" t\d ", line) and line is not marked[0]]
     assert rows.index(marked[0]) < rows.index(others[0])
+
+
+def test_the_figures_on_top_have_intervals_and_no_endless_number() -> None:
+    facts = in_words(DiagnosisSheet(replace(LED, fit_p_value=1e-29), STRING_HANGER))["facts"]
+    told = {what: (value, beside) for what, value, beside in facts}
+    assert told["Fit of the answer"] == ("poor", "posterior predictive p-value < 0.001")
+    assert told["Tension"][1].count("90 % interval") == 2

@@ -15,6 +15,7 @@ from shm.report.paper.setting import WIDTH
 from shm.report.table import Table
 from tests.helpers.painting import paint_blank
 from tests.helpers.pdf_words import Pdf
+from tests.report.diagnoses import UNEXPLAINED
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +107,9 @@ def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
     assert narrow + wide == pytest.approx(300.0)
     small = Table("t", ("a", "b"), (("1", "2"),))
     assert sum(columns.widths(small, 300.0, 8.0, 6.0)) < 60
+
+
+def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:
+    paper = hanger_paper(replace(season, drifts=(), diagnosis=UNEXPLAINED))
+    (gap,) = [part for part in paper.parts if part.title.startswith("Gap diagnosis")]
+    assert (paper.style, gap.style) == ("steady", "alert")

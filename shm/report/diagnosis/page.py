@@ -96,7 +96,8 @@ def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     unit = tension_unit(sheet.diagnosis)
     if math.isnan(better.mean):
         return ("Tension", _rounded(plain, unit), f"baseline: {unit.told(plain)}")
-    return ("Tension", _rounded(better, unit), f"baseline alone: {unit.told(plain)}")
+    told = f"{unit.told(better)}; baseline alone {unit.told(plain)}"
+    return ("Tension", _rounded(better, unit), told)
 
 
 def _rounded(estimate: TensionEstimate, unit: TensionUnit) -> str:
@@ -108,7 +109,7 @@ def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     if math.isnan(p_value):
         return None
     told = "good" if p_value >= 0.05 else "doubtful" if p_value >= 0.01 else "poor"
-    return ("Fit of the answer", told, f"posterior predictive p-value {words.plain(p_value, 2)}")
+    return ("Fit of the answer", told, f"posterior predictive p-value {words.probability(p_value)}")
 
 
 def _made(sheet: DiagnosisSheet) -> str:

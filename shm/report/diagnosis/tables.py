@@ -145,7 +145,7 @@ def tension(sheet: DiagnosisSheet) -> Table:
         (f"after: {AFTER}", diagnosis.tension_after_n),
     )
     return Table(
-        "Tension",
+        "Tension before and after",
         (
             "tension",
             *(f"{what}, {unit.name}" for what in ("mean", "sd", "90 % interval")),

@@ -16,7 +16,10 @@ Fact = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A headed part; what it has stands in the order of its fields."""
+    """A headed part; what it has stands in the order of its fields.
+
+    `style` is that of an answer of its own, as `Paper.style` is of the whole; empty: the paper's.
+    """
 
     title: str
     summary: str = ""
@@ -24,6 +27,7 @@ class Part:
     remarks: Sequence[str] = ()
     illustrations: Sequence[Illustration] = ()
     tables: Sequence[Table] = ()
+    style: str = ""
 
     @property
     def is_empty(self) -> bool:

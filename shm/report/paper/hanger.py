@@ -55,4 +55,5 @@ def _diagnosis(sheet: DiagnosisSheet, gap_watch: str) -> Part:
         told["remarks"],
         diagnosis_figures(sheet),
         (*told["answers"], *told["evidence"]),
+        told["style"],
     )

@@ -74,7 +74,7 @@ def flowables(paper: Paper) -> list[Flowable]:
     ]
     parts = [
         each for part in paper.parts if not part.is_empty
-        for each in _part(part, colour, figures, tables)
+        for each in _part(part, STATUS_COLOURS[part.style or paper.style], figures, tables)
     ]  # fmt: skip
     return [*top, *parts, Paragraph(escape(f"{paper.made}. {paper.closing}"), _NOTE)]
 

@@ -18,7 +18,7 @@ from shm.report.figures.member import Member
 from shm.values import Cause, Diagnosis
 
 _MOST = 10
-_ROW_INCHES = 0.3
+_ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
 _LEAST_SHOWN = 0.0005
 _LABEL = 40
 _NOTE = style.TINY + 0.5
@@ -41,7 +41,9 @@ def _draw(sheet: DiagnosisSheet) -> Figure | None:
     bars = _bars(sheet.diagnosis)
     if not any(bar.probability > 0 for bar in bars):
         return None
-    figure = style.new_figure(_ROW_INCHES * len(bars) + 1.0)
+    labels = [textwrap.fill(bar.label, _LABEL) for bar in bars]
+    is_tall = any(label.count("\n") > 1 for label in labels)
+    figure = style.new_figure((_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
     axes = figure.subplots()
     style.dress(axes, "probability", "")
     axes.barh(
@@ -54,7 +56,7 @@ def _draw(sheet: DiagnosisSheet) -> Figure | None:
     for row, bar in enumerate(bars):
         _write(axes, row, bar)
     right = _brackets(axes, bars)
-    axes.set_yticks(range(len(bars)), [_fitted(bar.label) for bar in bars])
+    axes.set_yticks(range(len(bars)), labels)
     axes.tick_params(axis="y", length=0, labelsize=style.TINY + 1)
     axes.grid(False, axis="y")
     axes.set_ylim(len(bars) - 0.45, -1.2)
@@ -87,10 +89,6 @@ def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
     all_causes = [(claim, cause) for claim in claims(diagnosis) for cause in claim.causes]
     probable = [pair for pair in all_causes if pair[1].probability >= _LEAST_SHOWN]
     return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
-
-
-def _fitted(text: str) -> str:
-    return textwrap.fill(text, _LABEL, max_lines=2, placeholder=" …")
 
 
 def _write(axes: Axes, row: int, bar: _Bar) -> None:
