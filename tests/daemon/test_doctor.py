@@ -144,6 +144,15 @@ def test_a_wrong_description_is_told_with_its_place(workspace: Workspace) -> Non
     assert (finding.level, "length_m" in finding.found) == (Level.FAULT, True)
 
 
+def test_a_model_class_that_the_daemon_would_not_begin_with_is_told(workspace: Workspace) -> None:
+    assert only(workspace, "models").level is Level.OK
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace('"beam1"', '"beam77"'))
+    finding = only(workspace, "models")
+    assert (finding.level, "'beam77'" in finding.found) == (Level.FAULT, True)
+    assert "beam2" in finding.remedy
+
+
 def test_looking_does_not_hide_that_a_folder_is_missing(workspace: Workspace) -> None:
     """An archive on a disk that is not mounted must not be begun anew, empty."""
     shutil.rmtree(workspace.folder / "archive")

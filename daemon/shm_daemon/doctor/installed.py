@@ -1,4 +1,4 @@
-"""Versions, and the extras that the settings call for. Needs no store."""
+"""Versions, and whether what the settings call for is there. Needs no store."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from importlib.util import find_spec
 
 from shm import __version__
 from shm.bridge import AppriseHook
+from shm.models import competing_names
 from shm.store import Workspace
 from shm_daemon.doctor.contract import Finding, fault, ok
 
@@ -49,6 +50,14 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
         yield fault("extras", f"not installed: {names}", f"pip install 'shm[{names}]'")
     else:
         yield ok("extras", f"installed: {', '.join(installed) or 'none'}; none other is needed")
+
+
+def check_models(workspace: Workspace) -> Iterator[Finding]:
+    """Whether each hanger has a model class; raises UsageError, as the daemon does."""
+    names = workspace.settings.model_names
+    for hanger in workspace.bridge.hangers:
+        competing_names(hanger, names)
+    yield ok("models", f"{', '.join(names)}; each hanger has one that applies")
 
 
 def _version(name: str) -> str:
