@@ -70,7 +70,7 @@ def test_the_table_ends_in_a_sentence_for_the_owner(arch: Workspace) -> None:
     told = call(arch).stdout
     assert "not compared" in told
     assert "each by itself" in told
-    assert "Hanger 6 has lost 35 kN (90 % 33 to 37) and its neighbours 5 and 7" in told
+    assert "Hanger 6 has lost 35 kN (90 % interval 33 to 37 kN) and its neighbours 5 and 7" in told
 
 
 def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -> None:

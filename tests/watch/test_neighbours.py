@@ -221,7 +221,8 @@ def test_the_sentence_says_who_lost_and_who_took_it_up() -> None:
     pattern = bridge_pattern(sure({6: 16e3, 7: -34e3, 8: 15e3, 9: 3e3}))
     assert pattern.explanations[0].name == "shed load"
     assert pattern.sentence.startswith(
-        "Hanger 7 has lost 34 kN (90 % 32 to 36) and its neighbours 6 and 8 have taken up 31 kN "
+        "Hanger 7 has lost 34 kN (90 % interval 32 to 36 kN) and its neighbours 6 and 8 have "
+        "taken up 31 kN "
     )
     ways = {row.hanger: row.way for row in pattern.rows if row.way != "unchanged"}
     assert ways == {6: "gained", 7: "lost", 8: "gained"}

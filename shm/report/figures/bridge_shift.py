@@ -179,8 +179,9 @@ def _caption(pattern: BridgePattern) -> str:
     dotted = " Dotted: not compared, no recent test." if pattern.not_compared else ""
     return (
         "Above: the hangers between deck and arch (not to scale), coloured by the shift of their "
-        "tension from the baseline: orange lost, blue gained, grey unchanged; bold numbers "
-        f"moved.{dotted} Below: the same in kN, with 90 % intervals. {pattern.sentence}"
+        "tension from the baseline: orange lost, blue gained, grey neither. Only bold numbers "
+        f"have likelier moved than not.{dotted} Below: the same in kN, with 90 % intervals. "
+        f"{pattern.sentence}"
     )
 
 

@@ -41,8 +41,8 @@ def _undecided(pattern: BridgePattern) -> str:
     told = []
     for each in likely:
         suspect = leading_suspect(pattern, each.name)
-        which = f" (most likely {_hangers(suspect.hangers).lower()})" if suspect else ""
-        told.append(f"{each.name}{which} {each.probability:.2f}")
+        which = f", most likely {_hangers(suspect.hangers).lower()}" if suspect else ""
+        told.append(f"{each.name} (probability {each.probability:.2f}{which})")
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     return (
         f"It cannot be told yet what moved: {_listed(told)}; the largest shift is "
@@ -65,7 +65,7 @@ def _alike(pattern: BridgePattern, remedy: str) -> str:
         f"All {len(pattern.rows)} hangers"
     )  # fmt: skip
     return (
-        f"{who} moved by about {mean:+.1f} % (90 % {low:+.1f} to {high:+.1f} %): "
+        f"{who} moved by about {mean:+.1f} % (90 % interval {low:+.1f} to {high:+.1f} %): "
         f"{pattern.alike_cause} rather than a hanger; {remedy}."
     )
 
@@ -125,7 +125,7 @@ def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], name: Explanati
     many = len(answering) > 1
     return (
         f"{whose} neighbour{'s' if many else ''} {names} {'have' if many else 'has'} {verb} "
-        f"{abs(taken) / 1e3:.0f} kN of it (90 % {low:.0f} to {high:.0f})"
+        f"{abs(taken) / 1e3:.0f} kN of it (90 % interval {low:.0f} to {high:.0f} kN)"
     )
 
 
@@ -154,7 +154,7 @@ def _sum(pattern: BridgePattern) -> str:
     kept = pattern.sum_kept
     moved = (
         f"The sum over {_group(pattern)} has moved by {kept.sum_n / 1e3:+.0f} kN "
-        f"(sd {kept.sum_sd_n / 1e3:.0f})"
+        f"(sd {kept.sum_sd_n / 1e3:.0f} kN)"
     )
     if kept.complete:
         return f"{moved}; the probability that it is kept is {kept.probability:.2f}."
@@ -176,17 +176,17 @@ def _group(pattern: BridgePattern) -> str:
 
 
 def _way(row: HangerRow) -> str:
-    """`lost 34 kN (90 % 28 to 40)`."""
+    """`lost 34 kN (90 % interval 28 to 40 kN)`."""
     low, high = sorted(abs(value) / 1e3 for value in (row.low_n, row.high_n))
     verb = "lost" if row.shift_n < 0 else "gained"
-    return f"{verb} {abs(row.shift_n) / 1e3:.0f} kN (90 % {low:.0f} to {high:.0f})"
+    return f"{verb} {abs(row.shift_n) / 1e3:.0f} kN (90 % interval {low:.0f} to {high:.0f} kN)"
 
 
 def _percent(row: HangerRow) -> str:
     mean, low, high = (
         100 * each for each in (row.shift_fraction, row.low_fraction, row.high_fraction)
     )
-    return f"{mean:+.1f} % (90 % {low:+.1f} to {high:+.1f} %)"
+    return f"{mean:+.1f} % (90 % interval {low:+.1f} to {high:+.1f} %)"
 
 
 def _hangers(hangers: Sequence[int]) -> str:
