@@ -15,7 +15,7 @@ import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.gap.contract import Fit, Hypothesis, Observations
+from shm.gap.contract import Fit, Hypothesis
 from shm.gap.landscape import Landscape
 from shm.gap.problem import GapProblem
 from shm.values import FloatArray, IntArray
@@ -146,7 +146,7 @@ def without_shape(problem: GapProblem, row: int) -> GapProblem:
         shape_place=design.shape_place[kept],
         shape_component=design.shape_component[kept],
     )
-    part = Observations(shapeless, observations.value[data], observations.sd[data])
+    part = observations.part(shapeless, data)
     made = GapProblem(problem.hanger, problem.baseline, part)
     made.smallest = problem.smallest
     return made

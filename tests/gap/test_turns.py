@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.gap.gross_error import without_shape
 from shm.gap.noise import nodes
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
@@ -85,3 +86,13 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
     test_modes = len(test.modes)
     assert chi_square(_turned(_may_be_turned(first, rad), rad)) < 2
     assert chi_square(_turned(first, rad)) > 20
+
+
+def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: ModalTest) -> None:
+    first, *rest = (_may_be_turned(mode, 0.3) for mode in test.modes)
+    turned = replace(test, modes=(first, *rest))
+    whole = GapProblem(HANGER_3, "beam1", observed([turned], HANGER_3))
+    without = without_shape(whole, 0).observations
+    others = whole.observations.design.shape_mode != 0
+    _, _, *of_others = turn_loads(whole.observations)[others].T
+    assert np.array_equal(turn_loads(without), np.column_stack(of_others))
