@@ -49,10 +49,10 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
 def sentences(rerun: Rerun, stage: Stage) -> list[str]:
     """What is done anew, what that supersedes, and what it leaves as it is."""
     names, file = ", ".join(rerun.tests) or "no test yet", rerun.recording.file.file_name
-    tests = f"{len(rerun.tests)} test(s), " if stage is Stage.IDENTIFIED else ""
+    tests = f"tests: {len(rerun.tests)}, " if stage is Stage.IDENTIFIED else ""
     said = [
         f"{file} ({names}) is to be {stage} again. Superseded, and kept with their lineage: "
-        f"{tests}{rerun.posteriors} posterior(s), {rerun.watches} watch(es)."
+        f"{tests}posteriors: {rerun.posteriors}, watches: {rerun.watches}."
     ]
     if rerun.of_baseline:
         own = ", ".join(rerun.of_baseline)

@@ -102,7 +102,7 @@ def _connect(scheduler: str) -> Client:
     except ShmError:
         client.close(timeout=_CONNECTING_S)
         raise
-    log.info("steps run on %s, %d worker(s)", scheduler, len(found))
+    log.info("steps run on %s, workers: %d", scheduler, len(found))
     return client
 
 

@@ -195,7 +195,7 @@ def test_files_that_wait_too_long_in_the_spool_are_told(workspace: Workspace) ->
     (workspace.spool / "broken.csv.part").write_text("x")
     assert only(workspace, "spool").level is Level.OK
     waiting, forgotten = found(workspace, "spool", datetime.now(UTC) + timedelta(days=2))
-    assert (waiting.level, "1 file(s) wait" in waiting.found) == (Level.WARNING, True)
+    assert (waiting.level, "1 file in the queue" in waiting.found) == (Level.WARNING, True)
     assert "alone.toml" in forgotten.found
     assert "broken.csv.part" in forgotten.found
 

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from shm.errors import ShmError
+from shm.report.words import counted
 from shm.store import Workspace
 from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, unknown
 from shm_daemon.doctor.flowing import (
@@ -48,7 +49,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
         workspace = Workspace.described(folder)
     except (ShmError, OSError) as error:
         return (*findings, _broken("bridge.toml", error))
-    described = f"{workspace.bridge.name}, {len(workspace.bridge.hangers)} hanger(s)"
+    described = f"{workspace.bridge.name}, {counted(len(workspace.bridge.hangers), 'hanger')}"
     findings.append(ok("bridge.toml", described))
     findings += _found("disk", partial(check_disks, folder, workspace.settings))
     findings += _found("models", partial(check_models, workspace))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from shm.report.words import counted
 from shm.store import Stage
 from shm_daemon.doctor.contract import Examined, Finding, fault, ok, some, told, warning
 from shm_daemon.heartbeat import patience_s, seconds_since_beat
@@ -45,7 +46,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
     if not ages:
         yield ok("spool", "empty")
     else:
-        found = f"{len(ages)} file(s) wait, the oldest for {told(max(ages))}"
+        found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
         late = max(ages) > _WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
@@ -94,7 +95,7 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
     first, last = (_age(path, examined.now) for path in (reasons[0], reasons[-1]))
     yield warning(
         "quarantine",
-        f"{len(reasons)} file(s) since {told(first)}, the latest {told(last)} ago: "
+        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: "
         f"{_why(reasons[-1])}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
     )

@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from datetime import timedelta
 
+from shm.report.words import counted
 from shm.store.checking import quick_troubles
 from shm_daemon.doctor.contract import (
     Examined,
@@ -36,7 +37,9 @@ def check_store(examined: Examined) -> Iterator[Finding]:
     else:
         held = sum(store.stage_counts().values())
         kind = store.engine.dialect.name
-        yield ok("store", f"{store.location} ({kind}), present schema, {held} recording(s)")
+        yield ok(
+            "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
+        )
 
 
 def check_backup(examined: Examined) -> Iterator[Finding]:

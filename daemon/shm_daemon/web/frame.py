@@ -11,13 +11,14 @@ from typing import Any
 
 from fastapi import Request
 from fastapi.responses import HTMLResponse
-from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader
 
 import shm
 from shm.errors import ShmError
 from shm.report import words
 from shm.report.figures.style import PALETTE
 from shm.report.template import ENVIRONMENT as OF_REPORTS
+from shm.report.template import environment
 from shm_daemon.web.site import Site
 
 STATIC = Path(__file__).with_name("static")
@@ -97,18 +98,8 @@ def _checksum(name: str) -> str:
 def _environment() -> Environment:
     """Our templates; those of the reports stand behind `report/`."""
     assert OF_REPORTS.loader is not None
-    made = Environment(
-        loader=ChoiceLoader(
-            [
-                PackageLoader("shm_daemon.web", "templates"),
-                PrefixLoader({"report": OF_REPORTS.loader}),
-            ]
-        ),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    of_reports = PrefixLoader({"report": OF_REPORTS.loader})
+    made = environment(ChoiceLoader([PackageLoader("shm_daemon.web", "templates"), of_reports]))
     made.globals.update(
         asset=asset,
         moment=words.moment,
