@@ -31,11 +31,12 @@ def without_faint(
 ) -> FloatArray:
     """The probabilities (families,) with those of pairs given to the one effect that they lean on.
 
-    A fault of the law is the same in all tests: what differs from test to test is a cause.
+    A fault of the law is the same in all tests: what differs from test to test is a cause. To an
+    effect that was not worth a fit nothing is given: its law is not nearly right.
     """
     moved = chances.copy()
     plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
-    alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1}
+    alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
     for i in plain:
         leant_on = _leant_on(problem, baseline, kinds[i].best.fit)
         if leant_on in alone:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,10 @@ LARGE = PlantedEffect("sag", "everywhere, transverse", {"sag_parameter": 3.0})
 SWING = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.0005})
 
 
-def chances_of(second: PlantedEffect, variant: Variant) -> dict[str, float]:
+SMALL_VARIANT = Variant("everywhere, transverse", planes=(0,))
+
+
+def chances_of(second: PlantedEffect, variant: Variant, fit_first: bool = True) -> dict[str, float]:
     """Of the clamp, and of the clamp with a second cause, which has 0.9 before."""
     tests = campaign(HANGER_3, HangerState(711e3), [CLAMP, second], PLAN, np.random.default_rng(1))
     problem, rng = (
@@ -33,6 +38,8 @@ def chances_of(second: PlantedEffect, variant: Variant) -> dict[str, float]:
     clamp, other = ("point_mass", Variant()), (second.name, variant)
     fits = [fitted(problem, Hypothesis(effects), rng) for effects in ((clamp,), (clamp, other))]
     tried = [Tried.fitted(fit, len(baseline.z)) for fit in (baseline, *fits)]
+    if not fit_first:
+        tried[1] = replace(tried[1], fit=None)
     kinds = families(tried, {"point_mass": 1, second.name: 1})
     before = np.array([0.9 if kind.effects == 2 else 0.05 for kind in kinds])
     after = without_faint(problem, baseline, kinds, before)
@@ -41,14 +48,20 @@ def chances_of(second: PlantedEffect, variant: Variant) -> dict[str, float]:
 
 
 def test_a_faint_second_cause_is_for_the_most_part_the_law_of_the_first() -> None:
-    found = chances_of(SMALL, Variant("everywhere, transverse", planes=(0,)))
+    found = chances_of(SMALL, SMALL_VARIANT)
     assert found["point_mass + sag"] == pytest.approx(0.9 / (1 + LAW_TO_CAUSE))
     assert found["point_mass"] == pytest.approx(0.05 + 0.9 * LAW_TO_CAUSE / (1 + LAW_TO_CAUSE))
 
 
+def test_an_effect_that_was_not_worth_a_fit_gets_nothing() -> None:
+    found = chances_of(SMALL, SMALL_VARIANT, fit_first=False)
+    assert found["point_mass + sag"] == pytest.approx(0.9)
+    assert found["point_mass"] == pytest.approx(0.05)
+
+
 @pytest.mark.parametrize(
     ("second", "variant"),
-    [(LARGE, Variant("everywhere, transverse", planes=(0,))), (SWING, Variant())],
+    [(LARGE, SMALL_VARIANT), (SWING, Variant())],
 )
 def test_a_plain_second_cause_and_one_that_differs_from_test_to_test_stay(
     second: PlantedEffect, variant: Variant
