@@ -13,6 +13,7 @@ import rich_click as click
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
 from shm_cli.common import counting_bar, json_option, readable_width, show, show_table, table
+from shm_cli.writable import NewFile
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
@@ -193,7 +194,7 @@ def _say_solved(solved: SolvedRound, seal: Path) -> None:
 )
 @click.option(
     "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="FILE",
     help="Write a page with all figures here.",
 )

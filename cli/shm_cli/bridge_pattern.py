@@ -11,13 +11,14 @@ from shm.report import pattern_json
 from shm.report.bridge.tables import pattern_tables
 from shm.report.figures.bridge_shift import bridge_illustration
 from shm_cli.common import json_option, opened_store, paragraph, show, show_texts
+from shm_cli.writable import NewFile
 
 
 @click.command("bridge")
 @json_option
 @click.option(
     "--figure",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="FILE.png",
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )

@@ -10,6 +10,7 @@ from shm import export
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Posterior
 from shm_cli.common import hanger_option, json_option, opened_store, show, waiting
+from shm_cli.writable import NewFile
 
 
 @click.command()
@@ -26,7 +27,7 @@ from shm_cli.common import hanger_option, json_option, opened_store, show, waiti
 @click.option(
     "--out",
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="FILE.csv|.nc|.json|.npz",
     help="Where to write.",
 )

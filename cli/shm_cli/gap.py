@@ -38,6 +38,7 @@ from shm_cli.common import (
     tests_and_hanger,
 )
 from shm_cli.update import modes_argument
+from shm_cli.writable import NewFile
 
 _DEFAULT = GapOptions()
 
@@ -89,7 +90,7 @@ def command() -> None:
 @seed_option
 @click.option(
     "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="FILE",
     help="Write a page with all figures here.",
 )

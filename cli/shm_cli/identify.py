@@ -27,6 +27,7 @@ from shm_cli.common import (
     readable_width,
     show,
 )
+from shm_cli.writable import NewFile
 
 _DEFAULT = Settings()
 
@@ -103,13 +104,13 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="T.modes.json",
     help="Write the modal-tests document here.",
 )
 @click.option(
     "--html",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="SHEET.html",
     help="Write a page with all figures here; one test only.",
 )

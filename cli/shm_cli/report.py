@@ -20,6 +20,7 @@ from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
 from shm.report.period import Period, period_since
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
+from shm_cli.writable import NewFile
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 _DRAWN = ("html", "pdf")
@@ -62,7 +63,7 @@ _OF_TEST: _Writers = {
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=NewFile(),
     metavar="FILE",
     help="Write here instead of stdout.",
 )

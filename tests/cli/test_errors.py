@@ -110,9 +110,9 @@ def test_the_way_out_of_a_lost_store_works(shm: Shm, empty: Workspace, tmp_path:
 @pytest.mark.parametrize(
     "line",
     ["export --hanger 3 --out {}/e.npz", "report --hanger 3 --format json --out {}/r.json",
-     "report --bridge --format text --out {}/r.txt"],
+     "report --bridge --format text --out {}/r.txt", "gap diagnose --hanger 99 --html {}/g.html"],
 )  # fmt: skip
-def test_a_place_that_cannot_be_written_is_no_fault_of_ours(
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_done(
     shm: Shm, bridge: Workspace, tmp_path: Path, line: str
 ) -> None:
     nowhere = tmp_path / "no" / "such"
