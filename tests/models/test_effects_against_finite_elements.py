@@ -219,6 +219,29 @@ def test_a_bar_that_sags_as_it_bends_is_the_same_by_both(
     )
 
 
+def test_a_bar_sags_as_it_bends_between_ends_that_give_way(hanger: Hanger) -> None:
+    at, springs = "deck end, longitudinal", "translational_end_flexibility"
+    sag = planted(hanger, "sag", "everywhere, longitudinal", VALUES["sag"])
+    way = planted(hanger, springs, at, VALUES[springs])
+    assert_alike(*both(hanger, sag, way, law=1), frequency=1e-5, shape=1e-3)
+
+
+def test_a_light_support_carries_a_bar_that_sags_as_it_bends_like_a_spring(hanger: Hanger) -> None:
+    stiffness_n_m, mass_kg = 1e8, 0.1
+    support_hz = math.sqrt(stiffness_n_m / mass_kg) / (2 * math.pi)
+
+    def frequencies_hz(name: str, *values: float) -> FloatArray:
+        sag = replace(variant_of("sag", "everywhere, longitudinal", hanger), law=1)
+        way = variant_of(name, "deck end, longitudinal", hanger)
+        model = ComposedHanger(hanger, "beam1", [("sag", sag), (name, way)], PLACES)
+        theta = np.array([[1.05, *np.zeros(len(GLOBAL)), VALUES["sag"]["sag_parameter"], *values]])
+        return model.modes(theta, Conditions(), MODES).frequency_hz
+
+    spring = frequencies_hz("translational_end_flexibility", math.log10(stiffness_n_m))
+    support = frequencies_hz("support_motion", mass_kg, support_hz)
+    np.testing.assert_allclose(support, spring, rtol=1e-4)
+
+
 def test_end_springs_of_the_baseline_are_those_of_the_state(hanger: Hanger) -> None:
     assert_alike(
         *both(hanger, baseline="beam2", springs=(6.8, 7.3, 7.1, 6.6)), frequency=1e-5, shape=1e-3

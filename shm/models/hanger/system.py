@@ -50,10 +50,11 @@ def system(physical: PhysicalHanger, bar: Bar) -> System:
         stiffness, mass = _condensed(stiffness, mass, bar.hats)
     first, kept = _kept(physical, stiffness.shape[-1])
     stiffness, mass = _window(stiffness, first, kept), _window(mass, first, kept)
+    found = swings(physical, kept)
+    stiffness, mass = on_swings(stiffness, mass, found)
     if np.any(physical.sag_parameter):
         stiffness = stiffness + _sag(physical, bar, stiffness, kept)
-    found = swings(physical, kept)
-    return System(*on_swings(stiffness, mass, found), kept, found)
+    return System(stiffness, mass, kept, found)
 
 
 def _condensed(
@@ -105,16 +106,19 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
 
 
 def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArray) -> FloatArray:
-    """What a hanger that hangs in a curve adds to its stiffness (n, planes, kept, kept).
+    """What a hanger that hangs in a curve adds to its stiffness (n, planes, unknowns, unknowns).
 
     A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
     where it sags as it bends, the bar's own under its weight, as large as makes a motion by that
     very curve stretch both alike (Irvine 1981, 2.4 and 3.3).
     """
-    pull = np.broadcast_to(bar.area[:, None, kept], stiffness.shape[:3])
+    pull = np.zeros(stiffness.shape[:3])
+    pull[..., : len(kept)] = bar.area[:, None, kept]
     if physical.sags_as_it_bends:
-        rest = np.linalg.solve(stiffness, pull[..., None])[..., 0]
-        slope = np.einsum("npj,nij->npi", rest, bar.tension[:, kept[:, None], kept])
+        rest, slope = np.linalg.solve(stiffness, pull[..., None])[..., 0], np.zeros_like(pull)
+        slope[..., : len(kept)] = np.einsum(
+            "npj,nij->npi", rest[..., : len(kept)], bar.tension[:, kept[:, None], kept]
+        )
         alike = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
         pull = alike[..., None] * slope
     dyad = pull[..., :, None] * pull[..., None, :]
