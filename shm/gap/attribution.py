@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.chances import Family, Tried, families, probabilities
+from shm.gap.chances import Family, Tried, doubted, families, probabilities
 from shm.gap.contract import Fit
 from shm.gap.faint import without_faint
 from shm.gap.groups import SAME_BELOW, faces, grouped
@@ -122,7 +122,10 @@ def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     imitated = imitated_share(visible_shifts(search.scans), search.baseline, likeliest)
     chances, passing = probabilities(kinds, imitated)
     chances = without_faint(search.problem, search.baseline, kinds, chances)
-    return _attribution(search, tried, kinds, [float(chance) for chance in chances], passing)
+    p_value = search.p_value(likeliest)
+    chances, passing = doubted(kinds, chances, passing, p_value)
+    each = [float(chance) for chance in chances]
+    return _attribution(search, tried, kinds, each, passing, p_value)
 
 
 def _attribution(
@@ -131,6 +134,7 @@ def _attribution(
     kinds: Sequence[Family],
     chances: Sequence[float],
     passing: float,
+    p_value: float,
 ) -> Attribution:
     """`passing` is the probability of something unknown that passes for one of the effects."""
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
@@ -145,7 +149,7 @@ def _attribution(
         explanations=causes,
         groups=groups,
         invisible=search.invisible,
-        p_value=search.p_value(_fit([kind for kind in kinds if not kind.flexible])),
+        p_value=p_value,
         search=search,
         tried=tuple(tried),
     )

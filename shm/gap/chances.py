@@ -25,6 +25,9 @@ AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""
 
+LEAST_P_VALUE = 1e-4
+"""Of smaller ones no more is known than that they are small: tails are not that normal."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tried:
@@ -104,6 +107,31 @@ def probabilities(candidates: Sequence[Family], imitated: float = 0.0) -> tuple[
     passing = float(as_single + as_pair)
     whole = weight.sum() + passing
     return np.asarray(weight / whole), float(passing / whole)
+
+
+def misfit_odds(p_value: float) -> float:
+    """By how much a p-value raises the odds of something unknown, from 1.
+
+    Where the likeliest explanation is right, so small a p-value is that much rarer than where
+    something else is, at most: -1 / (e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55, 2001).
+    """
+    p = max(p_value, LEAST_P_VALUE)
+    return max(1.0, -1 / (np.e * p * np.log(p))) if p < 1 / np.e else 1.0
+
+
+def doubted(
+    candidates: Sequence[Family], chances: FloatArray, passing: float, p_value: float
+) -> tuple[FloatArray, float]:
+    """Chances (families,) and `passing`, once the likeliest explanation fits no better than that.
+
+    An effect that errs in its law may be given what it does not explain; the flexible remainder
+    pays for every form that it could take. So of a bad fit the evidence says too little.
+    """
+    unknown = np.array([each.flexible for each in candidates])
+    odds = misfit_odds(p_value)
+    weight, passing = chances * np.where(unknown, odds, 1.0), passing * odds
+    whole = float(weight.sum() + passing)
+    return np.asarray(weight / whole), passing / whole
 
 
 def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:

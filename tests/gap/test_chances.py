@@ -7,7 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.chances import NO_GAP, SINGLE, UNKNOWN, Tried, families, log_prior, probabilities
+from shm.gap.chances import (
+    NO_GAP,
+    SINGLE,
+    UNKNOWN,
+    Tried,
+    doubted,
+    families,
+    log_prior,
+    misfit_odds,
+    probabilities,
+)
 from shm.gap.contract import Hypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
@@ -80,3 +90,27 @@ def test_a_baseline_that_fits_by_an_unlikely_bar_fits_less_well() -> None:
     unlikely = replace(own, z=np.array([4.0]))
     assert Tried.fitted(unlikely, 1).log_fit == pytest.approx(Tried.fitted(own, 1).log_fit - 8.0)
     assert Tried.fitted(unlikely, 0).log_fit == pytest.approx(own.log_fit)
+
+
+def test_a_p_value_raises_the_odds_of_something_unknown_as_published() -> None:
+    # Sellke, Bayarri and Berger (2001), table 1: bounds on the odds for 0.05, 0.01 and 0.001.
+    assert 1 / misfit_odds(0.05) == pytest.approx(0.407, abs=5e-4)
+    assert 1 / misfit_odds(0.01) == pytest.approx(0.125, abs=5e-4)
+    assert 1 / misfit_odds(0.001) == pytest.approx(0.0188, abs=5e-5)
+    assert misfit_odds(0.5) == misfit_odds(1.0) == 1
+    assert misfit_odds(0.0) == misfit_odds(1e-9) < 1000
+
+
+def test_of_a_bad_fit_something_unknown_gains_and_of_a_good_one_nothing_changes() -> None:
+    tried = [_tried(0.0), _tried(9.0, "a"), _tried(8.0, "b"), _tried(7.0, flexible=True)]
+    kinds = families(tried, {"a": 1, "b": 1})
+    before, passing = probabilities(kinds, 0.3)
+    same, passes = doubted(kinds, before, passing, 0.6)
+    assert (*same, passes) == pytest.approx((*before, passing))
+    after, passes = doubted(kinds, before, passing, 0.001)
+    assert after.sum() + passes == pytest.approx(1.0)
+    a, unknown = (next(i for i, k in enumerate(kinds) if k.name == n and k.flexible == f)
+                  for n, f in (("a", False), ("", True)))  # fmt: skip
+    odds = misfit_odds(0.001)
+    assert after[unknown] / after[a] == pytest.approx(odds * before[unknown] / before[a])
+    assert passes / after[a] == pytest.approx(odds * passing / before[a])
