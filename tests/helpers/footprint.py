@@ -23,7 +23,7 @@ class Trend:
         return self.rise > max(negligible * self.level, 2 * self.rise_sd)
 
     def __str__(self) -> str:
-        return f"{self.level:.1f}, {self.rise:+.2f} ± {self.rise_sd:.2f} from first to last"
+        return f"{self.level:.1f}, {self.rise:+z.2f} ± {self.rise_sd:.2f} from first to last"
 
 
 def trend(values: Sequence[float]) -> Trend:
