@@ -165,9 +165,9 @@ def queue(folder: Path, model: str, kind: str, options: argparse.Namespace) -> s
 
 def latency(folder: Path, model: str, kind: str, options: argparse.Namespace) -> str:
     """Drops the files that call an alert, one after the other; a row of the table."""
-    told = folder / f"told-{model}-{kind}"
-    told.mkdir()
-    hook = ["sh", "-c", f"cat > {told}/.$$ && mv {told}/.$$ {told}/$$"]
+    heard = folder / f"told-{model}-{kind}"
+    heard.mkdir()
+    hook = ["sh", "-c", f"cat > {heard}/.$$ && mv {heard}/.$$ {heard}/$$"]
     workspace = bridge(
         folder / f"alerts-{model}-{kind}", model, options.alerts, hooks={"ops": hook}
     )
@@ -181,22 +181,28 @@ def latency(folder: Path, model: str, kind: str, options: argparse.Namespace) ->
             ending, content = KINDS[kind](hanger, options.seed, 2, START + timedelta(hours=2), LOST)
             complete = time.time()
             put(workspace.spool / f"h{hanger.id}{ending}", content)
-            waits.append(heard_of(hanger.id, told) - complete)
+            waits.append(heard_of(hanger.id, heard) - complete)
     middle, late = np.percentile(waits, [50, 99])
     return f"| {len(waits)} alerts by {kind}, {model} | {middle:.1f} | {late:.1f} |"
 
 
-def heard_of(hanger: int, told: Path) -> float:
+def heard_of(hanger: int, folder: Path) -> float:
     """When the hook had the alert of a hanger."""
     end = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < end:
-        for path in (each for each in told.iterdir() if not each.name.startswith(".")):
+        for path in (each for each in folder.iterdir() if not each.name.startswith(".")):
             heard, at = json.loads(path.read_text())["hanger"], path.stat().st_mtime
             path.unlink()
             if heard == hanger:
                 return at
         time.sleep(0.05)
     raise SystemExit(f"no alert of hanger {hanger} within {LONGEST_WAIT_S:.0f} s")
+
+
+def told(row: str) -> str:
+    """The row, told at once: all of them take hours."""
+    print(row, file=sys.stderr, flush=True)
+    return row
 
 
 def main() -> None:
@@ -216,9 +222,9 @@ def main() -> None:
     ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        lines += [queue(folder, model, kind, options) for model, kind in cases if options.queue]
+        lines += [told(queue(folder, *case, options)) for case in cases if options.queue]
         lines += ["", "| | median, s | 99 %, s |", "|---|---|---|"]
-        lines += [latency(folder, model, kind, options) for model, kind in cases if options.alerts]
+        lines += [told(latency(folder, *case, options)) for case in cases if options.alerts]
     text = "\n".join(lines)
     print(text)
     if options.write_docs:
