@@ -16,6 +16,7 @@ from shm.models import competing_names
 from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import identify_lineage, update_terms
 from shm.pipeline.watching import to_watch
+from shm.resources import give_back_memory
 from shm.store import (
     Delivery,
     IdentifiedTest,
@@ -42,7 +43,10 @@ class DeliveryRefused(ShmError):
 
 def run_step(name: str, *arguments: Any) -> Any:
     """Runs a step of `shm.pipeline.steps`, which is imported in the process that computes."""
-    return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
+    try:
+        return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
+    finally:
+        give_back_memory()
 
 
 @dataclass(frozen=True)
