@@ -32,5 +32,9 @@ def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
     return [
         (attribution.no_gap_probability, attribution.baseline),
         (attribution.unexplained_probability, attribution.unexplained),
-        *((each.probability, each.best.fit) for each in attribution.explanations if each.best.fit),
+        *(
+            (each.probability, each.best.posterior)
+            for each in attribution.explanations
+            if each.best.posterior
+        ),
     ]

@@ -11,7 +11,6 @@ from shm.gap.chances import Family, Tried, doubted, families, probabilities
 from shm.gap.contract import Fit
 from shm.gap.faint import without_faint
 from shm.gap.groups import SAME_BELOW, faces, grouped
-from shm.gap.imitation import imitated_share, visible_shifts
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
@@ -108,19 +107,19 @@ def attributed(
 
 
 def more_thorough(found: Attribution) -> Attribution:
-    """The attribution gone on with: pairs of many more effects are fitted."""
-    search, tried = found.search, list(found.tried)
-    if not search.calls_for_pairs(tried):
-        return found
-    return _weighed(search, search.with_many_pairs(tried))
+    """The attribution gone on with: every effect and pairs of many more are fitted."""
+    search = found.search
+    tried = search.with_every_effect(list(found.tried))
+    if search.calls_for_pairs(tried):
+        tried = search.with_many_pairs(tried)
+    return _weighed(search, tried)
 
 
 def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
-    imitated = imitated_share(visible_shifts(search.scans), search.baseline, likeliest)
-    chances, passing = probabilities(kinds, imitated)
+    chances, passing = probabilities(kinds)
     chances = without_faint(search.problem, search.baseline, kinds, chances)
     p_value = search.p_value(likeliest)
     chances, passing = doubted(kinds, chances, passing, p_value)

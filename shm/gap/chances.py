@@ -8,7 +8,7 @@ an effect does not become likelier by being tried in more places (Scott and Berg
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -25,6 +25,11 @@ AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""
 
+PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.1
+PASSES_FOR_NONE = 1 - PASSES_FOR_ONE - PASSES_FOR_PAIR
+"""Of what is not in the catalogue so much does to data about what one of its effects does, or two,
+or resembles nothing in it: as effects do that are left out of the catalogue, in blind trials."""
+
 LEAST_P_VALUE = 1e-4
 """Of smaller ones no more is known than that they are small: tails are not that normal."""
 
@@ -33,6 +38,8 @@ LEAST_P_VALUE = 1e-4
 class Tried:
     """A hypothesis with its evidence; `fit` is None where screening was enough.
 
+    `log_passing` is the log evidence of something unknown that passes for its effects, None where
+    their laws were not looked at. `draws` (n, d) are of the posterior by all laws.
     `log_fit` is the log likelihood at its best, less what the baseline's own parameters and the
     bar's deviations pay there for lying off their priors: a baseline that fits by an unlikely bar
     fits less well.
@@ -42,6 +49,15 @@ class Tried:
     log_evidence: float
     log_fit: float
     fit: Fit | None = None
+    log_passing: float | None = None
+    draws: FloatArray | None = None
+
+    @property
+    def posterior(self) -> Fit | None:
+        """The fit by all laws of its effects: what it says of parameters."""
+        if self.fit is None or self.draws is None:
+            return self.fit
+        return replace(self.fit, draws=self.draws)
 
     @property
     def method(self) -> Method:
@@ -56,11 +72,15 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """What was tried of one effect, or one pair, wherever it may act, the best first."""
+    """What was tried of one effect, or one pair, wherever it may act, the best first.
+
+    `log_passing` is the log evidence of something unknown that passes for it.
+    """
 
     name: str
     tried: tuple[Tried, ...]
     log_evidence: float
+    log_passing: float
     log_prior: float
 
     @property
@@ -90,23 +110,30 @@ def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, 
     return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
 
 
-def probabilities(candidates: Sequence[Family], imitated: float = 0.0) -> tuple[FloatArray, float]:
-    """Of each family, (families,), and of something unknown that passes for one of the effects.
+def probabilities(candidates: Sequence[Family]) -> tuple[FloatArray, float]:
+    """Of each family, (families,), and of something unknown that passes for one of them.
 
-    All add to 1. The share `imitated` of what is unknown does to the data what a single effect
-    does, any of them as likely; of the rest the same share does what a pair does, and what is left
-    is as free as the flexible remainder.
+    All add to 1.
     """
-    log = np.array([each.log_evidence + each.log_prior for each in candidates])
-    flexible = np.array([each.flexible for each in candidates])
-    effects = np.where(flexible, 0, [each.effects for each in candidates])
-    free = 1 - imitated
-    weight = np.exp(log - log.max()) * np.where(flexible, free**2, 1.0)
-    as_single = imitated * UNKNOWN / SINGLE * weight[effects == 1].sum()
-    as_pair = free * imitated * UNKNOWN / PAIR * weight[effects == 2].sum()
-    passing = float(as_single + as_pair)
-    whole = weight.sum() + passing
-    return np.asarray(weight / whole), float(passing / whole)
+    evidence, passing, prior = (
+        np.array([getattr(each, name) for each in candidates])
+        for name in ("log_evidence", "log_passing", "log_prior")
+    )
+    share = np.array([_passing_share(each) for each in candidates])
+    kept = np.array([PASSES_FOR_NONE if each.flexible else 1.0 for each in candidates])
+    top = float((evidence + prior).max())
+    weight = kept * np.exp(evidence + prior - top)
+    unknown = float(np.sum(share * np.exp(passing + prior - top)))
+    whole = weight.sum() + unknown
+    return np.asarray(weight / whole), unknown / whole
+
+
+def _passing_share(family: Family) -> float:
+    """How often something unknown passes for a family, to how often it is that."""
+    if family.flexible or family.effects == 0:
+        return 0.0
+    single = family.effects == 1
+    return PASSES_FOR_ONE * UNKNOWN / SINGLE if single else PASSES_FOR_PAIR * UNKNOWN / PAIR
 
 
 def misfit_odds(p_value: float) -> float:
@@ -144,9 +171,13 @@ def _family(members: Sequence[Tried], variants: dict[str, int]) -> Family:
     ordered = tuple(sorted(members, key=lambda each: -each.log_evidence))
     hypothesis = ordered[0].hypothesis
     possible = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
-    log_evidence = logsumexp([each.log_evidence for each in ordered]) - np.log(possible)
+    evidence = [each.log_evidence for each in ordered]
+    passing = [e.log_evidence if e.log_passing is None else e.log_passing for e in ordered]
+    log_evidence, log_passing = (
+        float(logsumexp(each) - np.log(possible)) for each in (evidence, passing)
+    )
     log_prior = float(np.log(_prior(hypothesis, len(variants))))
-    return Family(hypothesis.name, ordered, float(log_evidence), log_prior)
+    return Family(hypothesis.name, ordered, log_evidence, log_passing, log_prior)
 
 
 def _prior(hypothesis: Hypothesis, effects: int) -> float:

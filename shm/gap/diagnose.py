@@ -112,7 +112,7 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
         log_bayes_factor=explanation.log_bayes_factor,
         log_fit=explanation.log_fit,
         log_occam=explanation.log_occam,
-        parameters=_estimates(problem, best.fit) if best.fit else (),
+        parameters=_estimates(problem, best.posterior) if best.posterior else (),
         method=best.method,
         group=explanation.group,
         also_at=tuple(

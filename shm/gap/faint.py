@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.gap.chances import Family
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.imitation import beyond
+from shm.gap.contract import Fit, Hypothesis, NoiseNode
+from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray
@@ -68,4 +68,13 @@ def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
     z = np.concatenate([fit.z[:own], fit.z[first:]]) if index == 0 else fit.z[:first]
     shift = fit.predicted - problem.predict(other, z[None])[0]
     least = min(problem.likelihood(Hypothesis()).nodes, key=lambda node: node.model_error)
-    return float(np.sqrt(max(beyond(shift[None], baseline, least)[0, 0], 0.0)))
+    return float(np.sqrt(max(_beyond(shift, baseline, least), 0.0)))
+
+
+def _beyond(shift: FloatArray, baseline: Fit, errors: NoiseNode) -> float:
+    """The square of a shift (data,), in standard deviations, beyond what the baseline's parameters
+    can follow."""
+    columns = np.column_stack([baseline.slopes, shift])[None]
+    products = Likelihood([errors]).gram(columns)[0, 0]
+    inner, outer = products[:-1, :-1] + np.eye(len(baseline.z)), products[:-1, -1]
+    return float(products[-1, -1] - outer @ np.linalg.solve(inner, outer))

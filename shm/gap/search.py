@@ -12,7 +12,7 @@ from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.hypotheses import hypotheses, invisible
-from shm.gap.laws import by_its_laws, otherwise
+from shm.gap.laws import by_its_laws, mixed, otherwise
 from shm.gap.options import GapOptions, Progress
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
@@ -94,6 +94,17 @@ class Search:
         chosen = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
         return self._with_fitted_pairs(tried, scans, chosen)
 
+    def with_every_effect(self, tried: list[Tried]) -> list[Tried]:
+        """Adds fits of the effects that screening had given up, each where it was likeliest there.
+
+        Of an effect so large that the baseline goes along far, the linear scan says too little.
+        """
+        given_up = [family.best for family in self._singles(tried) if family.best.fit is None]
+        fits = self._fitted(self.scans, given_up, 0.6, 0.7)
+        return [each for each in tried if each.hypothesis not in fits] + [
+            self._tried(fit) for fit in fits.values()
+        ]
+
     def with_many_pairs(self, tried: list[Tried]) -> list[Tried]:
         """Adds pairs of all kinds, fitted.
 
@@ -159,8 +170,10 @@ class Search:
 
     def leaders(self, tried: Sequence[Tried], most: int = LEADERS) -> list[Family]:
         """The likeliest families of one effect."""
-        singles = [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
-        return singles[:most]
+        return self._singles(tried)[:most]
+
+    def _singles(self, tried: Sequence[Tried]) -> list[Family]:
+        return [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
 
     def _hopeful(
         self,
@@ -219,12 +232,14 @@ class Search:
         fits = [tried.fit, *(self._by_other_laws(tried.fit) if anew else ())]
         share = np.array([1.0, *(1 / len(fits[1:]) for _ in fits[1:])])
         found = [by_its_laws(self.problem, self.baseline, fit, self.rng) for fit in fits]
-        log = np.array(
-            [fit.log_evidence + gain for fit, (gain, _) in zip(fits, found, strict=True)]
+        plain = np.log(share / share.sum()) + [fit.log_evidence for fit in fits]
+        log = plain + [each.gain for each in found]
+        return replace(
+            self._tried(found[int(log.argmax())].fit),
+            log_evidence=float(logsumexp(log)),
+            log_passing=float(logsumexp(plain + [each.passing for each in found])),
+            draws=mixed([each.draws for each in found], log, self.rng),
         )
-        best = found[int(log.argmax())][1]
-        log_evidence = float(logsumexp(log, b=share / share.sum()))
-        return replace(self._tried(best), log_evidence=log_evidence)
 
     def _by_other_laws(self, fit: Fit) -> list[Fit]:
         self._tell(f"other laws of {fit.hypothesis.name}", 0.95)

@@ -9,6 +9,7 @@ import pytest
 
 from shm.gap.chances import (
     NO_GAP,
+    PASSES_FOR_ONE,
     SINGLE,
     UNKNOWN,
     Tried,
@@ -32,7 +33,8 @@ def _tried(
 
 def test_probabilities_add_to_one() -> None:
     tried = [_tried(0.0), _tried(1.0, "a"), _tried(3.0, "b"), _tried(2.0, flexible=True)]
-    assert probabilities(families(tried, {"a": 1, "b": 1}))[0].sum() == pytest.approx(1.0)
+    chances, passing = probabilities(families(tried, {"a": 1, "b": 1}))
+    assert chances.sum() + passing == pytest.approx(1.0)
 
 
 def test_an_effect_does_not_gain_by_having_more_variants() -> None:
@@ -61,11 +63,19 @@ def test_with_evidence_for_nothing_the_priors_stand() -> None:
 
 
 def test_what_is_unknown_may_pass_for_an_effect() -> None:
-    tried = [_tried(0.0), _tried(30.0, "a"), _tried(0.0, "b"), _tried(20.0, flexible=True)]
-    kinds = families(tried, {"a": 1, "b": 1})
-    chances, passing = probabilities(kinds, 0.6)
+    tried = [_tried(0.0), _tried(30.0, "a"), _tried(0.0, "b"), _tried(0.0, flexible=True)]
+    chances, passing = probabilities(families(tried, {"a": 1, "b": 1}))
     assert chances.sum() + passing == pytest.approx(1.0)
-    assert passing / chances[0] == pytest.approx(0.6 * UNKNOWN / SINGLE, rel=1e-6)
+    assert passing / chances[0] == pytest.approx(PASSES_FOR_ONE * UNKNOWN / SINGLE, rel=1e-6)
+
+
+def test_the_further_an_effect_is_off_its_law_the_likelier_something_unknown_passes_for_it() -> (
+    None
+):
+    off = [_tried(0.0), replace(_tried(30.0, "a"), log_passing=32.0)]
+    near = [_tried(0.0), replace(_tried(30.0, "a"), log_passing=29.0)]
+    (_, far_off), (_, hardly_off) = (probabilities(families(t, {"a": 1})) for t in (off, near))
+    assert far_off > 5 * hardly_off
 
 
 def test_something_unknown_beside_a_cause_is_rarer_than_a_second_cause_and_than_it_alone() -> None:
@@ -104,7 +114,7 @@ def test_a_p_value_raises_the_odds_of_something_unknown_as_published() -> None:
 def test_of_a_bad_fit_something_unknown_gains_and_of_a_good_one_nothing_changes() -> None:
     tried = [_tried(0.0), _tried(9.0, "a"), _tried(8.0, "b"), _tried(7.0, flexible=True)]
     kinds = families(tried, {"a": 1, "b": 1})
-    before, passing = probabilities(kinds, 0.3)
+    before, passing = probabilities(kinds)
     same, passes = doubted(kinds, before, passing, 0.6)
     assert (*same, passes) == pytest.approx((*before, passing))
     after, passes = doubted(kinds, before, passing, 0.001)

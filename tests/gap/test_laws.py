@@ -6,15 +6,17 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import EXACT, by_its_laws
+from shm.gap.laws import EXACT, FRACTIONS, FRACTIONS_ON_THE_WHOLE, ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.simulate.reality import Reality
+from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
 
 WORN = PlantedEffect("section_loss", "everywhere", {"loss": 0.3, "x_m": 4.0, "extent_m": 2.0})
@@ -22,8 +24,8 @@ TENSION_N = 711e3
 
 
 @cache
-def _gain(effect: str, own_laws: bool) -> tuple[float, Fit, Fit, GapProblem]:
-    """What allowing for its law gains a fit of `effect` to worn bars, the fit then and before."""
+def _by_laws(effect: str, own_laws: bool) -> tuple[ByLaws, Fit, GapProblem]:
+    """A fit of `effect` to worn bars, by its laws and before, and the problem."""
     plan = CampaignPlan(
         modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
     )
@@ -33,41 +35,58 @@ def _gain(effect: str, own_laws: bool) -> tuple[float, Fit, Fit, GapProblem]:
     baseline = baseline_fit(problem, rng)
     (variant, *_) = EFFECTS[effect].variants(HANGER_3, problem.design.survey)
     before = fitted(problem, Hypothesis(((effect, variant),)), rng)
-    gain, after = by_its_laws(problem, baseline, before, rng)
-    return gain, after, before, problem
+    return by_its_laws(problem, baseline, before, rng), before, problem
 
 
-def _off(problem: GapProblem, fit: Fit) -> float:
+def _off(problem: GapProblem, fit: Fit, draws: FloatArray) -> float:
     """How far its loss is off the planted one, in standard deviations."""
     own = problem.names(fit.hypothesis).index("loss")
-    loss = problem.theta(fit.hypothesis, fit.draws)[:, own]
+    loss = problem.theta(fit.hypothesis, draws)[:, own]
     return float(abs(loss.mean() - WORN.values["loss"]) / loss.std())
 
 
 def test_corrosion_without_edges_is_still_corrosion_and_its_size_is_right() -> None:
-    gain, after, before, problem = _gain("section_loss", True)
-    assert gain > 20
-    assert after.log_fit > before.log_fit + 20
-    assert _off(problem, after) < 3 < _off(problem, before)
+    found, before, problem = _by_laws("section_loss", True)
+    assert found.gain > 20
+    assert found.fit.log_fit > before.log_fit + 20
+    assert _off(problem, before, found.draws) < 3 < _off(problem, before, before.draws)
+
+
+def test_the_fit_by_a_law_that_is_off_has_draws_of_its_own() -> None:
+    found, _, _ = _by_laws("section_loss", True)
+    sd = np.sqrt(np.diag(found.fit.covariance))
+    assert np.all(abs(found.fit.draws.mean(axis=0) - found.fit.z) < 0.3 * sd)
+    assert found.fit.draws.std(axis=0) == pytest.approx(sd, rel=0.2)
 
 
 def test_an_exact_law_pays_little_for_the_allowance() -> None:
-    gain, after, before, _ = _gain("section_loss", False)
-    assert np.log(EXACT) <= gain < 1.0
-    assert after is before
+    found, before, _ = _by_laws("section_loss", False)
+    assert np.log(EXACT.own) <= found.gain < 1.0
+    assert found.fit is before
+
+
+def test_shares_of_laws_add_to_one() -> None:
+    for shares in zip(EXACT, *FRACTIONS.values(), *FRACTIONS_ON_THE_WHOLE.values(), strict=True):
+        assert sum(shares) == pytest.approx(1.0)
+
+
+def test_what_is_exactly_an_effect_hardly_is_something_unknown_that_passes_for_it() -> None:
+    exact, *_ = _by_laws("section_loss", False)
+    wrong, *_ = _by_laws("point_mass", True)
+    assert exact.passing < exact.gain - 0.5
+    assert wrong.passing > wrong.gain + 0.5
 
 
 def test_another_effect_is_not_excused_by_its_laws() -> None:
     """A mass in place of the corrosion: what it does not do, no law of it does."""
-    _, _, right, _ = _gain("section_loss", True)
-    wrong_gain, _, wrong, _ = _gain("point_mass", True)
-    right_gain, *_ = _gain("section_loss", True)
-    assert wrong.log_evidence + wrong_gain < right.log_evidence + right_gain - 20
+    right, corrosion, _ = _by_laws("section_loss", True)
+    wrong, mass, _ = _by_laws("point_mass", True)
+    assert mass.log_evidence + wrong.gain < corrosion.log_evidence + right.gain - 20
 
 
 def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
     """Modes that the catalogue leaves alone move as much as the others, by a tenth of these."""
-    _, _, fit, problem = _gain("section_loss", False)
+    _, fit, problem = _by_laws("section_loss", False)
     rng = np.random.default_rng(1)
     baseline, count = baseline_fit(problem, rng), problem.design.frequencies
     typical = np.sqrt(np.mean((fit.predicted - baseline.predicted)[:count] ** 2))
@@ -76,5 +95,5 @@ def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
         away = problem.observations.value.copy()
         away[:count] += 0.2 * typical * rng.standard_normal(count)
         moved = GapProblem(HANGER_3, "beam1", replace(problem.observations, value=away))
-        gains.append(by_its_laws(moved, baseline, fit, rng)[0])
+        gains.append(by_its_laws(moved, baseline, fit, rng).gain)
     assert np.median(gains) > 50

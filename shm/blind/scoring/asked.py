@@ -88,13 +88,13 @@ _UNKNOWN_CAUSE = (
 _CALIBRATED = (
     Question(
         "calibration error", everything, _LEADING, calibration.corrected,
-        overall=at_most(0.06), each=every(at_most(0.06)), better=-1, above=LARGE,
+        overall=at_most(0.06), each=every(at_most(0.06)), better=-1,
     ),
+    Question("calibration error as counted", everything, _LEADING, calibration.counted),
+    Question("calibration error by chance", everything, _LEADING, calibration.by_chance),
     Question(
-        "calibration error as counted", everything, _LEADING, calibration.counted, above=LARGE
-    ),
-    Question(
-        "calibration error by chance", everything, _LEADING, calibration.by_chance, above=LARGE
+        "calibration error above size four", everything, _LEADING, calibration.corrected,
+        above=LARGE,
     ),
     Question(
         "log score", everything, mixed(log_score), weighed_mean,

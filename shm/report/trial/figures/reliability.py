@@ -41,9 +41,8 @@ def _caption(score: TrialScore) -> str:
         )
     )  # fmt: skip
     told = (
-        f" Expected calibration error of sizes above 4 {value(error.score)}; as counted "
-        f"{value(counted.score)}, of which chance alone gives {value(chance.score)} with so many "
-        "cases."
+        f" Expected calibration error {value(error.score)}; as counted {value(counted.score)}, of "
+        f"which chance alone gives {value(chance.score)} with so many cases."
         if error and counted and chance
         else ""
     )
