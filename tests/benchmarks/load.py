@@ -7,8 +7,8 @@ A queue lies in the spool when it begins: simulated hammer tests as the logger w
 hits, 25 s, four accelerations, CSV), or tests whose modes are known already (`*.modes.json`).
 
 Then, with settings as they come, one file at a time is dropped of a hanger that has lost a fifth of
-its tension, such that it calls the alert. The time is taken from the renaming of the whole file
-until a program has the alert.
+its tension, until one calls the alert: the second since as a rule. The time is taken from the
+renaming of that file, which is whole, until a program has the alert.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ PLAN = HammerPlan(hits=3, seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
 ORDERS, FREQUENCY_SD = 6, 3e-4
 LOST = 0.8
 RECORDINGS_OF_A_HANGER = 2
-LONGEST_WAIT_S = 600.0
+LONGEST_WAIT_S, MOST_FILES = 60.0, 3
 Content = tuple[str, str]
 """The end of a file's name and what is in the file."""
 
@@ -178,16 +178,25 @@ def latency(folder: Path, model: str, kind: str, options: argparse.Namespace) ->
         until_done(workspace, 2 * options.alerts, daemon.pid)
         for hanger in workspace.bridge.hangers:
             time.sleep(rng.uniform(1.0, 5.0))
-            ending, content = KINDS[kind](hanger, options.seed, 2, START + timedelta(hours=2), LOST)
-            complete = time.time()
-            put(workspace.spool / f"h{hanger.id}{ending}", content)
-            waits.append(heard_of(hanger.id, heard) - complete)
+            waits.append(called(workspace, hanger, KINDS[kind], options.seed, heard))
     middle, late = np.percentile(waits, [50, 99])
     return f"| {len(waits)} alerts by {kind}, {model} | {middle:.1f} | {late:.1f} |"
 
 
-def heard_of(hanger: int, folder: Path) -> float:
-    """When the hook had the alert of a hanger."""
+def called(workspace: Workspace, hanger: Hanger, kind: Kind, seed: int, folder: Path) -> float:
+    """How long after the file that calls it the hook has the alert of a hanger."""
+    for number in range(2, 2 + MOST_FILES):
+        ending, content = kind(hanger, seed, number, START + timedelta(hours=number), LOST)
+        complete = time.time()
+        put(workspace.spool / f"h{hanger.id}-{number}{ending}", content)
+        heard = heard_of(hanger.id, folder)
+        if heard is not None:
+            return heard - complete
+    raise SystemExit(f"{MOST_FILES} files of hanger {hanger.id} call no alert")
+
+
+def heard_of(hanger: int, folder: Path) -> float | None:
+    """When the hook had the alert of a hanger; None where it has had none for long."""
     end = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < end:
         for path in (each for each in folder.iterdir() if not each.name.startswith(".")):
@@ -196,7 +205,7 @@ def heard_of(hanger: int, folder: Path) -> float:
             if heard == hanger:
                 return at
         time.sleep(0.05)
-    raise SystemExit(f"no alert of hanger {hanger} within {LONGEST_WAIT_S:.0f} s")
+    return None
 
 
 def told(row: str) -> str:
