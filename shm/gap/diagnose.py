@@ -10,6 +10,7 @@ import numpy as np
 from shm.gap.answer import answered, possible
 from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
+from shm.gap.laws import mixed
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions, Progress, silent
@@ -151,9 +152,7 @@ def _tension(
         return TensionEstimate(NAN, NAN, NAN, NAN)
     weight = np.array([weight for weight, _ in fits])
     draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in fits]
-    counts = rng.multinomial(len(draws[0]), weight / weight.sum())
-    mixed = [rng.choice(each, count) for each, count in zip(draws, counts, strict=True)]
-    samples = np.concatenate(mixed)
+    samples = mixed(draws, weight, rng)
     low, high = (float(each) for each in np.quantile(samples, [0.025, 0.975]))
     return TensionEstimate(*_summary(samples), low, high)
 

@@ -103,7 +103,7 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
         gain=float(logsumexp(weight) - exact.log_evidence),
         passing=float(logsumexp(passing) - exact.log_evidence),
         fit=fit,
-        draws=mixed([fit.draws, *draws], weight, rng),
+        draws=mixed([fit.draws, *draws], normalised(weight), rng),
     )
     if logsumexp(weight[1:]) < weight[0] + SHOWN:
         return found
@@ -111,12 +111,11 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
     return replace(found, fit=_moved(problem, fit, off[best], others, draws[best]))
 
 
-def mixed(
-    draws: Sequence[FloatArray], log_weight: FloatArray, rng: np.random.Generator
-) -> FloatArray:
-    """As many draws (n, d) as the first of several has, taken from all by their weights (k,)."""
-    counts = rng.multinomial(len(draws[0]), normalised(log_weight))
-    return np.vstack([rng.choice(each, count) for each, count in zip(draws, counts, strict=True)])
+def mixed(draws: Sequence[FloatArray], weight: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """As many draws (n, ...) as the first of several has, taken from all by their weights (k,)."""
+    counts = rng.multinomial(len(draws[0]), weight / weight.sum())
+    chosen = [rng.choice(each, count) for each, count in zip(draws, counts, strict=True)]
+    return np.concatenate(chosen)
 
 
 def _changes(problem: GapProblem, fit: Fit) -> FloatArray:

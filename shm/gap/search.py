@@ -26,6 +26,7 @@ from shm.gap.screening import (
     varied,
 )
 from shm.gap.sensitivity import Scan
+from shm.update.tmcmc import normalised
 
 SAMPLED_WITHIN = 4.0
 MOST_FITS = 30
@@ -238,7 +239,7 @@ class Search:
             self._tried(found[int(log.argmax())].fit),
             log_evidence=float(logsumexp(log)),
             log_passing=float(logsumexp(plain + [each.passing for each in found])),
-            draws=mixed([each.draws for each in found], log, self.rng),
+            draws=mixed([each.draws for each in found], normalised(log), self.rng),
         )
 
     def _by_other_laws(self, fit: Fit) -> list[Fit]:
