@@ -107,12 +107,18 @@ def attributed(
 
 
 def more_thorough(found: Attribution) -> Attribution:
-    """The attribution gone on with: every effect and pairs of many more are fitted."""
-    search = found.search
-    tried = search.with_every_effect(list(found.tried))
-    if search.calls_for_pairs(tried):
-        tried = search.with_many_pairs(tried)
-    return _weighed(search, tried)
+    """The attribution gone on with where something unknown leads, or a pair.
+
+    Every effect and pairs of many are fitted, or other pairs of either effect.
+    """
+    search, tried = found.search, list(found.tried)
+    if found.leads == "unexplained":
+        tried = search.with_every_effect(tried)
+        if search.calls_for_pairs(tried):
+            tried = search.with_many_pairs(tried)
+    elif found.leading is None or " + " not in found.leading.effect:
+        return found
+    return _weighed(search, search.with_other_pairs(tried))
 
 
 def _weighed(search: Search, tried: list[Tried]) -> Attribution:

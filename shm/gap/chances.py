@@ -25,7 +25,7 @@ AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""
 
-PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.1
+PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.15
 PASSES_FOR_NONE = 1 - PASSES_FOR_ONE - PASSES_FOR_PAIR
 """Of what is not in the catalogue so much does to data about what one of its effects does, or two,
 or resembles nothing in it: as effects do that are left out of the catalogue, in blind trials."""

@@ -19,7 +19,7 @@ from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray
 
-FAINT = 0.2
+FAINT = 0.075
 """A second cause is faint that moves the data by less than this share of what the first does."""
 LAW_TO_CAUSE = 5.0
 """Odds that a faint second cause is the first one's law. Every other large effect is off by so much

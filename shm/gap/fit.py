@@ -17,6 +17,7 @@ from shm.gap.contract import Fit, Hypothesis, Peak
 from shm.gap.coordinates import is_place
 from shm.gap.descent import Optimum, optima
 from shm.gap.landscape import Landscape
+from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.gap.sensitivity import scan
 from shm.values import FloatArray
@@ -35,13 +36,15 @@ def fitted(
     hypothesis: Hypothesis,
     rng: np.random.Generator,
     starts: FloatArray | None = None,
+    likelihood: Likelihood | None = None,
 ) -> Fit:
     """The fit of `hypothesis` from `starts` z (n, d), or from where a scan of its effects leads.
 
-    The scan stands on the baseline's own fit, which the problem keeps. `draws` are those of the
+    The scan stands on the baseline's own fit, which the problem keeps. `likelihood` is the
+    problem's own unless another is given. `draws` are those of the
     normal approximation. Raises BadInput where no start can be predicted.
     """
-    landscape = Landscape(problem, hypothesis)
+    landscape = Landscape(problem, hypothesis, likelihood)
     z = _starts(problem, hypothesis, rng) if starts is None else starts
     found = optima(landscape, z)
     if not found:

@@ -8,6 +8,7 @@ import numpy as np
 
 from shm.gap.contract import Hypothesis
 from shm.gap.coordinates import Branch
+from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.values import BoolArray, FloatArray
 
@@ -45,12 +46,14 @@ class Views:
 
 
 class Landscape:
-    """The posterior of a hypothesis."""
+    """The posterior of a hypothesis, by the problem's own likelihood or by another one."""
 
-    def __init__(self, problem: GapProblem, hypothesis: Hypothesis):
+    def __init__(
+        self, problem: GapProblem, hypothesis: Hypothesis, likelihood: Likelihood | None = None
+    ):
         self.problem = problem
         self.hypothesis = hypothesis
-        self.likelihood = problem.likelihood(hypothesis)
+        self.likelihood = likelihood or problem.likelihood(hypothesis)
         self.coordinates = problem.coordinates(hypothesis)
         self._value = problem.observations.value
 

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
-from shm.gap.fit import scattered
+from shm.gap.fit import fitted, scattered
 from shm.gap.flexible import smooth_over_orders
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import same_mode
@@ -89,26 +89,28 @@ class ByLaws:
 
 
 def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator) -> ByLaws:
-    """A fit with effects by laws that may be off; the prediction is taken as linear about it."""
-    others = _changes(problem, fit)
-    allowances = _allowances(problem.design, fit.predicted - baseline.predicted)
-    wide = np.column_stack([fit.slopes, others])
+    """A fit with effects by laws that may be off.
+
+    The prediction is taken as linear about the fit; where the data show that the laws are off,
+    about the fit by the likeliest allowance.
+    """
     exact = _linear(problem, fit, fit.noise, fit.slopes)
-    off = [_linear(problem, fit, _allowed(fit, each), wide) for each in allowances]
-    share = np.array([EXACT, *(each.share for each in allowances)])
-    log = np.array([exact.log_evidence, *(each.log_evidence for each in off)])
-    weight, passing = (np.log(share) + log[:, None]).T
-    draws = [_scattered(fit, each, rng) for each in off]
-    found = ByLaws(
+    about, others = fit, _changes(problem, fit)
+    off = _off(problem, baseline, about, others)
+    if _shown(exact, off):
+        about = _fitted_anew(problem, fit, others, off, rng)
+        known = replace(about, noise=fit.noise, model_error=fit.model_error)
+        off = _off(problem, baseline, known, _changes(problem, known))
+    ways = [(EXACT, exact), *off]
+    evidence = np.array([each.log_evidence for _, each in ways])
+    weight, passing = np.log([share for share, _ in ways]).T + evidence
+    draws = [_scattered(about, each, rng) for _, each in off]
+    return ByLaws(
         gain=float(logsumexp(weight) - exact.log_evidence),
         passing=float(logsumexp(passing) - exact.log_evidence),
-        fit=fit,
+        fit=about,
         draws=mixed([fit.draws, *draws], normalised(weight), rng),
     )
-    if logsumexp(weight[1:]) < weight[0] + SHOWN:
-        return found
-    best = int(weight[1:].argmax())
-    return replace(found, fit=_moved(problem, fit, off[best], others, draws[best]))
 
 
 def mixed(draws: Sequence[FloatArray], weight: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -188,6 +190,17 @@ def _allowed(fit: Fit, allowance: _Allowance) -> Covariance:
     )
 
 
+def _off(
+    problem: GapProblem, baseline: Fit, fit: Fit, others: FloatArray
+) -> list[tuple[Share, _Linear]]:
+    """A fit's posterior by each allowance, `others` (data, k) being what other laws change."""
+    wide = np.column_stack([fit.slopes, others])
+    return [
+        (each.share, _linear(problem, fit, _allowed(fit, each), wide))
+        for each in _allowances(problem.design, fit.predicted - baseline.predicted)
+    ]
+
+
 def _linear(problem: GapProblem, fit: Fit, errors: Covariance, slopes: FloatArray) -> _Linear:
     """About a fit's most probable point; `slopes` (data, d + k), the first d its own."""
     likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
@@ -208,32 +221,31 @@ def _scattered(fit: Fit, linear: _Linear, rng: np.random.Generator) -> FloatArra
     return np.asarray(fit.z + away[:, :own])
 
 
-def _moved(
-    problem: GapProblem, fit: Fit, linear: _Linear, others: FloatArray, draws: FloatArray
-) -> Fit:
-    """The fit where the allowance, of which are `draws`, moves it to.
+def _shown(exact: _Linear, off: Sequence[tuple[Share, _Linear]]) -> bool:
+    """Whether the data show that an exact law is off."""
+    allowed = logsumexp([np.log(share.own) + each.log_evidence for share, each in off])
+    return bool(allowed > np.log(EXACT.own) + exact.log_evidence + SHOWN)
 
-    The other laws' changes are among its errors.
+
+def _fitted_anew(
+    problem: GapProblem,
+    fit: Fit,
+    others: FloatArray,
+    off: Sequence[tuple[Share, _Linear]],
+    rng: np.random.Generator,
+) -> Fit:
+    """By the likeliest allowance; the other laws' changes are among its errors.
+
+    Its evidence stays that of the exact law.
     """
+    likeliest = max(off, key=lambda each: np.log(each[0].own) + each[1].log_evidence)[1]
     own, count = len(fit.z), problem.design.frequencies
     errors = replace(
-        linear.errors,
-        frequency=linear.errors.frequency + others[:count] @ others[:count].T,
-        shape_loads=np.column_stack([linear.errors.shape_loads, others[count:]]),
+        likeliest.errors,
+        frequency=likeliest.errors.frequency + others[:count] @ others[:count].T,
+        shape_loads=np.column_stack([likeliest.errors.shape_loads, others[count:]]),
     )
     likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
-    places = np.array([fit.z, fit.z + linear.step[:own]])
-    predicted = np.array([fit.predicted, problem.predict(fit.hypothesis, places[1:])[0]])
-    log = likelihood.log(problem.observations.value - predicted)
-    # The prediction is only nearly linear: a step that leads down is not taken.
-    best = int((log - (places**2).sum(axis=1) / 2).argmax())
-    covariance = np.asarray(np.linalg.inv(linear.curvature)[:own, :own], dtype=np.float64)
-    return replace(
-        fit,
-        z=places[best],
-        covariance=covariance,
-        predicted=predicted[best],
-        noise=errors,
-        draws=draws - places[1] + places[best],
-        log_fit=float(log[best]),
-    )
+    starts = np.array([fit.z, fit.z + likeliest.step[:own]])
+    moved = fitted(problem, fit.hypothesis, rng, starts, likelihood)
+    return replace(moved, log_evidence=fit.log_evidence, method=fit.method, peaks=fit.peaks)

@@ -27,6 +27,7 @@ from shm.gap.screening import (
 )
 from shm.gap.sensitivity import Scan
 from shm.update.tmcmc import normalised
+from shm.values import FloatArray
 
 SAMPLED_WITHIN = 4.0
 MOST_FITS = 30
@@ -34,6 +35,7 @@ MOST_SAMPLED = 5
 LEADERS = 3
 LEADING_PAIRS = 2
 MOST_PAIRS = 8
+MOST_ROUNDS = 3
 MANY_LEADERS, MANY_PAIRS, ALIKE = 6, 30, 2
 SUPPORTED = 2.0
 LAWS_WITHIN, LAWS_WITHIN_SHARE = 500.0, 0.2
@@ -88,19 +90,57 @@ class Search:
 
     def with_pairs(self, tried: list[Tried]) -> list[Tried]:
         """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
+        leaders = [family.best.fit for family in self.leaders(tried)]
+        return self._with_pairs_of(leaders, tried)
+
+    def with_other_pairs(self, tried: list[Tried]) -> list[Tried]:
+        """Adds pairs of either effect of the likeliest pair, which need not lead alone, fitted.
+
+        Among them are those of its own kind at other places. Goes on while another pair leads.
+        """
+        seen: set[Hypothesis] = set()
+        best = self._likeliest(tried)
+        while len(best.effects) > 1 and best not in seen and len(seen) < MOST_ROUNDS:
+            seen.add(best)
+            tried = self._with_pairs_of(self._parts(best, tried), tried, best.name)
+            best = self._likeliest(tried)
+        return tried
+
+    def _likeliest(self, tried: Sequence[Tried]) -> Hypothesis:
+        """Of the effects and pairs."""
+        kinds = families(tried, self.variants)
+        return next(f.best.hypothesis for f in kinds if f.effects and not f.flexible)
+
+    def _parts(self, pair: Hypothesis, tried: Sequence[Tried]) -> list[Fit]:
+        """The fits of a pair's effects, each alone."""
+        parts = [Hypothesis((effect,)) for effect in pair.effects]
+        alone = [each for each in tried if each.hypothesis in parts]
+        new = self._fitted(self.scans, [each for each in alone if each.fit is None], 0.7, 0.7)
+        return [*(each.fit for each in alone if each.fit is not None), *new.values()]
+
+    def _with_pairs_of(
+        self, fits: Sequence[Fit | None], tried: list[Tried], kind: str = ""
+    ) -> list[Tried]:
+        """Adds the pairs of fitted effects that stand a chance, and all of a `kind`, fitted."""
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
         single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
-        scans, rough = self._pairs(tried, LEADERS)
-        chosen = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
+        scans, rough = self._pairs(fits, tried)
+        chosen = list(self._hopeful(scans, rough, single, rival, MOST_PAIRS))
+        names = set(kind.split(" + "))
+        chosen += [
+            each
+            for each in rough
+            if set(each.hypothesis.name.split(" + ")) == names and each not in chosen
+        ]
         return self._with_fitted_pairs(tried, scans, chosen)
 
     def with_every_effect(self, tried: list[Tried]) -> list[Tried]:
-        """Adds fits of the effects that screening had given up, each where it was likeliest there.
+        """Adds fits of the effects and places that screening had given up.
 
         Of an effect so large that the baseline goes along far, the linear scan says too little.
         """
-        given_up = [family.best for family in self._singles(tried) if family.best.fit is None]
+        given_up = [each for each in tried if each.fit is None]
         fits = self._fitted(self.scans, given_up, 0.6, 0.7)
         return [each for each in tried if each.hypothesis not in fits] + [
             self._tried(fit) for fit in fits.values()
@@ -111,17 +151,18 @@ class Search:
 
         Where the gap is large, the scans, which add up what each effect does alone, say little.
         """
-        scans, rough = self._pairs(tried, MANY_LEADERS)
+        leaders = [family.best.fit for family in self.leaders(tried, MANY_LEADERS)]
+        scans, rough = self._pairs(leaders, tried)
         return self._with_fitted_pairs(tried, scans, varied(rough, ALIKE, MANY_PAIRS))
 
     def _pairs(
-        self, tried: Sequence[Tried], leaders: int
+        self, fits: Sequence[Fit | None], tried: Sequence[Tried]
     ) -> tuple[dict[Hypothesis, Scan], list[Tried]]:
-        """Pairs of the leading effects that are not tried yet, scanned, and what the scans say."""
+        """Pairs of fitted effects that are not tried yet, scanned, and what the scans say."""
         known = {each.hypothesis for each in tried}
         scans: dict[Hypothesis, Scan] = {}
         rough: list[Tried] = []
-        for fit in (family.best.fit for family in self.leaders(tried, leaders)):
+        for fit in fits:
             if fit is not None:
                 found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
                 rough += tried_by_screening(self.problem, fit, found)
@@ -131,7 +172,7 @@ class Search:
     def _with_fitted_pairs(
         self, tried: list[Tried], scans: Mapping[Hypothesis, Scan], chosen: Sequence[Tried]
     ) -> list[Tried]:
-        fits = list(self._fitted(scans, chosen, 0.7, 0.85).values())
+        fits = list(self._fitted(scans, chosen, 0.7, 0.85, tried).values())
         first = sorted(fits, key=lambda fit: -fit.log_evidence)[:1]
         return [*tried, *map(self._tried, fits), *map(self._flexible, first)]
 
@@ -198,15 +239,29 @@ class Search:
         chosen: Sequence[Tried],
         begin: float,
         end: float,
+        tried: Sequence[Tried] = (),
     ) -> dict[Hypothesis, Fit]:
-        """Fits of what was chosen, from the scans' best points."""
+        """Fits of what was chosen, from the scans' best points and from where each effect of a pair
+        lies alone."""
         found: dict[Hypothesis, Fit] = {}
+        alone = {e.hypothesis: e.fit for e in tried if e.fit and len(e.hypothesis.effects) == 1}
         for hypothesis in (each.hypothesis for each in chosen):
             fraction = begin + (end - begin) * len(found) / len(chosen)
             self._tell(f"fitting {hypothesis.name}", fraction)
             starts = scans[hypothesis].starts(self.problem.coordinates(hypothesis), STARTS)
+            starts = np.vstack([starts, *self._joined(hypothesis, alone)])
             found[hypothesis] = fitted(self.problem, hypothesis, self.rng, starts)
         return found
+
+    def _joined(self, pair: Hypothesis, alone: Mapping[Hypothesis, Fit]) -> list[FloatArray]:
+        """Points z (d,) of a pair from the fits of its effects, each alone."""
+        fits = [alone.get(Hypothesis((effect,))) for effect in pair.effects]
+        known = [fit.z for fit in fits if fit is not None]
+        if len(known) < 2:
+            return []
+        common = len(self.baseline.z)
+        effects = [z[common:] for z in known]
+        return [np.concatenate([z[:common], *effects]) for z in known]
 
     def _tell(self, label: str, fraction: float) -> None:
         """Progress never goes back."""

@@ -47,9 +47,9 @@ def cleared(
 ) -> Cleared:
     """Attributed, and where that leaves gross errors, attributed anew without them.
 
-    Where the last attribution expects one of them as it was measured, the first one stands. Where
-    something unknown leads, it is searched thoroughly: only then, for among many pairs there always
-    is one that takes a gross error for its own.
+    Where the last attribution expects one of them as it was measured, the first one stands. It is
+    searched thoroughly only then, for among many pairs there always is one that takes a gross error
+    for its own.
     """
     every = np.arange(whole.design.frequencies)
     first = found = Cleared(whole, whole, every, attributed(whole, options, rng, progress))
@@ -65,8 +65,6 @@ def cleared(
         again = attributed(part, options, rng, lambda label, _: progress(label, 1.0))
         found = Cleared(whole, part, rows, again, (*found.aside, *sure))
     found = found if all(_stands(found, each) for each in found.aside) else first
-    if found.attribution.leads != "unexplained":
-        return found
     return replace(found, attribution=more_thorough(found.attribution))
 
 
