@@ -22,8 +22,8 @@ from shm.values import FloatArray
 FAINT = 0.075
 """A second cause is faint that moves the data by less than this share of what the first does."""
 LAW_TO_CAUSE = 5.0
-"""Odds that a faint second cause is the first one's law. Every other large effect is off by so much
-in such a way; of real second causes, sizes from hardly to plainly visible, one in five is faint."""
+"""Odds that a faint second cause is the first one's law. In blind trials eight pairs so faint were
+one effect and none was two; of ten with a second cause of up to a fifth, eight were two."""
 
 
 def without_faint(

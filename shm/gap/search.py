@@ -79,8 +79,8 @@ class Search:
 
     def with_unknown(self, tried: list[Tried]) -> list[Tried]:
         """Adds the remainder of something unknown to no gap and to the leading effects."""
-        fits = [self.baseline, *(each.best.fit for each in self.leaders(tried))]
-        return [*tried, *(self._flexible(fit) for fit in fits if fit is not None)]
+        fits = [self.baseline, *self._leading_fits(tried, LEADERS)]
+        return [*tried, *map(self._flexible, fits)]
 
     def calls_for_pairs(self, tried: Sequence[Tried]) -> bool:
         """Whether the best single effect explains something, so that a second may explain more."""
@@ -90,8 +90,7 @@ class Search:
 
     def with_pairs(self, tried: list[Tried]) -> list[Tried]:
         """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
-        leaders = [family.best.fit for family in self.leaders(tried)]
-        return self._with_pairs_of(leaders, tried)
+        return self._with_pairs_of(self._leading_fits(tried, LEADERS), tried)
 
     def with_other_pairs(self, tried: list[Tried]) -> list[Tried]:
         """Adds pairs of either effect of the likeliest pair, which need not lead alone, fitted.
@@ -119,20 +118,16 @@ class Search:
         return [*(each.fit for each in alone if each.fit is not None), *new.values()]
 
     def _with_pairs_of(
-        self, fits: Sequence[Fit | None], tried: list[Tried], kind: str = ""
+        self, fits: Sequence[Fit], tried: list[Tried], kind: str = ""
     ) -> list[Tried]:
         """Adds the pairs of fitted effects that stand a chance, and all of a `kind`, fitted."""
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
         single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
         scans, rough = self._pairs(fits, tried)
-        chosen = list(self._hopeful(scans, rough, single, rival, MOST_PAIRS))
-        names = set(kind.split(" + "))
-        chosen += [
-            each
-            for each in rough
-            if set(each.hypothesis.name.split(" + ")) == names and each not in chosen
-        ]
+        hopeful = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
+        of_kind = [each for each in rough if _same_effects(each.hypothesis.name, kind)]
+        chosen = tuple(dict.fromkeys([*hopeful, *of_kind]))
         return self._with_fitted_pairs(tried, scans, chosen)
 
     def with_every_effect(self, tried: list[Tried]) -> list[Tried]:
@@ -151,22 +146,20 @@ class Search:
 
         Where the gap is large, the scans, which add up what each effect does alone, say little.
         """
-        leaders = [family.best.fit for family in self.leaders(tried, MANY_LEADERS)]
-        scans, rough = self._pairs(leaders, tried)
+        scans, rough = self._pairs(self._leading_fits(tried, MANY_LEADERS), tried)
         return self._with_fitted_pairs(tried, scans, varied(rough, ALIKE, MANY_PAIRS))
 
     def _pairs(
-        self, fits: Sequence[Fit | None], tried: Sequence[Tried]
+        self, fits: Sequence[Fit], tried: Sequence[Tried]
     ) -> tuple[dict[Hypothesis, Scan], list[Tried]]:
         """Pairs of fitted effects that are not tried yet, scanned, and what the scans say."""
         known = {each.hypothesis for each in tried}
         scans: dict[Hypothesis, Scan] = {}
         rough: list[Tried] = []
         for fit in fits:
-            if fit is not None:
-                found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
-                rough += tried_by_screening(self.problem, fit, found)
-                scans |= found
+            found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
+            rough += tried_by_screening(self.problem, fit, found)
+            scans |= found
         return scans, rough
 
     def _with_fitted_pairs(
@@ -214,6 +207,10 @@ class Search:
         """The likeliest families of one effect."""
         return self._singles(tried)[:most]
 
+    def _leading_fits(self, tried: Sequence[Tried], most: int) -> list[Fit]:
+        leaders = (family.best.fit for family in self.leaders(tried, most))
+        return [fit for fit in leaders if fit is not None]
+
     def _singles(self, tried: Sequence[Tried]) -> list[Family]:
         return [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
 
@@ -241,8 +238,10 @@ class Search:
         end: float,
         tried: Sequence[Tried] = (),
     ) -> dict[Hypothesis, Fit]:
-        """Fits of what was chosen, from the scans' best points and from where each effect of a pair
-        lies alone."""
+        """Fits of what was chosen, from the scans' best points.
+
+        A pair also from where each of its effects, if it was `tried`, lies alone.
+        """
         found: dict[Hypothesis, Fit] = {}
         alone = {e.hypothesis: e.fit for e in tried if e.fit and len(e.hypothesis.effects) == 1}
         for hypothesis in (each.hypothesis for each in chosen):
@@ -314,6 +313,10 @@ class Search:
 def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
     names = [each.name for each in singles]
     return {name: names.count(name) for name in names}
+
+
+def _same_effects(pair: str, other: str) -> bool:
+    return sorted(pair.split(" + ")) == sorted(other.split(" + "))
 
 
 def _new(pairs: Mapping[Hypothesis, Scan], known: Set[Hypothesis]) -> dict[Hypothesis, Scan]:

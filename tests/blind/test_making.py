@@ -24,8 +24,17 @@ from shm.documents import load_modes
 from shm.errors import UsageError
 from shm.models.effects import EFFECTS
 from shm.read import read
-from shm.simulate import PLANTED, UNLISTED, PlantedEffect, drawn_hanger
-from shm.values import PlantedKind, Recording, TrueCase, Way
+from shm.simulate import (
+    PLANTED,
+    UNLISTED,
+    CampaignPlan,
+    HangerState,
+    PlantedEffect,
+    campaign_with_truth,
+    drawn_hanger,
+)
+from shm.simulate.campaign import Campaign
+from shm.values import Hanger, PlantedKind, Recording, TrueCase, Way
 from tests.helpers.blind_workers import in_this_process
 
 KINDS: tuple[PlantedKind, ...] = get_args(PlantedKind)
@@ -175,6 +184,31 @@ def test_a_case_whose_data_can_show_nothing_is_refused() -> None:
     site = Site(hanger, state, PLANS["one plane"])
     with pytest.raises(UsageError, match="another seed"):
         planted_effects(draft_of("one", effects=("temperature_tension",)), site, rng)
+
+
+def test_where_the_bar_as_it_was_made_buckles_other_effects_are_planted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused: list[tuple[PlantedEffect, ...]] = []
+
+    def buckles_once(
+        hanger: Hanger,
+        state: HangerState,
+        effects: tuple[PlantedEffect, ...],
+        plan: CampaignPlan,
+        rng: np.random.Generator,
+    ) -> Campaign:
+        if not refused:
+            refused.append(effects)
+            raise UsageError("the compression buckles the hanger.")
+        return campaign_with_truth(hanger, state, effects, plan, rng)
+
+    monkeypatch.setattr("shm.blind.making.case.campaign_with_truth", buckles_once)
+    truth = make_case(tmp_path / "case", draft_of("one"), np.random.SeedSequence(4))
+    (planted,) = truth.effects
+    ((before,),) = refused
+    assert planted.values != before.values
+    assert (tmp_path / "case" / "tests.modes.json").is_file()
 
 
 def test_what_cannot_be_planted_has_an_infinite_size() -> None:

@@ -13,12 +13,14 @@ from shm.blind.making.plans import PLANS
 from shm.blind.making.planting import Site, planted_effects
 from shm.bridge import load_hanger
 from shm.documents import dump, modes_document
+from shm.errors import UsageError
 from shm.read.single import write_single
 from shm.simulate import PLANTED, CampaignTruth, PlantedEffect, campaign_with_truth, drawn_hanger
 from shm.simulate.recorded import Recorder, recorded
 from shm.values import TrueCase, TrueEffect
 
 BASELINE = "beam1"
+_DRAWS = 5
 
 
 def make_case(directory: Path, draft: Draft, seed: np.random.SeedSequence) -> TrueCase:
@@ -28,9 +30,7 @@ def make_case(directory: Path, draft: Draft, seed: np.random.SeedSequence) -> Tr
     site = _described(directory / HANGER_FILE, draft, described)
     told = {"schema": CASE_SCHEMA, "baseline": BASELINE, "seed": int(chosen.integers(2**31))}
     (directory / CASE_FILE).write_text(dump(told) + "\n", encoding="utf-8")
-    effects = planted_effects(draft, site, planted)
-    measure = _write_recordings if draft.way == "recordings" else _write_modes
-    truth = measure(directory, site, effects, measured)
+    effects, truth = _planted(directory, draft, site, planted, measured)
     return TrueCase(
         draft.case,
         draft.kind,
@@ -55,6 +55,27 @@ def _described(path: Path, draft: Draft, rng: np.random.Generator) -> Site:
         encoding="utf-8",
     )
     return Site(load_hanger(path), state, PLANS[draft.richness])
+
+
+def _planted(
+    directory: Path,
+    draft: Draft,
+    site: Site,
+    planted: np.random.Generator,
+    measured: np.random.Generator,
+) -> tuple[tuple[PlantedEffect, ...], CampaignTruth]:
+    """What is planted, and measured of it; other effects where the bar as it was made buckles.
+
+    The one described may stand what that one does not.
+    """
+    measure = _write_recordings if draft.way == "recordings" else _write_modes
+    effects = planted_effects(draft, site, planted)
+    for _ in range(_DRAWS):
+        try:
+            return effects, measure(directory, site, effects, measured)
+        except UsageError:
+            effects = planted_effects(draft, site, planted)
+    return effects, measure(directory, site, effects, measured)
 
 
 def _write_modes(
