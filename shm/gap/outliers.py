@@ -64,8 +64,9 @@ def believed(attribution: Attribution) -> list[Believed]:
     """No gap, something unknown, and every explanation that was fitted, at each place."""
     causes = attribution.explanations
     variants = {each.effect: len(each.variants) for each in causes if " + " not in each.effect}
-    tried = [variant.fit for each in causes for variant in each.variants]
-    fits = [attribution.baseline, attribution.unexplained, *(fit for fit in tried if fit)]
+    tried = [each for each in attribution.tried if each.hypothesis.effects]
+    plain = [each.fit for each in tried if each.fit and not each.hypothesis.flexible]
+    fits = [attribution.baseline, attribution.unexplained, *plain]
     return [Believed(fit, log_prior(fit.hypothesis, variants)) for fit in fits]
 
 
