@@ -12,6 +12,7 @@ from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.laws import EXACT, FRACTIONS, FRACTIONS_ON_THE_WHOLE, ByLaws, by_its_laws
 from shm.gap.observations import observed
+from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
@@ -97,3 +98,22 @@ def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
         moved = GapProblem(HANGER_3, "beam1", replace(problem.observations, value=away))
         gains.append(by_its_laws(moved, baseline, fit, rng).gain)
     assert np.median(gains) > 50
+
+
+def test_where_a_law_is_far_off_the_fit_goes_all_the_way() -> None:
+    """A joint that slips by another power: one straight step from the exact law does not do."""
+    soft = PlantedEffect("joint_softening", "both ends", {"log10_k_at_reference_level": 7.6})
+    plan = CampaignPlan(
+        modes=6, temperatures_c=(10.0,), mass_share=0.0, shapes=False, reality=Reality()
+    )
+    tests = campaign(HANGER_3, HangerState(TENSION_N), [soft], plan, np.random.default_rng(3))
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    rng = np.random.default_rng(1)
+    baseline = baseline_fit(problem, rng)
+    variants = EFFECTS["joint_softening"].variants(HANGER_3, problem.design.survey)
+    (variant,) = [each for each in variants if each.at == "both ends"]
+    before = fitted(problem, Hypothesis((("joint_softening", variant),)), rng)
+    found = by_its_laws(problem, baseline, before, rng)
+    seen = problem.observations
+    assert predictive_p_value(seen, before, before.noise) < 1e-6
+    assert predictive_p_value(seen, found.fit, found.fit.noise) > 0.01
