@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from shm.gap.attribution import Attribution
+import numpy as np
+
+from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit
+from shm.update.tmcmc import normalised
 
 
 def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
@@ -27,14 +30,22 @@ def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
     """The fits of all that may be, with their probabilities: no gap, every cause, the unknown.
 
     A number that does not hang on the cause, such as the tension, is averaged over them (Hoeting
-    et al., Stat. Sci. 14, 1999).
+    et al., Stat. Sci. 14, 1999); over the places too where a cause may act.
     """
-    return [
+    fits = [
         (attribution.no_gap_probability, attribution.baseline),
         (attribution.unexplained_probability, attribution.unexplained),
-        *(
-            (each.probability, each.best.posterior)
-            for each in attribution.explanations
-            if each.best.posterior
-        ),
     ]
+    for each in attribution.explanations:
+        fits += _anywhere(each)
+    return fits
+
+
+def _anywhere(cause: Explanation) -> list[tuple[float, Fit]]:
+    """The fits of a cause wherever it may act, with their shares of its probability."""
+    found = [(each.log_evidence, each.posterior) for each in cause.variants]
+    fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
+    if not fitted:
+        return []
+    share = normalised(np.array([evidence for evidence, _ in fitted]))
+    return [(cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.chances import Family, Tried, doubted, families, probabilities
+from shm.gap.chances import Family, Tried, doubted, families, missed, probabilities
 from shm.gap.contract import Fit
 from shm.gap.faint import without_faint
 from shm.gap.groups import SAME_BELOW, faces, grouped
@@ -129,7 +129,7 @@ def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     chances = without_faint(search.problem, search.baseline, kinds, chances)
     p_value = search.p_value(likeliest)
     chances, passing = doubted(kinds, chances, passing, p_value)
-    each = [float(chance) for chance in chances]
+    each = [float(chance) for chance in missed(kinds, chances)]
     return _attribution(search, tried, kinds, each, passing, p_value)
 
 

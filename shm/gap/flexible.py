@@ -121,16 +121,17 @@ def _over_orders(design: Design) -> list[FloatArray]:
     """Correlations (F, F) between modes: none, smooth over the order in one plane or in both."""
     patterns = [same_mode(design), smooth_over_orders(design)]
     several = np.ptp(design.frequency_plane) > 0
-    return [*patterns, _smooth(design)] if several else patterns
+    return [*patterns, alike_in_planes(design)] if several else patterns
 
 
 def smooth_over_orders(design: Design) -> FloatArray:
     """Correlations (F, F) that fall with the difference of the orders, in each plane."""
     plane = design.frequency_plane
-    return np.asarray((plane[:, None] == plane) * _smooth(design))
+    return np.asarray((plane[:, None] == plane) * alike_in_planes(design))
 
 
-def _smooth(design: Design) -> FloatArray:
+def alike_in_planes(design: Design) -> FloatArray:
+    """Correlations (F, F) that fall with the difference of the orders, whatever the planes."""
     order = design.frequency_order
     apart = (order[:, None] - order) / SMOOTH_ORDERS
     return np.asarray(np.exp(-(apart**2) / 2))

@@ -6,55 +6,26 @@ unknown would take the blame. So the data may err about a prediction in two ways
 multiple, about 1 in size, of what each other law of the effect would change; and by a fraction of
 what the effect does beyond what the baseline can follow, the same in all tests of a mode: of what
 it does to that very mode or, where a law shifts its action from mode to mode, to the modes of a
-test and plane on the whole. The fraction is unknown.
+test and plane on the whole. The fraction is unknown (`shm.gap.allowances`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
+from shm.gap.allowances import Allowance, Share, allowances, exactly
+from shm.gap.contract import Covariance, Fit, Hypothesis, NoiseNode
 from shm.gap.fit import fitted, scattered
-from shm.gap.flexible import smooth_over_orders
 from shm.gap.likelihood import Likelihood
-from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.update.tmcmc import normalised
-from shm.values import FloatArray, IntArray
+from shm.values import FloatArray
 
-
-class Share(NamedTuple):
-    """Prior probabilities: that an effect's own law is off by so much, and that something unknown
-    is that passes for it."""
-
-    own: float
-    unknown: float
-
-
-EXACT = Share(0.45, 0.17)
-FRACTIONS = {
-    0.003: Share(0.2, 0.18),
-    0.03: Share(0.1, 0.11),
-    0.1: Share(0.05, 0.05),
-    0.2: Share(0.015, 0.06),
-    0.4: Share(0.005, 0.16),
-}
-"""How often an effect's law is off by such a fraction of what it does to a mode; as likely from
-mode to mode as smooth over the orders. What is not in the catalogue but passes for an effect is off
-by more. Shares as found in blind trials: of effects that were planted, and of effects that took the
-blame for others, which had been left out."""
-FRACTIONS_ON_THE_WHOLE = {
-    0.01: Share(0.12, 0.13),
-    0.03: Share(0.045, 0.08),
-    0.1: Share(0.015, 0.06),
-}
-"""The same of what the effect does to the modes of a test and plane on the whole."""
 SHOWN = 3.0
 """Log odds against an exact law from which on the data show that it is off."""
 
@@ -97,13 +68,14 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
     exact = _linear(problem, fit, fit.noise, fit.slopes)
     about, others = fit, _changes(problem, fit)
     off = _off(problem, baseline, about, others)
-    if _shown(exact, off):
+    if _shown(exactly(fit.hypothesis), exact, off):
         about = _fitted_anew(problem, fit, others, off, rng)
         known = replace(about, noise=fit.noise, model_error=fit.model_error)
         off = _off(problem, baseline, known, _changes(problem, known))
-    ways = [(EXACT, exact), *off]
+    ways = [(exactly(fit.hypothesis), exact), *off]
     evidence = np.array([each.log_evidence for _, each in ways])
-    weight, passing = np.log([share for share, _ in ways]).T + evidence
+    with np.errstate(divide="ignore"):  # a share may be 0
+        weight, passing = np.log([share for share, _ in ways]).T + evidence
     draws = [_scattered(about, each, rng) for _, each in off]
     return ByLaws(
         gain=float(logsumexp(weight) - exact.log_evidence),
@@ -139,47 +111,7 @@ def otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
                 yield replace(hypothesis, effects=tuple(effects))
 
 
-class _Allowance(NamedTuple):
-    """By how much data are off (data,), how frequencies go together (F, F), how likely that is."""
-
-    off: FloatArray
-    alike: FloatArray
-    share: Share
-
-
-def _allowances(design: Design, shift: FloatArray) -> list[_Allowance]:
-    whole = _on_the_whole(design, shift)
-    off = [(fraction * shift, share) for fraction, share in FRACTIONS.items()]
-    off += [(fraction * whole, share) for fraction, share in FRACTIONS_ON_THE_WHOLE.items()]
-    orders = same_mode(design), smooth_over_orders(design)
-    return [
-        _Allowance(error, alike, Share(*(each / len(orders) for each in share)))
-        for error, share in off
-        for alike in orders
-    ]
-
-
-def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:
-    """Root mean squares of a shift (data,) over each test and plane, and over each shape."""
-    count = design.frequencies
-    planes = 1 + int(design.frequency_plane.max())
-    return np.concatenate(
-        [
-            _root_mean_square(
-                design.frequency_test * planes + design.frequency_plane, shift[:count]
-            ),
-            _root_mean_square(design.shape_mode, shift[count:]),
-        ]
-    )
-
-
-def _root_mean_square(group: IntArray, values: FloatArray) -> FloatArray:
-    """Of the values (n,) of each group, given to each of its members."""
-    mean = np.bincount(group, values**2) / np.maximum(np.bincount(group), 1)
-    return np.asarray(np.sqrt(mean)[group])
-
-
-def _allowed(fit: Fit, allowance: _Allowance) -> Covariance:
+def _allowed(fit: Fit, allowance: Allowance) -> Covariance:
     """The errors of a fit with those of its law."""
     off, alike, _ = allowance
     count = len(alike)
@@ -197,7 +129,7 @@ def _off(
     wide = np.column_stack([fit.slopes, others])
     return [
         (each.share, _linear(problem, fit, _allowed(fit, each), wide))
-        for each in _allowances(problem.design, fit.predicted - baseline.predicted)
+        for each in allowances(problem, baseline, fit)
     ]
 
 
@@ -221,10 +153,10 @@ def _scattered(fit: Fit, linear: _Linear, rng: np.random.Generator) -> FloatArra
     return np.asarray(fit.z + away[:, :own])
 
 
-def _shown(exact: _Linear, off: Sequence[tuple[Share, _Linear]]) -> bool:
+def _shown(share: Share, exact: _Linear, off: Sequence[tuple[Share, _Linear]]) -> bool:
     """Whether the data show that an exact law is off."""
     allowed = logsumexp([np.log(share.own) + each.log_evidence for share, each in off])
-    return bool(allowed > np.log(EXACT.own) + exact.log_evidence + SHOWN)
+    return bool(allowed > np.log(share.own) + exact.log_evidence + SHOWN)
 
 
 def _fitted_anew(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shm.gap.chances import (
+    MISSED,
     NO_GAP,
     PASSES_FOR_ONE,
     SINGLE,
@@ -17,6 +18,7 @@ from shm.gap.chances import (
     families,
     log_prior,
     misfit_odds,
+    missed,
     probabilities,
 )
 from shm.gap.contract import Hypothesis
@@ -124,3 +126,15 @@ def test_of_a_bad_fit_something_unknown_gains_and_of_a_good_one_nothing_changes(
     odds = misfit_odds(0.001)
     assert after[unknown] / after[a] == pytest.approx(odds * before[unknown] / before[a])
     assert passes / after[a] == pytest.approx(odds * passing / before[a])
+
+
+def test_of_what_is_unexplained_a_part_is_a_cause_that_was_missed() -> None:
+    tried = [_tried(0.0), _tried(900.0, "a"), _tried(897.0, "b"), _tried(2000.0, flexible=True)]
+    kinds = families(tried, {"a": 1, "b": 1})
+    chances, passing = probabilities(kinds)
+    told = missed(kinds, chances)
+    assert told.sum() + passing == pytest.approx(1.0)
+    by_name = {(k.name, k.flexible): c for k, c in zip(kinds, told, strict=True)}
+    assert by_name["", True] == pytest.approx(1 - MISSED)
+    assert by_name["a", False] / by_name["b", False] == pytest.approx(np.exp(3.0))
+    assert by_name["", False] == 0

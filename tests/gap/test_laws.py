@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from shm.gap.allowances import EXACT
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import EXACT, FRACTIONS, FRACTIONS_ON_THE_WHOLE, ByLaws, by_its_laws
+from shm.gap.laws import ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
@@ -64,11 +65,6 @@ def test_an_exact_law_pays_little_for_the_allowance() -> None:
     found, before, _ = _by_laws("section_loss", False)
     assert np.log(EXACT.own) <= found.gain < 1.0
     assert found.fit is before
-
-
-def test_shares_of_laws_add_to_one() -> None:
-    for shares in zip(EXACT, *FRACTIONS.values(), *FRACTIONS_ON_THE_WHOLE.values(), strict=True):
-        assert sum(shares) == pytest.approx(1.0)
 
 
 def test_what_is_exactly_an_effect_hardly_is_something_unknown_that_passes_for_it() -> None:
