@@ -31,8 +31,8 @@ PASSES_FOR_NONE = 1 - PASSES_FOR_ONE - PASSES_FOR_PAIR
 or resembles nothing in it: as effects do that are left out of the catalogue, in blind trials."""
 
 MISSED = 0.2
-"""Of what nothing in the catalogue explains so much is in the catalogue after all: its place was
-not found, or its law is farther off than allowed for. In blind trials 18 of 54 such answers."""
+"""Where a free remainder explains what no cause does, so likely is a cause nevertheless: its place
+was not found, or its law is farther off than allowed for. In blind trials 18 of 54 such answers."""
 
 LEAST_P_VALUE = 1e-4
 """Of smaller ones no more is known than that they are small: tails are not that normal."""
@@ -166,18 +166,21 @@ def doubted(
 
 
 def missed(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
-    """Chances (families,) with a part of the unknown's given to the causes that were tried.
+    """Chances (families,) by which a remainder rules out no cause beyond what may be missed.
 
-    Each has its share by what speaks for it against the others: it was tried near its best.
+    Of what the causes gain, each has its share by what speaks for it: it was tried near its best.
     """
     unknown = np.array([each.flexible for each in candidates])
     cause = np.array([each.effects > 0 for each in candidates]) & ~unknown
-    if not cause.any():
+    of_both = chances[unknown | cause].sum()
+    if not cause.any() or chances[cause].sum() >= MISSED * of_both:
         return chances
     speaks = np.array([each.log_evidence + each.log_prior for each in candidates])
     share = np.exp(np.where(cause, speaks - logsumexp(speaks[cause]), -np.inf))
-    given = MISSED * chances[unknown].sum() * share
-    return np.asarray(chances * np.where(unknown, 1 - MISSED, 1.0) + given)
+    left = (1 - MISSED) * of_both / chances[unknown].sum()
+    return np.asarray(
+        np.where(cause, MISSED * of_both * share, chances * np.where(unknown, left, 1))
+    )
 
 
 def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:

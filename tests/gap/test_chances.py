@@ -138,3 +138,9 @@ def test_of_what_is_unexplained_a_part_is_a_cause_that_was_missed() -> None:
     assert by_name["", True] == pytest.approx(1 - MISSED)
     assert by_name["a", False] / by_name["b", False] == pytest.approx(np.exp(3.0))
     assert by_name["", False] == 0
+
+
+def test_a_cause_that_a_remainder_does_not_rule_out_was_not_missed() -> None:
+    kinds = families([_tried(9.0), _tried(30.0, "a"), _tried(31.0, flexible=True)], {"a": 1})
+    chances, _ = probabilities(kinds)
+    assert missed(kinds, chances) is chances
