@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from shm.gap.contract import Design, Fit, Hypothesis
 from shm.gap.flexible import alike_in_planes, smooth_over_orders
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS, parameters_of
+from shm.models.effects import EFFECTS
 from shm.values import FloatArray, IntArray
 
 
@@ -68,13 +67,17 @@ def allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> list[Allowance]:
         return list(_each(off, in_a_plane))
     raised = _by_levels(problem, fit)
     by_level = [(f * raised, Share(ROUGH * s, 0.0)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
-    off = [(error, Share((1 - ROUGH) * s.own, s.unknown)) for error, s in off]
+    off = [(error, _unless_rough(share)) for error, share in off]
     return [*_each(off, in_a_plane), *_each(by_level, (*in_a_plane, alike_in_planes(design)))]
 
 
 def exactly(hypothesis: Hypothesis) -> Share:
     """How likely it is that the laws of a hypothesis' effects are exact."""
-    return EXACT._replace(own=(1 - ROUGH) * EXACT.own) if _with_level(hypothesis) else EXACT
+    return _unless_rough(EXACT) if _with_level(hypothesis) else EXACT
+
+
+def _unless_rough(share: Share) -> Share:
+    return share._replace(own=(1 - ROUGH) * share.own)
 
 
 def _each(
@@ -87,22 +90,18 @@ def _each(
 
 
 def _with_level(hypothesis: Hypothesis) -> bool:
-    return any("amplitude" in EFFECTS[name].follows for name, _ in hypothesis.effects)
+    return any(_goes_with_level(name) for name, _ in hypothesis.effects)
+
+
+def _goes_with_level(name: str) -> bool:
+    return "amplitude" in EFFECTS[name].follows
 
 
 def _by_levels(problem: GapProblem, fit: Fit) -> FloatArray:
     """What a fit's effects that go with the level do to its prediction (data,)."""
-    theta = problem.theta(fit.hypothesis, fit.z[None])
-    first = problem.coordinates(Hypothesis()).dimension
-    kept, columns = [], list(range(first))
-    for name, variant in fit.hypothesis.effects:
-        last = first + len(parameters_of(name, problem.hanger, variant))
-        if "amplitude" not in EFFECTS[name].follows:
-            kept.append((name, variant))
-            columns += range(first, last)
-        first = last
-    without = replace(fit.hypothesis, effects=tuple(kept))
-    return np.asarray(fit.predicted - problem.predict_at(without, theta[:, columns])[0])
+    names = [name for name, _ in fit.hypothesis.effects]
+    others = [index for index, name in enumerate(names) if not _goes_with_level(name)]
+    return np.asarray(fit.predicted - problem.predicted_with(fit, others))
 
 
 def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:

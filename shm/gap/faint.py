@@ -62,11 +62,7 @@ def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
 
     Beyond what the baseline's own parameters can follow.
     """
-    other = Hypothesis((fit.hypothesis.effects[1 - index],))
-    own = len(baseline.z)
-    first = problem.coordinates(Hypothesis(fit.hypothesis.effects[:1])).dimension
-    z = np.concatenate([fit.z[:own], fit.z[first:]]) if index == 0 else fit.z[:first]
-    shift = fit.predicted - problem.predict(other, z[None])[0]
+    shift = fit.predicted - problem.predicted_with(fit, [1 - index])
     least = min(problem.likelihood(Hypothesis()).nodes, key=lambda node: node.model_error)
     return float(np.sqrt(max(_beyond(shift, baseline, least), 0.0)))
 

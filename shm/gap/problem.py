@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -86,6 +86,17 @@ class GapProblem:
     def predict_at(self, hypothesis: Hypothesis, theta: FloatArray) -> FloatArray:
         """The data (n, data) that parameters theta (n, d) predict of the tests made."""
         return self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+
+    def predicted_with(self, fit: Fit, kept: Sequence[int]) -> FloatArray:
+        """The data (data,) that a fit predicts with only those of its effects, by their indices."""
+        effects = fit.hypothesis.effects
+        ends = [
+            self.coordinates(Hypothesis(effects[:count])).dimension
+            for count in range(len(effects) + 1)
+        ]
+        z = [fit.z[: ends[0]], *(fit.z[ends[index] : ends[index + 1]] for index in kept)]
+        hypothesis = Hypothesis(tuple(effects[index] for index in kept))
+        return np.asarray(self.predict(hypothesis, np.concatenate(z)[None])[0])
 
     def tension_n(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
         """The tension (n,) that z (n, d) stand for."""
