@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -267,12 +268,38 @@ def test_it_reads_from_threads_from_forks_and_from_daemonic_processes(csv: Path)
     assert apart.read_test(csv)
 
 
-def test_a_reading_process_that_was_killed_is_begun_anew(csv: Path) -> None:
+def test_a_reading_process_killed_while_it_reads_is_begun_anew(
+    csv: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     apart.read_test(csv)
-    os.kill(asking._known[0].process.pid, signal.SIGKILL)
-    with pytest.raises(BadInput, match="SIGKILL"):
-        apart.read_test(csv)
+    reader, received = asking._known[0].process.pid, asking._received
+    os.kill(reader, signal.SIGSTOP)  # so that it cannot answer before it is killed
+
+    def killed(*asked: Any) -> Any:
+        os.kill(reader, signal.SIGKILL)
+        return received(*asked)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(asking, "_received", killed)
+        with pytest.raises(BadInput, match="SIGKILL"):
+            apart.read_test(csv)
     assert apart.read_test(csv)
+
+
+@pytest.mark.parametrize("known_to_be_dead", [True, False])
+def test_a_reading_process_killed_before_it_is_asked_costs_no_file(
+    csv: Path, monkeypatch: pytest.MonkeyPatch, known_to_be_dead: bool
+) -> None:
+    apart.read_test(csv)
+    process = asking._known[0].process
+    os.kill(process.pid, signal.SIGKILL)
+    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+    if not known_to_be_dead:
+        polls = iter([lambda: None])
+        polled = process.poll
+        monkeypatch.setattr(process, "poll", lambda: next(polls, polled)())
+    assert apart.read_test(csv)
+    assert asking._known[0].process.pid != process.pid
 
 
 def test_the_reading_process_ends_with_the_one_that_asks(csv: Path) -> None:

@@ -62,14 +62,21 @@ class Request:
 def ask(request: Request) -> Answer:
     """The answer of a child that has read the file; raises BadInput where it died of it."""
     with _one_at_a_time:
-        reader = _reader()
         try:
-            return reader.ask(request)
-        except BaseException as error:
-            # After a refusal of ours the child may still write, or the reader still wait for it.
-            if not isinstance(error, BadInput) or not reader.at_rest:
-                _forget()
-            raise
+            return _asked(request)
+        except ConnectionError:  # the reading process died before: not the file's doing
+            return _asked(request)
+
+
+def _asked(request: Request) -> Answer:
+    reader = _reader()
+    try:
+        return reader.ask(request)
+    except BaseException as error:
+        # After a refusal of ours the child may still write, or the reader still wait for it.
+        if not isinstance(error, BadInput) or not reader.at_rest:
+            _forget()
+        raise
 
 
 class _Reader:
