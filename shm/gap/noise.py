@@ -1,13 +1,14 @@
 """The unknown errors of the data: a few possibilities, each a covariance with a prior weight.
 
-The frequencies err by their identification, independently, by a small model error that belongs to a
-mode and so repeats in every test, and by what repeats in any case (`shm.gap.repeated`):
-cov = factor^2 diag(sd^2) + sigma^2 [same plane and order] + repeated. sigma has a half-normal
-prior: the general model agrees with independent finite elements to 1e-5, and what is much larger
-than that is a gap, not scatter. Stated standard deviations rest on a few hits and are themselves
-uncertain: those of one mode in several tests are drawn together as far as they differ by chance,
-and `factor`, what is left and common to all, has a log-normal prior; a wide one would take a gap
-for noise. That of the shapes is taken from their own scatter between tests. Where no standard
+The frequencies err by their identification, by a small model error that belongs to a mode and so
+repeats in every test, and by what repeats in any case (`shm.gap.repeated`): cov = factor^2 diag(sd)
+R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently, but for
+peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma has a
+half-normal prior: the general model agrees with independent finite elements to 1e-5, and what is
+much larger than that is a gap, not scatter. Stated standard deviations rest on a few hits and are
+themselves uncertain: those of one mode in several tests are drawn together as far as they differ by
+chance, and `factor`, what is left and common to all, has a log-normal prior; a wide one would take
+a gap for noise. That of the shapes is taken from their own scatter between tests. Where no standard
 deviations are given there is instead one unknown standard deviation for all, log-uniform; where
 some are, both. Unknowns are integrated by the trapezoidal rule over their logarithm.
 """
@@ -28,6 +29,13 @@ MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))
 SD_LOWER, SD_UPPER = 1e-4, 3e-2
 FACTOR_SPREAD = 0.08
 """Of the logarithm of true over stated standard deviations, common to all frequencies."""
+
+OVERLAP = 0.004
+"""Frequencies of one order that are closer, as a fraction, have peaks that overlap: twice the
+bandwidth at 0.1 % of damping."""
+CORRELATIONS = (0.0, 0.4)
+"""Of the errors of such peaks, one as likely as the other: our identification of both planes
+together leaves none, that of each by itself shares what both sensors heard."""
 
 _SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 1e-4, 5
 _SHAPES_SPREAD = 0.2
@@ -61,14 +69,34 @@ def _of_frequencies(observations: Observations) -> list[tuple[FloatArray, float,
     known, same = np.isfinite(sd), same_mode(observations.design)
     return [
         (
-            np.diag(np.where(known, factor * sd, common) ** 2) + sigma**2 * same,
-            float(of_common * of_factor * of_sigma),
+            errors * np.outer(own, own) + sigma**2 * same,
+            float(of_common * of_factor * of_sigma * of_errors),
             float(sigma if known.any() else common),
         )
+        for errors, of_errors in _correlations(observations)
         for common, of_common in zip(*_unknown_sds(known), strict=True)
         for factor, of_factor in zip(*_factors(known), strict=True)
         for sigma, of_sigma in zip(*_model_errors(known), strict=True)
+        for own in [np.where(known, factor * sd, common)]
     ]
+
+
+def _correlations(observations: Observations) -> list[tuple[FloatArray, float]]:
+    """Correlations (F, F) of the errors of identification that are possible, with their weights.
+
+    None where a standard deviation is unknown: that outweighs it.
+    """
+    design = observations.design
+    log_frequency, alone = observations.value[: design.frequencies], np.eye(design.frequencies)
+    overlap = (
+        (np.abs(np.subtract.outer(log_frequency, log_frequency)) < OVERLAP)
+        & np.equal.outer(design.frequency_test, design.frequency_test)
+        & np.equal.outer(design.frequency_order, design.frequency_order)
+        & np.not_equal.outer(design.frequency_plane, design.frequency_plane)
+    )
+    if not overlap.any() or np.isnan(observations.sd[: design.frequencies]).any():
+        return [(alone, 1.0)]
+    return [(alone + each * overlap, 1 / len(CORRELATIONS)) for each in CORRELATIONS]
 
 
 def drawn_together(observations: Observations) -> FloatArray:

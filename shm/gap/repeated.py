@@ -68,19 +68,28 @@ class Repeated:
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:
     """Loads (F, k) of the section along the bar, which varies about its mean.
 
-    Each column is one of the independent ways in which it varies (Karhunen and Loeve). The mean is
-    one of the bar's deviations and no business of this. `physical` holds `STRETCHES + 1` hangers
-    alike. Mass goes with the section, bending stiffness with its square.
+    `physical` holds `STRETCHES + 1` hangers alike. Mass goes with the section, bending stiffness
+    with its square.
     """
-    length_m = hanger.length_m
-    edges_m = np.linspace(0.0, length_m, STRETCHES + 1)
+    edges_m = np.linspace(0.0, hanger.length_m, STRETCHES + 1)
     influence = _influence(physical, edges_m, int(design.frequency_order.max()))
-    apart = np.subtract.outer(edges_m[:-1], edges_m[:-1]) / SECTION_REACH_M
-    centring = np.eye(STRETCHES) - 1 / STRETCHES
-    variance, ways = np.linalg.eigh(centring @ np.exp(-(apart**2) / 2) @ centring)
-    kept = variance > _LEAST_SHARE * variance.sum()
-    ways = hanger.scatter.along * ways[:, kept] * np.sqrt(variance[kept])
+    ways = section_ways(hanger.length_m, hanger.scatter.along)
     return np.asarray((influence @ ways)[design.frequency_plane, design.frequency_order - 1])
+
+
+def section_ways(length_m: float, sd: float) -> FloatArray:
+    """The independent ways (STRETCHES, k) in which a section varies, as fractions of its mean.
+
+    One standard deviation of each (Karhunen and Loeve); `sd` is that of all together, the root mean
+    square along the bar. The mean is one of the bar's deviations and no business of this.
+    """
+    place_m = np.arange(STRETCHES) * length_m / STRETCHES
+    apart = np.subtract.outer(place_m, place_m) / SECTION_REACH_M
+    centring = np.eye(STRETCHES) - 1 / STRETCHES
+    covariance = centring @ np.exp(-(apart**2) / 2) @ centring
+    variance, ways = np.linalg.eigh(covariance * STRETCHES / np.trace(covariance))
+    kept = variance > _LEAST_SHARE * variance.sum()
+    return np.asarray(sd * ways[:, kept] * np.sqrt(variance[kept]))
 
 
 def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> FloatArray:

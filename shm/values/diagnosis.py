@@ -9,9 +9,9 @@ from shm.values.kinds import NAN, Plane
 
 Leads = Literal["cause", "no gap", "unexplained"]
 
-NO_GAP_STANDS_FROM = 0.2
-"""A gap is not shown while no gap keeps this probability: many faint causes together outweigh it
-sooner than any of them is worth naming."""
+NO_GAP_STANDS_FROM = 0.05
+"""A gap is not shown while no gap keeps this probability, what a 95 % interval leaves out: many
+faint causes together outweigh it sooner than any of them is worth naming."""
 
 
 def leads(no_gap: float, unexplained: float, claim: float) -> Leads:

@@ -40,7 +40,7 @@ def test_the_planted_effect_that_leads_is_first_and_right() -> None:
 
 
 def test_an_effect_that_the_first_cannot_be_told_from_is_in_its_group_but_not_first() -> None:
-    score = scored(a_truth(), an_answer(ALIAS, 0.05, 0.05, groups=GROUP))
+    score = scored(a_truth(), an_answer(ALIAS, 0.04, 0.06, groups=GROUP))
     assert (score.leader, score.alike) == ("sag", ("point_mass",))
     assert score.leading_probability == pytest.approx(0.8)
     assert score.right
@@ -51,7 +51,7 @@ def test_an_effect_that_the_first_cannot_be_told_from_is_in_its_group_but_not_fi
 
 
 def test_without_the_group_the_same_answer_is_wrong() -> None:
-    score = scored(a_truth(), an_answer(ALIAS, 0.05, 0.05))
+    score = scored(a_truth(), an_answer(ALIAS, 0.04, 0.06))
     assert not (score.right)
     assert not (score.in_group)
     assert not (score.first)
@@ -73,9 +73,9 @@ def test_named_first_does_not_mind_what_no_gap_has() -> None:
     ("no_gap", "unexplained", "sag", "right", "detected"),
     [
         (0.7, 0.2, 0.1, True, False),
-        (0.3, 0.1, 0.6, True, False),
-        (0.1, 0.8, 0.1, False, True),
-        (0.1, 0.1, 0.8, False, True),
+        (0.06, 0.1, 0.84, True, False),
+        (0.04, 0.86, 0.1, False, True),
+        (0.04, 0.1, 0.86, False, True),
     ],
 )
 def test_a_sound_hanger_is_right_where_no_gap_leads(
@@ -89,7 +89,7 @@ def test_a_sound_hanger_is_right_where_no_gap_leads(
 
 def test_what_the_catalogue_lacks_is_right_where_unexplained_leads() -> None:
     truth = a_truth("unknown", ["breathing_crack"])
-    assert scored(truth, an_answer({"sag": 0.3}, 0.1, 0.6)).right
+    assert scored(truth, an_answer({"sag": 0.3}, 0.04, 0.66)).right
     misled = scored(truth, an_answer({"sag": 0.95}, 0.01, 0.04))
     assert misled.misattributed
     assert not misled.right
@@ -182,7 +182,7 @@ def test_an_answer_to_a_case_that_the_key_lacks_is_refused() -> None:
 
 
 def test_left_out_the_right_answer_is_unexplained() -> None:
-    score = second(a_truth(), an_answer({"point_mass": 1.0}), an_answer({"sag": 0.2}, 0.1, 0.7))
+    score = second(a_truth(), an_answer({"point_mass": 1.0}), an_answer({"sag": 0.26}, 0.04, 0.7))
     assert score.right
     assert not score.misattributed
     assert score.truth_probability == 0.7

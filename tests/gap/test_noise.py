@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 from shm.gap.contract import Covariance, NoiseNode, Observations
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import (
+    CORRELATIONS,
     FACTOR_SPREAD,
     MEAN_MODEL_ERROR,
     MODEL_ERROR_SCALE,
@@ -71,6 +72,25 @@ def test_a_model_error_is_one_number_for_a_mode_in_all_tests() -> None:
     node = nodes(found)[-1]
     off = node.covariance.frequency[same.astype(bool) & ~np.eye(len(same), dtype=bool)]
     np.testing.assert_allclose(off, node.model_error**2)
+
+
+def test_peaks_that_overlap_may_err_together() -> None:
+    """The same error in both planes is likelier, and weighs less, than two of one's own."""
+    found = _observations()
+    design = found.design
+    apart = replace(found, value=found.value + 0.0)
+    apart.value[: design.frequencies] += 0.01 * design.frequency_plane
+    assert len(nodes(found)) == len(CORRELATIONS) * len(nodes(apart))
+    residual = np.random.default_rng(3).standard_normal(design.frequencies)
+    alike = np.where(design.frequency_plane == 0, residual, np.roll(residual, toy.MODES))
+    log_odds = []
+    for error in (residual, alike):
+        data = np.zeros((1, design.size))
+        data[0, : design.frequencies] = 2e-4 * error
+        log_odds.append(Likelihood(nodes(found)).log(data) - Likelihood(nodes(apart)).log(data))
+    assert log_odds[1] > 1.0 > log_odds[0]
+    together = Likelihood(nodes(found)).weighed(toy.tension()).products(toy.tension().T)
+    assert together.min() < 0.8 * together.max()
 
 
 def test_the_mean_model_error_is_that_of_its_prior() -> None:

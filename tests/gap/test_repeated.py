@@ -10,7 +10,7 @@ import pytest
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.repeated import GAIN_SD, PLACE_SD_M, TURN_SD_RAD, Repeated
+from shm.gap.repeated import GAIN_SD, PLACE_SD_M, TURN_SD_RAD, Repeated, section_ways
 from shm.gap.shapes import ShapeScaling
 from shm.models.composed import Baseline
 from shm.models.hanger import Zone, solve
@@ -112,6 +112,13 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
     ways = np.linalg.lstsq(loads, shift, rcond=None)[0]
     np.testing.assert_allclose(loads @ ways, shift, atol=2e-6)
     assert 0.5 < np.linalg.norm(ways) < 3.0
+
+
+@pytest.mark.parametrize("length_m", [3.0, 12.0])
+def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m: float) -> None:
+    ways = section_ways(length_m, 0.001)
+    assert np.sqrt(np.mean((ways**2).sum(axis=1))) == pytest.approx(0.001, rel=1e-3)
+    np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
 
 
 def test_a_bar_of_one_section_has_no_loads() -> None:

@@ -182,8 +182,8 @@ UNEXPLAINED = replace(
 UNDECIDED = replace(
     LED,
     causes=(make_cause("point_mass", 0.45, parameters=MASS), make_cause("sag", 0.3)),
-    no_gap_probability=0.15,
-    unexplained_probability=0.1,
+    no_gap_probability=0.04,
+    unexplained_probability=0.21,
     next_measurements=(),
 )
 
