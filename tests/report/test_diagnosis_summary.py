@@ -86,8 +86,8 @@ def test_the_answer_in_a_word(name: str, found: Answer) -> None:
          "None of the effects in the catalogue explains it"),
         (UNEXPLAINED, "The likeliest effect is a point mass of 12 kg (9 to 15)"),
         (UNEXPLAINED, "Weighed over all that may be, the tension is 702 kN"),
-        (UNDECIDED, "Undecided: these data leave open point mass (0.450), sag (0.300) and something "
-                    "that is not in the catalogue (0.210)."),
+        (UNDECIDED, "Undecided: these data leave open point mass (0.450), sag (0.300) and "
+                    "something that is not in the catalogue (0.210)."),
         (replace(UNDECIDED, no_gap_probability=0.15, unexplained_probability=0.1),
          "Undecided: these data leave open point mass (0.450), sag (0.300) and no gap (0.150)."),
         (UNDECIDED, "With point mass the frequencies' error shrinks"),
