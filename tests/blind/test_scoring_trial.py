@@ -78,7 +78,7 @@ def test_detection_is_judged_strictly_above_size_four() -> None:
         for number, size in enumerate([4.0] * 10 + [4.1] * 10, start=1)
     )
     blind = [an_answer({"point_mass": 0.2}, 0.8, case=truth.case) for truth in cases[:10]]
-    seen = [an_answer({"point_mass": 0.9}, 0.1, case=truth.case) for truth in cases[10:]]
+    seen = [an_answer({"point_mass": 0.9}, 0.01, case=truth.case) for truth in cases[10:]]
     found = mark(of(cases, blind + seen, []), "detected")
     assert (found.score.value, found.score.cases, found.met) == (1.0, 10, True)
 
