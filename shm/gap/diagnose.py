@@ -97,7 +97,7 @@ def diagnose(
         tension_before_n=_tension(problem, [(1.0, before)], rng),
         tension_after_n=_tension(problem, possible(attribution), rng),
         next_measurements=following,
-        remarks=(*found.remarks, *set_aside(aside), *doubtful(doubted)),
+        remarks=(*found.remarks, *set_aside(aside, clear.otherwise), *doubtful(doubted)),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,

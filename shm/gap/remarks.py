@@ -226,13 +226,17 @@ def _listed(names: Sequence[str]) -> str:
     return f"test {names[0]}" if len(names) == 1 else f"tests {', '.join(names)}"
 
 
-def set_aside(outliers: Sequence[Outlier]) -> tuple[str, ...]:
-    """Of frequencies that the diagnosis did without."""
-    return tuple(
+def set_aside(outliers: Sequence[Outlier], otherwise: str = "") -> tuple[str, ...]:
+    """Of frequencies that were done without; `otherwise` would cause them, were they right."""
+    told = tuple(
         f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
         f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
         for each in outliers
     )
+    if not told or not otherwise:
+        return told
+    right = "it prove right" if len(told) == 1 else "they prove right"
+    return (*told, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
 
 
 def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:

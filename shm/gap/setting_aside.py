@@ -25,7 +25,7 @@ class Cleared:
     """The attribution of those frequencies `rows` (indices) of `whole` that `problem` keeps.
 
     `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
-    but not surely.
+    but not surely. `otherwise` is the cause that would lead, were none of `aside` one; "" for none.
     """
 
     whole: GapProblem
@@ -34,6 +34,7 @@ class Cleared:
     attribution: Attribution
     aside: tuple[GrossError, ...] = ()
     doubted: tuple[GrossError, ...] = ()
+    otherwise: str = ""
 
     def seen(self, error: GrossError, fit: Fit) -> LeftOut:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""
@@ -65,7 +66,20 @@ def cleared(
         again = attributed(part, options, rng, lambda label, _: progress(label, 1.0))
         found = Cleared(whole, part, rows, again, (*found.aside, *sure))
     found = found if all(_stands(found, each) for each in found.aside) else first
-    return replace(found, attribution=more_thorough(found.attribution))
+    thorough = more_thorough(found.attribution)
+    return replace(found, attribution=thorough, otherwise=_led_before(first.attribution, thorough))
+
+
+def _led_before(first: Attribution, last: Attribution) -> str:
+    """The effect that led at first, if it leads no more, and where it acts.
+
+    Pairs are none: among many there always is one that takes a gross error for its own.
+    """
+    led, leads = first.leading, last.leading
+    if led is None or " + " in led.effect or (leads and leads.effect == led.effect):
+        return ""
+    place = led.best.hypothesis.at.removeprefix("everywhere").removeprefix(", ")
+    return f"{led.effect.replace('_', ' ')} ({place})" if place else led.effect.replace("_", " ")
 
 
 def _stands(found: Cleared, error: GrossError) -> bool:

@@ -67,6 +67,7 @@ def test_what_is_set_aside_is_told_in_a_remark_and_kept_in_the_list_of_residuals
 ) -> None:
     assert "Longitudinal 3 of test t1" in one_wrong.remarks[0]
     assert "look at the recording again" in one_wrong.remarks[0]
+    assert not any("Should it prove right" in remark for remark in one_wrong.remarks)
     assert len(one_wrong.where) == 12
     (row,) = [r for r in one_wrong.where if (r.plane, r.order) == ("longitudinal", 3)]
     assert row.residual_percent == pytest.approx(3.0, abs=0.2)
@@ -74,6 +75,12 @@ def test_what_is_set_aside_is_told_in_a_remark_and_kept_in_the_list_of_residuals
     assert row.share == 0
     assert sum(r.share for r in one_wrong.where) == pytest.approx(1.0)
     assert one_wrong.shrinkage.rms_before_percent < 0.1
+
+
+def test_an_effect_that_moves_one_frequency_only_is_not_forgotten() -> None:
+    found = diagnose(spoiled(measured(), "longitudinal", 1, 1.1), PLAIN, QUICK)
+    assert [(each.plane, each.order) for each in found.outliers] == [("longitudinal", 1)]
+    assert "Should it prove right, sag (longitudinal) is the likeliest cause" in found.remarks[1]
 
 
 def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_one() -> None:
