@@ -25,6 +25,7 @@ from shm.gap.gross_error import (
     log_ordinary,
     without_shape,
 )
+from shm.gap.laws import by_its_laws
 from shm.gap.problem import GapProblem
 from shm.values import BoolArray, IntArray
 
@@ -141,22 +142,35 @@ def _judged(
     """
     rest = problem.part(np.delete(np.arange(problem.design.frequencies), row))
     whole = without_shape(problem, row)
-    base = fitted(rest, Hypothesis(), rng)
+    base, base_of_whole = (fitted(each, Hypothesis(), rng) for each in (rest, whole))
     gross, ordinary, kept = [], [], []
     for each in _contenders(problem, candidates, row):
         without = Believed(_without(rest, each.fit, base, rng), each.log_prior)
         seen = at(whole, without.fit, row)
         kept.append(without)
-        gross.append(without.log_weight + seen.given_rest(log_gross(seen.deviation))[0])
+        gain = _gain(rest, base, without.fit, rng)
+        gross.append(without.log_weight + gain + seen.given_rest(log_gross(seen.deviation))[0])
         tails = without.fit.log_evidence + seen.given_rest(log_ordinary(seen.deviation, seen.sd))[0]
         full = (
             each.fit
             if whole is problem
             else fitted(whole, each.fit.hypothesis, rng, each.fit.z[None])
         )
-        ordinary.append(each.log_prior + _ordinary(whole, full, row, float(tails)))
+        allowed = full.log_evidence + _gain(whole, base_of_whole, full, rng)
+        ordinary.append(each.log_prior + max(_ordinary(whole, full, row, float(tails)), allowed))
     odds = float(logsumexp(gross) - logsumexp(ordinary))
     return float(expit(odds)), kept
+
+
+def _gain(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator) -> float:
+    """What a fit gains in log evidence by allowing its effects' laws to be off.
+
+    A law that is off moves one mode more than others, as a gross error does.
+    """
+    hypothesis = fit.hypothesis
+    if hypothesis.flexible or not hypothesis.effects:
+        return 0.0
+    return by_its_laws(problem, baseline, fit, rng).gain
 
 
 def _ordinary(whole: GapProblem, fit: Fit, row: int, tails: float) -> float:

@@ -16,7 +16,7 @@ from shm.gap.observations import observed
 from shm.gap.outliers import SURE
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign
 from shm.values import Diagnosis, ModalTest
 from tests.helpers.hangers import HANGER_3
 
@@ -89,6 +89,20 @@ def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_o
     assert found.leading is not None
     assert found.leading.effect == "point_mass"
     assert diagnose(measured(CLAMP), PLAIN, QUICK).outliers == ()
+
+
+def test_an_effect_whose_law_is_off_at_one_mode_is_no_gross_error_there() -> None:
+    moving = PlantedEffect(
+        "support_motion",
+        "deck end, longitudinal",
+        {"support_mass_kg": 850.0, "support_frequency_hz": 9.0},
+    )
+    plan = replace(ONE_TEST, modes=8, reality=Reality())
+    tests = campaign(PLAIN, HangerState(711e3), (moving,), plan, np.random.default_rng(101))
+    found = diagnose(tests, PLAIN, QUICK)
+    assert not found.outliers
+    assert found.leading is not None
+    assert found.leading.effect == "support_motion"
 
 
 def test_a_residual_of_four_and_a_half_standard_deviations_is_no_proof() -> None:
