@@ -93,7 +93,8 @@ def test_a_web_interface_that_dies_comes_again_and_ends_with_its_daemon(
             taken.close()
             until(lambda: answers(port))
             assert owner.poll() is None
-            assert "GET '/health'" in (workspace.folder / "daemon.web.log").read_text()
+            web_log = workspace.folder / "daemon.web.log"
+            until(lambda: "GET '/health'" in web_log.read_text())  # told after it is answered
         finally:
             owner.kill()
     until(lambda: not servers_of(workspace))
