@@ -14,7 +14,7 @@ from shm.gap.gross_error import LeftOut, at, log_gross, log_ordinary, without_sh
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.outliers import SURE, GrossError, gross_errors
 from shm.gap.problem import GapProblem
-from shm.values import NAN, PLANES, IntArray, Outlier, Residual
+from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 
 _ROUNDS = 2
 _LIKELIER_THAN_NOT = 0.5
@@ -78,8 +78,7 @@ def _led_before(first: Attribution, last: Attribution) -> str:
     led, leads = first.leading, last.leading
     if led is None or " + " in led.effect or (leads and leads.effect == led.effect):
         return ""
-    place = led.best.hypothesis.at.removeprefix("everywhere").removeprefix(", ")
-    return f"{led.effect.replace('_', ' ')} ({place})" if place else led.effect.replace("_", " ")
+    return effect_label(led.effect, led.best.hypothesis.at)
 
 
 def _stands(found: Cleared, error: GrossError) -> bool:

@@ -19,6 +19,7 @@ from shm.values.diagnosis import (
     Shrinkage,
     TensionEstimate,
     Trend,
+    effect_label,
     leads,
 )
 from shm.values.drift import (
@@ -160,5 +161,6 @@ __all__ = [
     "WatchedQuantity",
     "WatchedTest",
     "Way",
+    "effect_label",
     "leads",
 ]

@@ -14,6 +14,12 @@ NO_GAP_STANDS_FROM = 0.05
 faint causes together outweigh it sooner than any of them is worth naming."""
 
 
+def effect_label(effect: str, at: str) -> str:
+    """`sag (longitudinal)` of an effect and where it acts; everywhere goes without saying."""
+    place = at.removeprefix("everywhere").removeprefix(", ")
+    return effect.replace("_", " ") + (f" ({place})" if place else "")
+
+
 def leads(no_gap: float, unexplained: float, claim: float) -> Leads:
     """What a diagnosis says by the probabilities of no gap, the unknown and the likeliest claim."""
     if no_gap >= NO_GAP_STANDS_FROM:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from shm.report import words
 from shm.report.diagnosis.sizes import Sizes
-from shm.values import Cause, EffectEstimate
+from shm.values import Cause, EffectEstimate, effect_label
 
 _PLACES = {
     "everywhere": "",
@@ -83,12 +83,7 @@ def title(effect: str) -> str:
 def label(cause: Cause) -> str:
     """`rotational end flexibility (both ends)`, for tables and figures."""
     parts = zip(cause.effects, _ats(cause.at, cause), strict=True)
-    return " + ".join(f"{title(effect)}{_in_brackets(at)}" for effect, at in parts)
-
-
-def _in_brackets(at: str) -> str:
-    at = at.removeprefix("everywhere").removeprefix(", ")
-    return f" ({at})" if at else ""
+    return " + ".join(effect_label(effect, at) for effect, at in parts)
 
 
 def phrase(cause: Cause) -> str:
