@@ -7,13 +7,14 @@ an effect does not become likelier by being tried in more places (Scott and Berg
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.contract import Fit, Hypothesis, Method
+from shm.gap.imitation import imitation
 from shm.values import FloatArray
 
 NO_GAP = 0.25
@@ -25,7 +26,7 @@ AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""
 
-PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.15
+PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.2
 PASSES_FOR_NONE = 1 - PASSES_FOR_ONE - PASSES_FOR_PAIR
 """Of what is not in the catalogue so much does to data about what one of its effects does, or two,
 or resembles nothing in it: as effects do that are left out of the catalogue, in blind trials."""
@@ -78,7 +79,8 @@ class Tried:
 class Family:
     """What was tried of one effect, or one pair, wherever it may act, the best first.
 
-    `log_passing` is the log evidence of something unknown that passes for it.
+    `log_passing` is the log evidence of something unknown that passes for it, `passing_odds` the
+    odds of that against the family itself, before any data.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Family:
     log_evidence: float
     log_passing: float
     log_prior: float
+    passing_odds: float
 
     @property
     def best(self) -> Tried:
@@ -119,25 +122,16 @@ def probabilities(candidates: Sequence[Family]) -> tuple[FloatArray, float]:
 
     All add to 1.
     """
-    evidence, passing, prior = (
+    evidence, passing, prior, odds = (
         np.array([getattr(each, name) for each in candidates])
-        for name in ("log_evidence", "log_passing", "log_prior")
+        for name in ("log_evidence", "log_passing", "log_prior", "passing_odds")
     )
-    share = np.array([_passing_share(each) for each in candidates])
     kept = np.array([PASSES_FOR_NONE if each.flexible else 1.0 for each in candidates])
     top = float((evidence + prior).max())
     weight = kept * np.exp(evidence + prior - top)
-    unknown = float(np.sum(share * np.exp(passing + prior - top)))
+    unknown = float(np.sum(odds * np.exp(passing + prior - top)))
     whole = weight.sum() + unknown
     return np.asarray(weight / whole), unknown / whole
-
-
-def _passing_share(family: Family) -> float:
-    """How often something unknown passes for a family, to how often it is that."""
-    if family.flexible or family.effects == 0:
-        return 0.0
-    single = family.effects == 1
-    return PASSES_FOR_ONE * UNKNOWN / SINGLE if single else PASSES_FOR_PAIR * UNKNOWN / PAIR
 
 
 def misfit_odds(p_value: float) -> float:
@@ -199,7 +193,17 @@ def _family(members: Sequence[Tried], variants: dict[str, int]) -> Family:
         float(logsumexp(each) - np.log(possible)) for each in (evidence, passing)
     )
     log_prior = float(np.log(_prior(hypothesis, len(variants))))
-    return Family(hypothesis.name, ordered, log_evidence, log_passing, log_prior)
+    odds = _passing_odds(hypothesis, variants)
+    return Family(hypothesis.name, ordered, log_evidence, log_passing, log_prior, odds)
+
+
+def _passing_odds(hypothesis: Hypothesis, catalogue: Collection[str]) -> float:
+    names = [name for name, _ in hypothesis.effects]
+    if hypothesis.flexible or not names:
+        return 0.0
+    if len(names) == 1:
+        return PASSES_FOR_ONE * UNKNOWN / SINGLE
+    return PASSES_FOR_PAIR * UNKNOWN / PAIR * imitation(names, catalogue)
 
 
 def _prior(hypothesis: Hypothesis, effects: int) -> float:

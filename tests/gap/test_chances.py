@@ -71,6 +71,16 @@ def test_what_is_unknown_may_pass_for_an_effect() -> None:
     assert passing / chances[0] == pytest.approx(PASSES_FOR_ONE * UNKNOWN / SINGLE, rel=1e-6)
 
 
+def test_a_pair_that_imitates_freely_is_claimed_less_surely() -> None:
+    variants = dict.fromkeys(
+        ("point_mass", "section_loss", "geometric_hardening", "sensor_mass"), 1
+    )
+    free = [_tried(0.0), _tried(40.0, "point_mass", "section_loss")]
+    bound = [_tried(0.0), _tried(40.0, "geometric_hardening", "sensor_mass")]
+    (freely, _), (surely, _) = (probabilities(families(t, variants)) for t in (free, bound))
+    assert freely[0] < 0.7 < 0.95 < surely[0]
+
+
 def test_the_further_an_effect_is_off_its_law_the_likelier_something_unknown_passes_for_it() -> (
     None
 ):
