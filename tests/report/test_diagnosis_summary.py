@@ -111,6 +111,15 @@ def test_a_group_is_claimed_by_its_sum_where_no_member_leads_alone() -> None:
     assert "is most likely due to ends that turn" in said(diagnosis)
 
 
+def test_of_a_pair_that_fits_and_is_not_claimed_it_says_why() -> None:
+    pair = make_cause("point_mass + section_loss", 0.43)
+    fits = replace(UNEXPLAINED, causes=(pair,), unexplained_probability=0.57, fit_p_value=0.4)
+    why = "These two fit, but together they would also fit much that has another cause."
+    assert why in said(fits)
+    assert why not in said(replace(fits, fit_p_value=0.001))
+    assert why not in said(replace(UNEXPLAINED, fit_p_value=0.4))
+
+
 def test_a_gap_is_not_claimed_while_no_gap_keeps_one_in_twenty() -> None:
     faint = replace(ALIKE, no_gap_probability=0.06, unexplained_probability=0.0)
     assert claimed(faint) is None

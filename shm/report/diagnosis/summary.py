@@ -20,6 +20,7 @@ from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
 _POOR_FIT = 0.01
+_FAIR_FIT = 0.05
 _WORTH_MEASURING = 1.0
 _CERTAIN = 20.0
 _CERTAIN_ODDS = 1000
@@ -152,7 +153,15 @@ def _runner_up(diagnosis: Diagnosis) -> str:
     told = answer(diagnosis) not in (Answer.NO_GAP, Answer.UNEXPLAINED)
     if told or best is None or not best.probability >= 1 - _SURE:
         return ""
-    return f"The likeliest effect is {_told(best)}."
+    return f"The likeliest effect is {_told(best)}.{_why_not(diagnosis, best)}"
+
+
+def _why_not(diagnosis: Diagnosis, best: Claim) -> str:
+    """Why a pair that fits is not claimed where something unknown is."""
+    fits = diagnosis.fit_p_value >= _FAIR_FIT and answer(diagnosis) is Answer.UNEXPLAINED
+    if not fits or len(best.leading.effects) < 2:
+        return ""
+    return " These two fit, but together they would also fit much that has another cause."
 
 
 def _pattern(diagnosis: Diagnosis) -> str:
