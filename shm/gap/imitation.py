@@ -2,7 +2,7 @@
 
 Some effects can act anywhere and take many forms: a mass and a loss of section together come near
 to almost anything. Others can do one thing only. So of what passes for a pair, a few pairs have
-the most.
+the most: each as the product of what its effects were seen to do in blind trials.
 """
 
 from __future__ import annotations
