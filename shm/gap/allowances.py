@@ -43,7 +43,8 @@ FRACTIONS_ON_THE_WHOLE = {
 """The same of what the effect does to the modes of a test and plane on the whole."""
 ROUGH = 0.5
 """How often the law of an effect that goes with the level is only roughly known: a level is one
-number of a test, while every mode rings at its own and dies away at its own pace."""
+number of a test, while every mode rings at its own and dies away at its own pace. So it is for what
+passes for such an effect."""
 FRACTIONS_WHERE_ROUGH = {0.1: 0.3, 0.2: 0.35, 0.4: 0.35}
 """How often it then is off by such a fraction of what the effect does to a mode."""
 
@@ -66,7 +67,7 @@ def allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> list[Allowance]:
     if not _with_level(fit.hypothesis):
         return list(_each(off, in_a_plane))
     raised = _by_levels(problem, fit)
-    by_level = [(f * raised, Share(ROUGH * s, 0.0)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
+    by_level = [(f * raised, Share(*[ROUGH * s] * 2)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
     off = [(error, _unless_rough(share)) for error, share in off]
     return [*_each(off, in_a_plane), *_each(by_level, (*in_a_plane, alike_in_planes(design)))]
 
@@ -77,7 +78,7 @@ def exactly(hypothesis: Hypothesis) -> Share:
 
 
 def _unless_rough(share: Share) -> Share:
-    return share._replace(own=(1 - ROUGH) * share.own)
+    return Share(*((1 - ROUGH) * each for each in share))
 
 
 def _each(

@@ -44,6 +44,14 @@ def test_shares_add_to_one(effect: str) -> None:
         assert sum(shares) == pytest.approx(1.0)
 
 
+def test_what_passes_for_an_effect_may_be_off_wherever_the_effect_may() -> None:
+    """Or an effect that is off by the level would be beyond doubt."""
+    for effect in ("section_loss", "geometric_hardening"):
+        problem, baseline, fit = _fits(effect)
+        for allowed in allowances(problem, baseline, fit):
+            assert allowed.share.unknown >= allowed.share.own / 2
+
+
 def test_beside_another_effect_only_the_one_that_goes_with_the_level_is_roughly_known() -> None:
     problem, baseline, fit = _fits("geometric_hardening", "timebase")
     alone = problem.predict_at(
