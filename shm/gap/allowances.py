@@ -67,7 +67,7 @@ def allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> list[Allowance]:
     if not _with_level(fit.hypothesis):
         return list(_each(off, in_a_plane))
     raised = _by_levels(problem, fit)
-    by_level = [(f * raised, Share(*[ROUGH * s] * 2)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
+    by_level = [(f * raised, Share(ROUGH * s, ROUGH * s)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
     off = [(error, _unless_rough(share)) for error, share in off]
     return [*_each(off, in_a_plane), *_each(by_level, (*in_a_plane, alike_in_planes(design)))]
 
