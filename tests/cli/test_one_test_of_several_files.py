@@ -71,9 +71,8 @@ def test_a_stored_test_shows_how_it_was_identified(
     document = json.loads(shm(*ask, "--json").out)
     with workspace.store() as store:
         (stored,) = store.tests(3)
-    assert [mode["frequency_hz"] for mode in document["test"]["modes"]] == [
-        mode.frequency_hz for mode in stored.test.modes
-    ]
+    shown = [mode["frequency_hz"] for mode in document["test"]["modes"]]
+    assert shown == pytest.approx([mode.frequency_hz for mode in stored.test.modes])
     assert [check["name"] for check in document["quality"]] == [c.name for c in stored.quality]
     page = tmp_path / "sheet.html"
     assert shm(*ask, "--out", page).code == 0

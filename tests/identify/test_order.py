@@ -101,3 +101,23 @@ def test_a_described_hanger_keeps_its_numbers_when_its_first_modes_are_lost() ->
     assert _orders(planes, Expected.of(hanger)) == [orders, orders]
     ill_known = replace(hanger, nominal_tension_n=950e3)
     assert _orders(planes, Expected.of(ill_known)) == [orders, orders]
+
+
+# A bar of shm.simulate: 85 mm thick, 14.5 m long, slack at 851 kN, sagging with lambda squared 7.
+SAGGING = [6.556, 11.463, 18.286, 26.236, 35.537, 46.213, 58.463, 72.21]
+
+
+def _described_bar() -> Expected:
+    area, inertia = np.pi * 0.085**2 / 4, np.pi * 0.085**4 / 64
+    return Expected.of(Hanger(1, 14.5, 210e9, area, inertia, 7850 * area, 880e3))
+
+
+def test_a_first_order_raised_by_sag_is_the_first() -> None:
+    """Set aside, nothing would tell of the sag."""
+    assert _orders([_plane(SAGGING)], _described_bar()) == [list(range(1, 9))]
+
+
+def test_a_mode_above_the_first_order_is_not_taken_for_it() -> None:
+    foreign = 6.556
+    modes = [_plane([5.4, foreign, *SAGGING[1:]])]
+    assert _orders(modes, _described_bar()) == [[1, None, *range(2, 9)]]

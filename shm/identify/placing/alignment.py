@@ -21,6 +21,9 @@ Costs: TypeAlias = NDArray[np.float32]
 
 ASIDE_COST = 12.0
 """Of a mode that is none of the plane: a good fit is believed up to three tolerances."""
+SAG_COST = 8.0
+"""Of a first order well above the others' beam: a sag raises it by up to two fifths, and it alone
+tells of the sag."""
 _MOST_SHAPE_COST = 9.0
 _ORDINARY = 0.012
 
@@ -105,12 +108,18 @@ def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
     for mode, log_frequency in enumerate(np.log(plane.frequency_hz)):
         entry = nearest.entry(log_frequency - grid.levels)
         order = order_table[entry]
-        cost = (residual_table[entry] / tolerance.frequency) ** 2 + (spread + doubt[mode])
+        cost = _misfit(residual_table[entry] / tolerance.frequency, order) + (spread + doubt[mode])
         if shape_costs is not None:
             cost += _of_orders(shape_costs[mode], order)
         orders.append(order)
         costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
     return Alignment(_total(orders, costs, grid), orders, costs)
+
+
+def _misfit(deviation: FloatArray, order: IntArray) -> FloatArray:
+    cost = deviation**2
+    raised = (order == 0) & (deviation > 0)
+    return np.where(raised, np.minimum(cost, SAG_COST), cost)
 
 
 def _of_orders(table: Costs, order: IntArray) -> Costs:
