@@ -21,7 +21,7 @@ from shm.models.composed import ComposedHanger
 from shm.models.conditions import Conditions
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
 from shm.models.registry import MODELS
-from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Plane
 
 _HALF_WIDTH_IN_SD = math.sqrt(3)
 _ALONG = 101
@@ -69,6 +69,11 @@ class Adopted(Model):
             amplitude=test.amplitude if hard and math.isfinite(test.amplitude) else 1.0,
             added_mass=test.added_mass,
         )
+
+    def follows(self, mode: Mode) -> bool:
+        """As any class, and a raised mode where an adopted effect may have raised it."""
+        raising = any(EFFECTS[name].raises_first_order for name, _ in self._effects)
+        return raising or super().follows(mode)
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput as any class, and where an effect follows a temperature not given."""

@@ -80,6 +80,10 @@ def temperatures(data: HangerReport) -> Table:
 
 
 _BESIDE = 2
+_RAISED = (
+    " Not followed: the mode lies well above the bar that the others follow, as if the hanger "
+    "sagged; no tension is inferred from it. For the cause: shm gap diagnose."
+)
 
 
 def neighbours(data: HangerReport) -> Table:
@@ -104,18 +108,33 @@ def frequencies(data: HangerReport) -> Table:
             "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % interval, Hz",
             "off, % (90 % interval)",
         ),
-        tuple(
-            _frequency_row(
-                mode,
-                measured.get((mode.plane, mode.order)),
-                misfits.get((mode.plane, mode.order)),
-            )
-            for mode in data.predicted
+        (
+            *(_raised_row(mode) for mode in _raised(data)),
+            *(
+                _frequency_row(
+                    mode,
+                    measured.get((mode.plane, mode.order)),
+                    misfits.get((mode.plane, mode.order)),
+                )
+                for mode in data.predicted
+            ),
         ),
         note="Predicted by the posterior of the model class, with what its parameters leave open. "
         "sd: standard deviation of the measurement. Off: predicted over measured, less one, with "
-        "the interval of both; where the sd is not known, with that of the prediction.",
+        "the interval of both; where the sd is not known, with that of the prediction."
+        + (_RAISED if _raised(data) else ""),
     )  # fmt: skip
+
+
+def _raised(data: HangerReport) -> list[Mode]:
+    """Modes above the bar's own order that the posterior does not follow."""
+    predicted = {(mode.plane, mode.order) for mode in data.predicted}
+    return [m for m in data.latest.modes if m.raised and (m.plane, m.order) not in predicted]
+
+
+def _raised_row(mode: Mode) -> tuple[str, ...]:
+    measured = f"{mode.frequency_hz:.3f}", words.number(mode.frequency_sd_hz, ".4f")
+    return (mode.plane, str(mode.order), *measured, "not followed", "", "")
 
 
 def _frequency_row(

@@ -114,7 +114,14 @@ def _described_bar() -> Expected:
 
 def test_a_first_order_raised_by_sag_is_the_first() -> None:
     """Set aside, nothing would tell of the sag."""
-    assert _orders([_plane(SAGGING)], _described_bar()) == [list(range(1, 9))]
+    found = assign_orders([_plane(SAGGING)], _described_bar())
+    assert found.orders == (tuple(range(1, 9)),)
+    assert found.raised == (True,)
+
+
+def test_of_a_bar_that_does_not_sag_no_order_is_raised() -> None:
+    found = assign_orders([_plane([5.4, *SAGGING[1:]])], _described_bar())
+    assert found.raised == (False,)
 
 
 def test_a_mode_above_the_first_order_is_not_taken_for_it() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from shm.report import HangerReport, Table, text
 from shm.report.table import laid_out
-from shm.report.tables import tables
-from shm.values import PredictedFrequency
+from shm.report.tables import frequencies, tables
+from shm.values import Mode, PredictedFrequency
 
 WHOLE = [
     "Tension",
@@ -44,6 +44,15 @@ def test_a_frequency_that_was_not_measured_is_said(bare: HangerReport) -> None:
     table = next(table for table in tables(bare) if table.title == "Frequencies")
     assert table.rows[1][2] == "not measured"
     assert table.rows[1][-1] == "not measured"
+
+
+def test_a_raised_frequency_is_shown_without_a_prediction(bare: HangerReport) -> None:
+    raised = Mode("transverse", 9, 99.0, 0.1, raised=True)
+    latest = replace(bare.latest, modes=(*bare.latest.modes, raised))
+    shown = frequencies(replace(bare, tests=(*bare.tests[:-1], latest)))
+    assert shown.rows[0][:5] == ("transverse", "9", "99.000", "0.1000", "not followed")
+    assert "shm gap diagnose" in shown.note
+    assert "shm gap diagnose" not in frequencies(bare).note
 
 
 def test_of_a_pooled_posterior_the_latest_test_is_compared(season: HangerReport) -> None:

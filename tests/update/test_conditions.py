@@ -12,6 +12,8 @@ from shm.models.conditions import Conditions
 from shm.simulate import HangerState, TestConditions, planted_modes
 from shm.update import UpdateOptions, update
 from shm.update.likelihood import Likelihood
+from shm.update.options import silent
+from shm.update.problem import Problem
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -121,3 +123,14 @@ def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
     state = HangerState(HANGER_3.nominal_tension_n, *(springs if name == "beam2" else ()))
     planted = planted_modes(HANGER_3, state, (), TestConditions(added_mass=mass), 6, ())
     np.testing.assert_allclose(found, planted.frequency_hz, rtol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "left_out"),
+    [("beam1", 1), ("beam1+point_mass@everywhere", 1), ("beam1+sag@everywhere.transverse", 0)],
+)
+def test_a_raised_mode_counts_where_the_class_can_tell_of_it(name: str, left_out: int) -> None:
+    model = build(name, HANGER_3)
+    modes = (Mode("transverse", 1, 7.0, raised=True), Mode("transverse", 2, 13.85))
+    problem = Problem.of([ModalTest("t1", modes, 3)], model, 1, silent)
+    assert problem.likelihood.modes == list(modes[left_out:])

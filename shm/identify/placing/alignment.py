@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.identify.placing.pattern import Pattern, nearest_orders, tensioned_beam_pattern
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 Costs: TypeAlias = NDArray[np.float32]
 
@@ -74,12 +74,14 @@ class Grid:
 class Alignment:
     """Costs over a grid: `total` (levels, tensions, springs), `orders` from 0 and `costs` a mode.
 
-    `orders` and `costs` have shape (modes, levels, tensions, springs).
+    `orders`, `costs` and `raised`, whether a mode is a first order that sag has raised, have shape
+    (modes, levels, tensions, springs).
     """
 
     total: Costs
     orders: Sequence[IntArray]
     costs: Sequence[Costs]
+    raised: Sequence[BoolArray]
 
     def numbers(self, level: int, tension: int) -> list[int | None]:
         """Orders from 1 at the best springs of one beam; None for a mode set aside."""
@@ -95,6 +97,14 @@ class Alignment:
             found[mode] = order + 1
         return found
 
+    def is_first_raised(self, level: int, tension: int) -> bool:
+        """Whether the first order at the best springs of one beam is above that beam's."""
+        numbers = self.numbers(level, tension)
+        if 1 not in numbers:
+            return False
+        spring = int(np.argmin(self.total[level, tension]))
+        return bool(self.raised[numbers.index(1)][level, tension, spring])
+
 
 def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
     """The modes of a plane against every beam of the grid."""
@@ -104,22 +114,19 @@ def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
     shape_costs = _shape_costs(plane, grid, tolerance)
     doubt = plane.doubt if len(plane.doubt) else np.zeros(len(plane.frequency_hz))
     spread = 2 * np.log(tolerance.frequency / _ORDINARY)
-    orders, costs = [], []
+    orders, costs, raised = [], [], []
     for mode, log_frequency in enumerate(np.log(plane.frequency_hz)):
         entry = nearest.entry(log_frequency - grid.levels)
         order = order_table[entry]
-        cost = _misfit(residual_table[entry] / tolerance.frequency, order) + (spread + doubt[mode])
+        deviation = residual_table[entry] / tolerance.frequency
+        above = (order == 0) & (deviation > 0) & (deviation**2 > SAG_COST)
+        cost = np.where(above, SAG_COST, deviation**2) + (spread + doubt[mode])
         if shape_costs is not None:
             cost += _of_orders(shape_costs[mode], order)
         orders.append(order)
         costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
-    return Alignment(_total(orders, costs, grid), orders, costs)
-
-
-def _misfit(deviation: FloatArray, order: IntArray) -> FloatArray:
-    cost = deviation**2
-    raised = (order == 0) & (deviation > 0)
-    return np.where(raised, np.minimum(cost, SAG_COST), cost)
+        raised.append(above)
+    return Alignment(_total(orders, costs, grid), orders, costs, raised)
 
 
 def _of_orders(table: Costs, order: IntArray) -> Costs:

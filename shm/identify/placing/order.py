@@ -48,10 +48,12 @@ Basis: TypeAlias = Literal["description", "pattern", "counting"]
 class Numbering:
     """Orders from 1 of the modes of each plane, None for a mode set aside, and how they are known.
 
-    `basis`: the hanger's `description`, the `pattern` of a tensioned beam, or mere `counting`.
+    `raised` (planes,): whether the first order lies above the beam that the others follow. `basis`:
+    the hanger's `description`, the `pattern` of a tensioned beam, or mere `counting`.
     """
 
     orders: Orders
+    raised: tuple[bool, ...]
     basis: Basis
 
 
@@ -104,10 +106,11 @@ def assign_orders(planes: Sequence[PlaneModes], expected: Expected | None = None
         if expected:
             bases = [("description", expected), *bases]
         for basis, each in bases:
-            orders = _fitted(planes, each)
+            orders, raised = _fitted(planes, each)
             if sum(plane.count(None) for plane in orders) <= _most_aside(sum(counts), basis):
-                return Numbering(orders, basis)
-    return Numbering(tuple(tuple(range(1, count + 1)) for count in counts), "counting")
+                return Numbering(orders, raised, basis)
+    counted = tuple(tuple(range(1, count + 1)) for count in counts)
+    return Numbering(counted, (False,) * len(counts), "counting")
 
 
 def _most_aside(modes: int, basis: Basis) -> float:
@@ -118,7 +121,9 @@ def _most_aside(modes: int, basis: Basis) -> float:
     return MOST_ASIDE * (modes if basis == "description" else max(modes - _FREE, 0))
 
 
-def _fitted(planes: Sequence[PlaneModes], expected: Expected | None) -> Orders:
+def _fitted(
+    planes: Sequence[PlaneModes], expected: Expected | None
+) -> tuple[Orders, tuple[bool, ...]]:
     """The cheapest numbering over all beams, tolerances, and ways to leave out or set aside."""
     grid = expected.grid() if expected else _wide_grid(planes)
     prior = expected.cost(grid) if expected else np.zeros((1, 1))
@@ -131,9 +136,9 @@ def _fitted(planes: Sequence[PlaneModes], expected: Expected | None) -> Orders:
         levels = [level, level + int(shift[level, tension])]
         fits.append((float(cost[level, tension]), alignments, levels, tension))
     _, best, levels, tension = min(fits, key=lambda fit: fit[0])
-    return tuple(
-        tuple(fit.numbers(level, tension)) for fit, level in zip(best, levels, strict=False)
-    )
+    own = list(zip(best, levels, strict=False))
+    orders = tuple(tuple(fit.numbers(level, tension)) for fit, level in own)
+    return orders, tuple(fit.is_first_raised(level, tension) for fit, level in own)
 
 
 def _wide_grid(planes: Sequence[PlaneModes]) -> Grid:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class _Candidate:
     doubt: float
 
 
+_Ordered: TypeAlias = tuple[_Candidate, int, bool]
+"""Candidate, order, and whether that lies above the beam of the others."""
+
+
 def placed(
     found: Sequence[FoundMode],
     points: Sequence[ResponsePoint],
@@ -56,16 +61,16 @@ def placed(
         Expected.of(known) if known else None,
     )
     ordered = [
-        (candidate, order)
-        for group, orders in zip(groups, numbering.orders, strict=True)
+        (candidate, order, raised and order == 1)
+        for group, orders, raised in zip(groups, numbering.orders, numbering.raised, strict=True)
         for candidate, order in zip(group, orders, strict=True)
         if order is not None
     ]
-    kept = [candidate.found for candidate, _ in ordered]
+    kept = [candidate.found for candidate, *_ in ordered]
     pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
     aside = [mode for mode in found if not any(each is mode for each in kept)]
     return Placement(
-        modes=tuple(_mode(candidate, order, pairs) for candidate, order in ordered),
+        modes=tuple(_mode(*each, pairs) for each in ordered),
         set_aside=_by_frequency([*steady, *(explained(mode, found, kept) for mode in aside)]),
         notes=(
             *_plane_notes(points, turned_rad),
@@ -74,6 +79,7 @@ def placed(
             *_support_notes(hanger),
             *_basis_notes(numbering, known, points),
             *_order_notes(ordered),
+            *_raised_notes(ordered),
         ),
     )
 
@@ -116,7 +122,7 @@ def _plane_modes(group: Sequence[_Candidate], length_m: float) -> PlaneModes:
     )
 
 
-def _mode(candidate: _Candidate, order: int, pairs: Sequence[FoundMode]) -> Mode:
+def _mode(candidate: _Candidate, order: int, raised: bool, pairs: Sequence[FoundMode]) -> Mode:
     found = candidate.found
     if any(found is pair for pair in pairs):
         found = blurred(found)
@@ -129,6 +135,7 @@ def _mode(candidate: _Candidate, order: int, pairs: Sequence[FoundMode]) -> Mode
         damping_sd=found.damping_sd,
         shape=candidate.shape,
         acceleration_m_s2=found.acceleration_m_s2,
+        raised=raised,
     )
 
 
@@ -189,12 +196,22 @@ def _basis_notes(
     return []
 
 
-def _order_notes(ordered: Sequence[tuple[_Candidate, int]]) -> list[str]:
+def _order_notes(ordered: Sequence[_Ordered]) -> list[str]:
     notes = []
     for plane in PLANES:
-        numbers = [order for candidate, order in ordered if candidate.plane == plane]
+        numbers = [order for candidate, order, _ in ordered if candidate.plane == plane]
         missing = sorted(set(range(1, max(numbers, default=0))) - set(numbers))
         if missing:
             listed = ", ".join(str(order) for order in missing)
             notes.append(f"{plane} order {listed} was not found; the others keep their numbers")
     return notes
+
+
+def _raised_notes(ordered: Sequence[_Ordered]) -> list[str]:
+    return [
+        f"{candidate.plane} order {order}, {candidate.found.frequency_hz:.2f} Hz, lies well above "
+        "the beam that the other orders follow, as if the hanger sagged: no tension is inferred "
+        "from it; ask `shm gap diagnose` for the cause"
+        for candidate, order, raised in ordered
+        if raised
+    ]
