@@ -92,8 +92,8 @@ def test_document(test: ModalTest) -> dict[str, Any]:
         document.pop("tension_read_n")
         document.pop("tension_read_sd_n")
     for mode in document["modes"]:
-        if not mode["raised"]:
-            mode.pop("raised")
+        if not mode["irregular"]:
+            mode.pop("irregular")
     return document
 
 
@@ -214,9 +214,9 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
             file=file,
             remedy="Leave it out where unknown.",
         )
-    raised = mode.get("raised", False)
-    if not isinstance(raised, bool):
-        raise BadInput(f"{label}: raised must be true or false.", file=file, remedy="Correct it.")
+    irregular = mode.get("irregular", False)
+    if not isinstance(irregular, bool):
+        raise BadInput(f"{label}: irregular is true or false.", file=file, remedy="Correct it.")
     return Mode(
         plane=mode["plane"],
         order=order,
@@ -226,7 +226,7 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
         damping_sd=_number(mode, "damping_sd", label, file),
         shape=_shape(mode.get("shape"), label, file),
         acceleration_m_s2=_number(mode, "acceleration_m_s2", label, file),
-        raised=raised,
+        irregular=irregular,
     )
 
 

@@ -71,9 +71,9 @@ class Adopted(Model):
         )
 
     def follows(self, mode: Mode) -> bool:
-        """As any class, and a raised mode where an adopted effect may have raised it."""
-        raising = any(EFFECTS[name].raises_first_order for name, _ in self._effects)
-        return raising or super().follows(mode)
+        """As any class, and an irregular mode where an adopted effect may have made it one."""
+        moved = any(EFFECTS[name].moves_first_order for name, _ in self._effects)
+        return moved or super().follows(mode)
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput as any class, and where an effect follows a temperature not given."""

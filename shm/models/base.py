@@ -127,8 +127,8 @@ class Model:
         return hanger.bending_stiffness_n_m2 * wave_number
 
     def follows(self, mode: Mode) -> bool:
-        """Whether the class describes `mode`: no bar alone does one that lies above its order."""
-        return not mode.raised
+        """Whether the class describes `mode`: no bar alone does an irregular one."""
+        return not mode.irregular
 
     def followed(self, tests: Sequence[ModalTest]) -> list[ModalTest]:
         """The tests with those modes alone that the class follows."""

@@ -80,9 +80,9 @@ def temperatures(data: HangerReport) -> Table:
 
 
 _BESIDE = 2
-_RAISED = (
-    " Not followed: the mode lies well above the bar that the others follow, as if the hanger "
-    "sagged; no tension is inferred from it. For the cause: shm gap diagnose."
+_IRREGULAR = (
+    " Not followed: the mode is well off the bar that the others follow, as if the hanger sagged "
+    "or had lost section; no tension is inferred from it. For the cause: shm gap diagnose."
 )
 
 
@@ -109,7 +109,7 @@ def frequencies(data: HangerReport) -> Table:
             "off, % (90 % interval)",
         ),
         (
-            *(_raised_row(mode) for mode in _raised(data)),
+            *(_irregular_row(mode) for mode in _irregular(data)),
             *(
                 _frequency_row(
                     mode,
@@ -122,17 +122,17 @@ def frequencies(data: HangerReport) -> Table:
         note="Predicted by the posterior of the model class, with what its parameters leave open. "
         "sd: standard deviation of the measurement. Off: predicted over measured, less one, with "
         "the interval of both; where the sd is not known, with that of the prediction."
-        + (_RAISED if _raised(data) else ""),
+        + (_IRREGULAR if _irregular(data) else ""),
     )  # fmt: skip
 
 
-def _raised(data: HangerReport) -> list[Mode]:
-    """Modes above the bar's own order that the posterior does not follow."""
+def _irregular(data: HangerReport) -> list[Mode]:
+    """Irregular modes of the latest test that the posterior does not follow."""
     predicted = {(mode.plane, mode.order) for mode in data.predicted}
-    return [m for m in data.latest.modes if m.raised and (m.plane, m.order) not in predicted]
+    return [m for m in data.latest.modes if m.irregular and (m.plane, m.order) not in predicted]
 
 
-def _raised_row(mode: Mode) -> tuple[str, ...]:
+def _irregular_row(mode: Mode) -> tuple[str, ...]:
     measured = f"{mode.frequency_hz:.3f}", words.number(mode.frequency_sd_hz, ".4f")
     return (mode.plane, str(mode.order), *measured, "not followed", "", "")
 

@@ -25,8 +25,8 @@ class Mode:
     """One identified mode. `order` counts from 1 in each plane; standard deviations may be NaN.
 
     `acceleration_m_s2` is the amplitude with which it rings right after a hit, at the sensor that
-    moves most (median over the hits). `raised`: it lies above the order of the tensioned beam that
-    the others follow, as a sag raises a first one; a diagnosis takes it, a beam's tension does not.
+    moves most (median over the hits). `irregular`: it is well off the tensioned beam that the
+    others follow, as a sag raises a first order; a diagnosis takes it, a beam's tension does not.
     """
 
     plane: Plane
@@ -37,7 +37,7 @@ class Mode:
     damping_sd: float = NAN
     shape: tuple[ShapePoint, ...] = ()
     acceleration_m_s2: float = NAN
-    raised: bool = False
+    irregular: bool = False
 
 
 @dataclass(frozen=True)

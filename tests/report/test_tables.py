@@ -46,9 +46,9 @@ def test_a_frequency_that_was_not_measured_is_said(bare: HangerReport) -> None:
     assert table.rows[1][-1] == "not measured"
 
 
-def test_a_raised_frequency_is_shown_without_a_prediction(bare: HangerReport) -> None:
-    raised = Mode("transverse", 9, 99.0, 0.1, raised=True)
-    latest = replace(bare.latest, modes=(*bare.latest.modes, raised))
+def test_an_irregular_frequency_is_shown_without_a_prediction(bare: HangerReport) -> None:
+    irregular = Mode("transverse", 9, 99.0, 0.1, irregular=True)
+    latest = replace(bare.latest, modes=(*bare.latest.modes, irregular))
     shown = frequencies(replace(bare, tests=(*bare.tests[:-1], latest)))
     assert shown.rows[0][:5] == ("transverse", "9", "99.000", "0.1000", "not followed")
     assert "shm gap diagnose" in shown.note

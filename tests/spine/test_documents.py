@@ -26,7 +26,7 @@ FULL = ModalTest(
     added_mass=AddedMass(25.0, 3.6),
     modes=(
         Mode("transverse", 1, 5.82, 0.006, 0.004, math.nan, (ShapePoint(1.2, 0.31, 0.01, 0.01),)),
-        Mode("longitudinal", 1, 6.09, raised=True),
+        Mode("longitudinal", 1, 6.09, irregular=True),
     ),
 )
 

@@ -127,10 +127,14 @@ def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "left_out"),
-    [("beam1", 1), ("beam1+point_mass@everywhere", 1), ("beam1+sag@everywhere.transverse", 0)],
+    [
+        ("beam1", 1),
+        ("beam1+distributed_mass@everywhere", 1),
+        ("beam1+sag@everywhere.transverse", 0),
+    ],
 )
-def test_a_raised_mode_counts_where_the_class_can_tell_of_it(name: str, left_out: int) -> None:
+def test_an_irregular_mode_counts_where_the_class_can_tell_of_it(name: str, left_out: int) -> None:
     model = build(name, HANGER_3)
-    modes = (Mode("transverse", 1, 7.0, raised=True), Mode("transverse", 2, 13.85))
+    modes = (Mode("transverse", 1, 7.0, irregular=True), Mode("transverse", 2, 13.85))
     problem = Problem.of([ModalTest("t1", modes, 3)], model, 1, silent)
     assert problem.likelihood.modes == list(modes[left_out:])

@@ -191,10 +191,10 @@ def test_modes_that_the_baseline_lacks_are_left_out() -> None:
     np.testing.assert_array_equal(few.information, many.information)
 
 
-def test_a_raised_mode_is_read_only_where_the_class_can_tell_of_it() -> None:
+def test_an_irregular_mode_is_read_only_where_the_class_can_tell_of_it() -> None:
     seen = measured(frequencies(SPRUNG))
-    raised = replace(seen, modes=(replace(seen.modes[0], raised=True), *seen.modes[1:]))
-    plain = Reader(posterior(SPRUNG), [raised], HANGER_3)
+    irregular = replace(seen, modes=(replace(seen.modes[0], irregular=True), *seen.modes[1:]))
+    plain = Reader(posterior(SPRUNG), [irregular], HANGER_3)
     assert (seen.modes[0].plane, seen.modes[0].order) not in plain.modes
     assert len(plain.modes) == len(seen.modes) - 1
 

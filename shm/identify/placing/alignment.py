@@ -21,9 +21,10 @@ Costs: TypeAlias = NDArray[np.float32]
 
 ASIDE_COST = 12.0
 """Of a mode that is none of the plane: a good fit is believed up to three tolerances."""
-SAG_COST = 8.0
-"""Of a first order well above the others' beam: a sag raises it by up to two fifths, and it alone
-tells of the sag."""
+IRREGULAR_COST = 8.0
+"""Of a first order off the others' beam: a sag raises it, by up to two fifths, a section lost near
+an end lowers it, and it alone tells of either."""
+_FARTHEST_BELOW = 0.2
 _MOST_SHAPE_COST = 9.0
 _ORDINARY = 0.012
 
@@ -74,14 +75,14 @@ class Grid:
 class Alignment:
     """Costs over a grid: `total` (levels, tensions, springs), `orders` from 0 and `costs` a mode.
 
-    `orders`, `costs` and `raised`, whether a mode is a first order that sag has raised, have shape
+    `orders`, `costs` and `irregular`, whether a mode is a first order off the beam, have shape
     (modes, levels, tensions, springs).
     """
 
     total: Costs
     orders: Sequence[IntArray]
     costs: Sequence[Costs]
-    raised: Sequence[BoolArray]
+    irregular: Sequence[BoolArray]
 
     def numbers(self, level: int, tension: int) -> list[int | None]:
         """Orders from 1 at the best springs of one beam; None for a mode set aside."""
@@ -97,13 +98,13 @@ class Alignment:
             found[mode] = order + 1
         return found
 
-    def is_first_raised(self, level: int, tension: int) -> bool:
-        """Whether the first order at the best springs of one beam is above that beam's."""
+    def is_first_irregular(self, level: int, tension: int) -> bool:
+        """Whether the first order at the best springs of one beam is off that beam's."""
         numbers = self.numbers(level, tension)
         if 1 not in numbers:
             return False
         spring = int(np.argmin(self.total[level, tension]))
-        return bool(self.raised[numbers.index(1)][level, tension, spring])
+        return bool(self.irregular[numbers.index(1)][level, tension, spring])
 
 
 def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
@@ -114,19 +115,20 @@ def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
     shape_costs = _shape_costs(plane, grid, tolerance)
     doubt = plane.doubt if len(plane.doubt) else np.zeros(len(plane.frequency_hz))
     spread = 2 * np.log(tolerance.frequency / _ORDINARY)
-    orders, costs, raised = [], [], []
+    orders, costs, irregular = [], [], []
     for mode, log_frequency in enumerate(np.log(plane.frequency_hz)):
         entry = nearest.entry(log_frequency - grid.levels)
         order = order_table[entry]
-        deviation = residual_table[entry] / tolerance.frequency
-        above = (order == 0) & (deviation > 0) & (deviation**2 > SAG_COST)
-        cost = np.where(above, SAG_COST, deviation**2) + (spread + doubt[mode])
+        residual = residual_table[entry]
+        misfit = (residual / tolerance.frequency) ** 2
+        off = (order == 0) & (residual > -_FARTHEST_BELOW) & (misfit > IRREGULAR_COST)
+        cost = np.where(off, IRREGULAR_COST, misfit) + (spread + doubt[mode])
         if shape_costs is not None:
             cost += _of_orders(shape_costs[mode], order)
         orders.append(order)
         costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
-        raised.append(above)
-    return Alignment(_total(orders, costs, grid), orders, costs, raised)
+        irregular.append(off)
+    return Alignment(_total(orders, costs, grid), orders, costs, irregular)
 
 
 def _of_orders(table: Costs, order: IntArray) -> Costs:

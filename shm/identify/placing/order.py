@@ -48,12 +48,12 @@ Basis: TypeAlias = Literal["description", "pattern", "counting"]
 class Numbering:
     """Orders from 1 of the modes of each plane, None for a mode set aside, and how they are known.
 
-    `raised` (planes,): whether the first order lies above the beam that the others follow. `basis`:
+    `irregular` (planes,): whether the first order is off the beam that the others follow. `basis`:
     the hanger's `description`, the `pattern` of a tensioned beam, or mere `counting`.
     """
 
     orders: Orders
-    raised: tuple[bool, ...]
+    irregular: tuple[bool, ...]
     basis: Basis
 
 
@@ -106,9 +106,9 @@ def assign_orders(planes: Sequence[PlaneModes], expected: Expected | None = None
         if expected:
             bases = [("description", expected), *bases]
         for basis, each in bases:
-            orders, raised = _fitted(planes, each)
+            orders, irregular = _fitted(planes, each)
             if sum(plane.count(None) for plane in orders) <= _most_aside(sum(counts), basis):
-                return Numbering(orders, raised, basis)
+                return Numbering(orders, irregular, basis)
     counted = tuple(tuple(range(1, count + 1)) for count in counts)
     return Numbering(counted, (False,) * len(counts), "counting")
 
@@ -138,7 +138,7 @@ def _fitted(
     _, best, levels, tension = min(fits, key=lambda fit: fit[0])
     own = list(zip(best, levels, strict=False))
     orders = tuple(tuple(fit.numbers(level, tension)) for fit, level in own)
-    return orders, tuple(fit.is_first_raised(level, tension) for fit, level in own)
+    return orders, tuple(fit.is_first_irregular(level, tension) for fit, level in own)
 
 
 def _wide_grid(planes: Sequence[PlaneModes]) -> Grid:

@@ -41,7 +41,7 @@ class _Candidate:
 
 
 _Ordered: TypeAlias = tuple[_Candidate, int, bool]
-"""Candidate, order, and whether that lies above the beam of the others."""
+"""Candidate, order, and whether that is off the beam of the others."""
 
 
 def placed(
@@ -61,8 +61,10 @@ def placed(
         Expected.of(known) if known else None,
     )
     ordered = [
-        (candidate, order, raised and order == 1)
-        for group, orders, raised in zip(groups, numbering.orders, numbering.raised, strict=True)
+        (candidate, order, irregular and order == 1)
+        for group, orders, irregular in zip(
+            groups, numbering.orders, numbering.irregular, strict=True
+        )
         for candidate, order in zip(group, orders, strict=True)
         if order is not None
     ]
@@ -79,7 +81,7 @@ def placed(
             *_support_notes(hanger),
             *_basis_notes(numbering, known, points),
             *_order_notes(ordered),
-            *_raised_notes(ordered),
+            *_irregular_notes(ordered),
         ),
     )
 
@@ -122,7 +124,7 @@ def _plane_modes(group: Sequence[_Candidate], length_m: float) -> PlaneModes:
     )
 
 
-def _mode(candidate: _Candidate, order: int, raised: bool, pairs: Sequence[FoundMode]) -> Mode:
+def _mode(candidate: _Candidate, order: int, irregular: bool, pairs: Sequence[FoundMode]) -> Mode:
     found = candidate.found
     if any(found is pair for pair in pairs):
         found = blurred(found)
@@ -135,7 +137,7 @@ def _mode(candidate: _Candidate, order: int, raised: bool, pairs: Sequence[Found
         damping_sd=found.damping_sd,
         shape=candidate.shape,
         acceleration_m_s2=found.acceleration_m_s2,
-        raised=raised,
+        irregular=irregular,
     )
 
 
@@ -207,11 +209,11 @@ def _order_notes(ordered: Sequence[_Ordered]) -> list[str]:
     return notes
 
 
-def _raised_notes(ordered: Sequence[_Ordered]) -> list[str]:
+def _irregular_notes(ordered: Sequence[_Ordered]) -> list[str]:
     return [
-        f"{candidate.plane} order {order}, {candidate.found.frequency_hz:.2f} Hz, lies well above "
-        "the beam that the other orders follow, as if the hanger sagged: no tension is inferred "
-        "from it; ask `shm gap diagnose` for the cause"
-        for candidate, order, raised in ordered
-        if raised
+        f"{candidate.plane} order {order}, {candidate.found.frequency_hz:.2f} Hz, is well off the "
+        "beam that the other orders follow, as if the hanger sagged or had lost section: no "
+        "tension is inferred from it; ask `shm gap diagnose` for the cause"
+        for candidate, order, irregular in ordered
+        if irregular
     ]
