@@ -28,7 +28,7 @@ from shm_cli.common import (
     table,
     tests_and_hanger,
 )
-from shm_cli.update import modes_argument
+from shm_cli.update import modes_argument, tell_irregular
 
 
 @click.command()
@@ -72,6 +72,7 @@ def command(
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger) for name in competing_names(hanger, names)]
+    tell_irregular(tests)
     options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         selection = select(tests, chosen, options, progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import rich_click as click
@@ -9,7 +10,7 @@ import rich_click as click
 from shm.documents import posterior_document, summary
 from shm.models import build
 from shm.update import UpdateOptions, update
-from shm.values import Posterior
+from shm.values import ModalTest, Posterior
 from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
@@ -71,6 +72,7 @@ def command(
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    tell_irregular(tests)
     options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         posterior = update(tests, build(model, hanger), options, progress)
@@ -78,6 +80,19 @@ def command(
         show(posterior_document(posterior))
         return
     show_posterior(posterior)
+
+
+def tell_irregular(tests: Sequence[ModalTest]) -> None:
+    """Says on stderr which modes are left out, and what to do."""
+    for test in tests:
+        for mode in test.modes:
+            if mode.irregular:
+                click.echo(
+                    f"Left out: {mode.plane} {mode.order} of test {test.id}, "
+                    f"{mode.frequency_hz:.3f} Hz, is well off the bar that the other modes follow. "
+                    "For the cause: shm gap diagnose",
+                    err=True,
+                )
 
 
 def show_posterior(posterior: Posterior) -> None:

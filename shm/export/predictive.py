@@ -32,9 +32,9 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
 
     Raises BadInput where `tests` and `hanger` are not those that the posterior was made from.
     """
-    model = described(posterior.model, hanger)
-    likelihood = Likelihood(model.followed(tests))
+    likelihood = Likelihood(tests)
     sigma, theta = posterior.samples[:, -1], posterior.samples[:, :-1]
+    model = described(posterior.model, hanger)
     model.prepare(likelihood.highest_order)
     predicted = likelihood.predict(model, theta)
     measured = likelihood.frequency_hz

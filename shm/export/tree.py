@@ -129,7 +129,7 @@ def _coordinates(posterior: Posterior, tests: Sequence[ModalTest]) -> dict[str, 
         "order": ("measurement", [row.order for row in rows]),
     }
     if tests:
-        named["test"] = ("measurement", [test.id for test in tests for _ in test.modes])
+        named["test"] = ("measurement", [test.id for test in tests for _ in test.regular_modes])
     return named
 
 

@@ -21,7 +21,7 @@ from shm.models.composed import ComposedHanger
 from shm.models.conditions import Conditions
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
 from shm.models.registry import MODELS
-from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode, Plane
+from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
 _HALF_WIDTH_IN_SD = math.sqrt(3)
 _ALONG = 101
@@ -69,11 +69,6 @@ class Adopted(Model):
             amplitude=test.amplitude if hard and math.isfinite(test.amplitude) else 1.0,
             added_mass=test.added_mass,
         )
-
-    def follows(self, mode: Mode) -> bool:
-        """As any class, and an irregular mode where an adopted effect may have made it one."""
-        moved = any(EFFECTS[name].moves_first_order for name, _ in self._effects)
-        return moved or super().follows(mode)
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput as any class, and where an effect follows a temperature not given."""

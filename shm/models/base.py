@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from shm.errors import BadInput, UsageError
 from shm.models.conditions import Conditions
 from shm.models.laden import laden_ratio
-from shm.values import FloatArray, Hanger, ModalTest, Mode, Plane, Prior
+from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
 
@@ -125,17 +124,6 @@ class Model:
         stretched = hanger.nominal_tension_n / hanger.bending_stiffness_n_m2
         wave_number = math.sqrt(stretched + (order * math.pi / hanger.length_m) ** 2)
         return hanger.bending_stiffness_n_m2 * wave_number
-
-    def follows(self, mode: Mode) -> bool:
-        """Whether the class describes `mode`: no bar alone does an irregular one."""
-        return not mode.irregular
-
-    def followed(self, tests: Sequence[ModalTest]) -> list[ModalTest]:
-        """The tests with those modes alone that the class follows."""
-        return [
-            replace(test, modes=tuple(mode for mode in test.modes if self.follows(mode)))
-            for test in tests
-        ]
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput where this class cannot describe the conditions of `test`."""

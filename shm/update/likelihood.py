@@ -36,7 +36,7 @@ class Likelihood:
     """
 
     def __init__(self, tests: Sequence[ModalTest], repeat: int = 1):
-        modes: list[Mode] = [mode for test in tests for mode in test.modes]
+        modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]
         if not modes:
             raise BadInput(
                 "no measured frequency to update with.", remedy="Give a test with modes."
@@ -74,7 +74,7 @@ class Likelihood:
         rows: dict[Conditions, list[int]] = {}
         first = 0
         for test in self.tests:
-            measured = range(first, first + len(test.modes))
+            measured = range(first, first + len(test.regular_modes))
             rows.setdefault(model.conditions(test), []).extend(measured)
             first = measured.stop
         return rows

@@ -60,7 +60,7 @@ class Problem:
         """
         for test in tests:
             model.refuse(test)
-        problem = cls(model, Likelihood(model.followed(tests), repeat))
+        problem = cls(model, Likelihood(tests, repeat))
         label = f"{model.name}: reduced basis"
         model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
         return problem

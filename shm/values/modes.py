@@ -26,7 +26,7 @@ class Mode:
 
     `acceleration_m_s2` is the amplitude with which it rings right after a hit, at the sensor that
     moves most (median over the hits). `irregular`: it is well off the tensioned beam that the
-    others follow, as a sag raises a first order; a diagnosis takes it, a beam's tension does not.
+    others follow, as sag raises a first order. Diagnoses take it, no tension is inferred from it.
     """
 
     plane: Plane
@@ -89,3 +89,8 @@ class ModalTest:
     added_mass: AddedMass | None = None
     tension_read_n: float = NAN
     tension_read_sd_n: float = NAN
+
+    @property
+    def regular_modes(self) -> tuple[Mode, ...]:
+        """Those from which a tension is inferred; see `Mode.irregular`."""
+        return tuple(mode for mode in self.modes if not mode.irregular)

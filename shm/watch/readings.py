@@ -143,7 +143,7 @@ class Reader:
         self._base = base_point(baseline, self._model)
         self._allowance = frequency_allowance
         usable = [test for test in tests if _is_described(test, self._model)]
-        keys = {_key(mode) for test in usable for mode in test.modes if self._reads(mode)}
+        keys = {_key(mode) for test in usable for mode in test.regular_modes if _is_measured(mode)}
         if not keys:
             raise BadInput(
                 f"the baseline of hanger {hanger.id} has no test with a mode that model class "
@@ -215,11 +215,9 @@ class Reader:
         change = change - log_frequencies(model, base[None], self.modes)
         return np.asarray(_MODULUS_PER_KELVIN * change[0] / _STIFFER)
 
-    def _reads(self, mode: Mode) -> bool:
-        return self._model.follows(mode) and _is_measured(mode)
-
     def _seen(self, test: ModalTest) -> _Seen:
-        modes = [mode for mode in test.modes if self._reads(mode) and _key(mode) in self.modes]
+        read = (mode for mode in test.regular_modes if _is_measured(mode))
+        modes = [mode for mode in read if _key(mode) in self.modes]
         own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)

@@ -125,3 +125,20 @@ def test_the_textbook_method_warns_in_plain_words(modes_file: Path, hanger_file:
     assert ended.stderr.startswith("Warning: textbook TMCMC: a bias of -1 to -7")
     assert ".py" not in ended.stderr
     assert json.loads(ended.stdout)["model"] == "beam1"
+
+
+@pytest.mark.parametrize(
+    "command", [("update", "--model", "beam1"), ("select", "--models", "beam1")]
+)
+def test_a_mode_that_is_left_out_is_said(
+    shm: Shm, modes_file: Path, hanger_file: Path, command: tuple[str, ...]
+) -> None:
+    document = json.loads(modes_file.read_text(encoding="utf-8"))
+    mode = document["tests"][0]["modes"][0]
+    mode |= {"irregular": True, "frequency_hz": 1.2 * mode["frequency_hz"]}
+    modes_file.write_text(json.dumps(document), encoding="utf-8")
+    ended = shm(*command, modes_file, "--hanger-file", hanger_file, *QUICK, "--json")
+    assert f"Left out: {mode['plane']} {mode['order']} of test" in ended.err
+    found = ended.document["models"][0] if command[0] == "select" else ended.document
+    assert found["tension_n"]["mean"] == pytest.approx(0.9 * 711e3, rel=0.05)
+    assert len(found["predicted"]) == len(document["tests"][0]["modes"]) - 1

@@ -12,8 +12,6 @@ from shm.models.conditions import Conditions
 from shm.simulate import HangerState, TestConditions, planted_modes
 from shm.update import UpdateOptions, update
 from shm.update.likelihood import Likelihood
-from shm.update.options import silent
-from shm.update.problem import Problem
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -125,16 +123,10 @@ def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
     np.testing.assert_allclose(found, planted.frequency_hz, rtol=2e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "left_out"),
-    [
-        ("beam1", 1),
-        ("beam1+distributed_mass@everywhere", 1),
-        ("beam1+sag@everywhere.transverse", 0),
-    ],
-)
-def test_an_irregular_mode_counts_where_the_class_can_tell_of_it(name: str, left_out: int) -> None:
-    model = build(name, HANGER_3)
-    modes = (Mode("transverse", 1, 7.0, irregular=True), Mode("transverse", 2, 13.85))
-    problem = Problem.of([ModalTest("t1", modes, 3)], model, 1, silent)
-    assert problem.likelihood.modes == list(modes[left_out:])
+def test_no_tension_is_inferred_from_an_irregular_mode() -> None:
+    irregular, regular = Mode("transverse", 1, 7.0, irregular=True), Mode("transverse", 2, 13.85)
+    tests = [ModalTest("t1", (irregular, regular), 3), ModalTest("t2", (regular, regular), 3)]
+    likelihood = Likelihood(tests)
+    assert likelihood.modes == [regular] * 3
+    model = build("beam1", HANGER_3)
+    assert likelihood.predict(model, parameters(model, theta_L=1.0)).shape == (1, 3)

@@ -191,7 +191,7 @@ def test_modes_that_the_baseline_lacks_are_left_out() -> None:
     np.testing.assert_array_equal(few.information, many.information)
 
 
-def test_an_irregular_mode_is_read_only_where_the_class_can_tell_of_it() -> None:
+def test_an_irregular_mode_is_not_read() -> None:
     seen = measured(frequencies(SPRUNG))
     irregular = replace(seen, modes=(replace(seen.modes[0], irregular=True), *seen.modes[1:]))
     plain = Reader(posterior(SPRUNG), [irregular], HANGER_3)

@@ -105,7 +105,7 @@ class Effect:
     for. The first parameter is the effect's size. `follows` are the conditions of a test that it
     depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
     would not have. `other_laws` says in words by which other laws, about as likely as its own, the
-    same parameters may act. `moves_first_order`: it may take a first order well off the bar's.
+    same parameters may act.
     """
 
     name: ClassVar[str]
@@ -116,7 +116,6 @@ class Effect:
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
     of_the_hanger: ClassVar[bool] = True
     other_laws: ClassVar[tuple[str, ...]] = ()
-    moves_first_order: ClassVar[bool] = False
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         """Why these data cannot show the effect, a sentence for people; empty where they can."""

@@ -24,7 +24,6 @@ class IntermediateSupport(Effect):
     source = "Grossi and Albarracín (2003), Eigenfrequencies of generally restrained beams."
     seen_by = ("frequencies of low orders", "the other plane", "shapes")
     imitated_by = ("sag", "support_motion", "section_loss", "point_mass")
-    moves_first_order = True
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.planes(survey)

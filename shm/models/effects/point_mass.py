@@ -31,7 +31,6 @@ class UnknownPointMass(Effect):
         "sensor_mass",
     )
     other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
-    moves_first_order = True
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         own_kg = scales.mass_kg(hanger)

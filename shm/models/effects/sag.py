@@ -23,7 +23,6 @@ class Sag(Effect):
     source = "Irvine and Caughey (1974), The linear theory of free vibrations of a suspended cable."
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
-    moves_first_order = True
     other_laws = ("it sags as its bending and its ends let it, not as a string",)
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:

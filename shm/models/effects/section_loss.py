@@ -29,7 +29,6 @@ class SectionLoss(Effect):
         "the loss begins and ends gradually, over two fifths of its extent at each end",
         "pits reach into the section: the stiffness falls as the area, not as its square",
     )
-    moves_first_order = True
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(

@@ -38,7 +38,6 @@ class SupportMotion(Effect):
     )
     seen_by = ("frequencies near the support's own", "the other plane", "shapes near the ends")
     imitated_by = ("intermediate_support", "sag", "translational_end_flexibility")
-    moves_first_order = True
     other_laws = tuple(
         f"with a second mode at {faster:g} times the frequency, {_HEAVIER:g} times as heavy"
         for faster in _FASTER

@@ -28,7 +28,6 @@ class TranslationalEndFlexibility(Effect):
     source = "Rao and Mirza (1989), A note on vibrations of generally restrained beams."
     seen_by = ("frequencies", "the other plane", "shapes near the ends")
     imitated_by = ("support_motion", "shear_and_rotary_inertia", "stiff_end_zones", "point_mass")
-    moves_first_order = True
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
