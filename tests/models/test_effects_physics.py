@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from shm.models import build
 from shm.models.effects import EFFECTS, Conditions, Survey, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, solve
+from shm.models.hanger.physical import Zone
 from shm.values import NAN, PLANES, Hanger
 from tests.helpers.hangers import HANGER_3
 
@@ -237,6 +238,29 @@ def test_each_other_law_of_a_support_swings_at_a_higher_frequency_of_its_own() -
         ratios.append(1 / np.sqrt(mass_kg * compliance) / (2 * np.pi * 3.0))
     assert ratios == sorted(ratios)
     assert 1.5 < ratios[0] < ratios[-1] < 6.0
+
+
+@pytest.mark.parametrize(("law", "edge"), [(0, 0.0), (1, 0.6), (3, 0.3)])
+def test_a_loss_with_smooth_edges_is_met_best_by_its_law(law: int, edge: float) -> None:
+    """Forty steps stand for an edge that is smooth over a share of the extent at each end."""
+    effect, at = EFFECTS["section_loss"], place("section_loss", "everywhere")
+    middle_m, extent_m, left = 3.0, 3.0, 0.5
+    step = left ** (1 / 40)
+    smooth = tuple(
+        Zone(
+            *(np.array([each]) for each in (middle_m - reach_m, middle_m + reach_m, step**2, step))
+        )
+        for reach_m in extent_m / 2 * np.linspace(1 - edge, 1 + edge, 40)
+    )
+    wanted = solved(replace(physical(), zones=smooth)).frequency_hz
+    values = np.array([[1 - left, middle_m, extent_m]])
+    found = [
+        solved(effect.applied(physical(), values, replace(at, law=each), Conditions("t1"), ROD))
+        for each in range(len(effect.other_laws) + 1)
+    ]
+    off = [np.abs(each.frequency_hz / wanted - 1).max() for each in found]
+    assert int(np.argmin(off)) == law
+    assert off[law] < 0.005
 
 
 def test_warmth_and_level_change_the_tension() -> None:

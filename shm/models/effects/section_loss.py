@@ -10,6 +10,9 @@ from shm.models.effects.base import GRADUAL, Effect, Parameter, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, FloatArray, Hanger
 
+_STEEP = (0.8, 1.0, 1.2)
+"""Half as gradual: three steps stand for a slope that is a half wider than they span."""
+
 
 class SectionLoss(Effect):
     """Corrosion, wear or a machined neck: over a stretch the bar has lost a share of its area.
@@ -26,8 +29,9 @@ class SectionLoss(Effect):
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
     other_laws = (
-        "the loss begins and ends gradually, over two fifths of its extent at each end",
+        "the loss begins and ends gradually, over three fifths of its extent at each end",
         "pits reach into the section: the stiffness falls as the area, not as its square",
+        "the loss begins and ends gradually, over three tenths of its extent at each end",
     )
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
@@ -61,7 +65,7 @@ class SectionLoss(Effect):
         hanger: Hanger,
     ) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        reaches = GRADUAL if variant.law == 1 else (1.0,)
+        reaches = {1: GRADUAL, 3: _STEEP}.get(variant.law, (1.0,))
         power = 1 if variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
         zones = tuple(
