@@ -75,8 +75,8 @@ class Grid:
 class Alignment:
     """Costs over a grid: `total` (levels, tensions, springs), `orders` from 0 and `costs` a mode.
 
-    `orders`, `costs` and `irregular`, whether a mode is a first order off the beam, have shape
-    (modes, levels, tensions, springs).
+    `orders`, `costs` and `irregular`, whether a mode is a first order so far off the beam that it
+    would be set aside, have shape (modes, levels, tensions, springs).
     """
 
     total: Costs
@@ -121,13 +121,13 @@ def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
         order = order_table[entry]
         residual = residual_table[entry]
         misfit = (residual / tolerance.frequency) ** 2
-        off = (order == 0) & (residual > -_FARTHEST_BELOW) & (misfit > IRREGULAR_COST)
-        cost = np.where(off, IRREGULAR_COST, misfit) + (spread + doubt[mode])
+        first = (order == 0) & (residual > -_FARTHEST_BELOW)
+        cost = np.where(first, np.minimum(misfit, IRREGULAR_COST), misfit) + spread + doubt[mode]
         if shape_costs is not None:
             cost += _of_orders(shape_costs[mode], order)
         orders.append(order)
         costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
-        irregular.append(off)
+        irregular.append(first & (misfit + spread + doubt[mode] >= ASIDE_COST))
     return Alignment(_total(orders, costs, grid), orders, costs, irregular)
 
 
