@@ -31,7 +31,7 @@ COARSE = Resolution(theta_step=1.4, nodes=24, springs=160, sigma_step_in_sd=1.2)
 
 
 @pytest.mark.parametrize("table", TABLES)
-@pytest.mark.parametrize("repeat", [1, 10])
+@pytest.mark.parametrize("repeat", [pytest.param(1, marks=pytest.mark.trial), 10])
 def test_a_coarser_quadrature_agrees_with_the_stored_oracle(table: str, repeat: int) -> None:
     assert beam1_log_evidence(table, repeat, 500) == pytest.approx(
         ORACLE[table, "beam1", repeat], abs=2e-3
