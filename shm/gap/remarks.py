@@ -102,6 +102,7 @@ def _doubtful(test: ModalTest) -> dict[str, str]:
 def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
     remarks = [
         _few(tests, hanger),
+        _irregular(tests),
         _without_sd(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
@@ -137,6 +138,24 @@ def _what_few_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
     return (
         "tension alone can follow so few frequencies, so that a gap can hardly show and its cause "
         "cannot"
+    )
+
+
+def _irregular(tests: Sequence[ModalTest]) -> str:
+    """The baseline's tension is then another one than that inferred elsewhere."""
+    found = [
+        f"{_name(mode)} of test {test.id} ({mode.frequency_hz:g} Hz)"
+        for test in tests
+        for mode in test.modes
+        if mode.irregular
+    ]
+    if not found:
+        return ""
+    are, them = ("is", "it") if len(found) == 1 else ("are", "them")
+    return (
+        f"Well off the beam that the other modes follow {are} {', '.join(found)}: the diagnosis "
+        f"takes {them}, `shm update` leaves {them} out, so that the tension by the baseline alone "
+        f"differs from that of `shm update`."
     )
 
 

@@ -68,6 +68,18 @@ def test_one_mode_at_several_tensions_read_shows_a_gap_by_how_it_rises() -> None
     assert "tension alone can follow" in remark
 
 
+def test_an_irregular_mode_is_used_and_said() -> None:
+    regular = _test()
+    test = replace(regular, modes=(replace(regular.modes[0], irregular=True), *regular.modes[1:]))
+    found = usable([test], HANGER)
+    assert found.tests == (test,)
+    (remark,) = found.remarks
+    assert remark.startswith("Well off the beam that the other modes follow is transverse 1 of tes")
+    assert "(5.6 Hz): the diagnosis takes it, `shm update` leaves it out" in remark
+    (remark,) = usable([test, replace(test, id="t2")], HANGER).remarks
+    assert "follow are transverse 1 of test t1 (5.6 Hz), transverse 1 of test t2" in remark
+
+
 def test_frequencies_without_standard_deviation_are_said() -> None:
     (remark,) = usable([_test(sd=NAN)], HANGER).remarks
     assert remark.startswith("No frequency has a standard deviation")
