@@ -12,6 +12,7 @@ from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.laws import mixed
 from shm.gap.next_measurement import ranked
+from shm.gap.numbering import misnumbered
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.places import places
@@ -97,7 +98,12 @@ def diagnose(
         tension_before_n=_tension(problem, [(1.0, before)], rng),
         tension_after_n=_tension(problem, possible(attribution), rng),
         next_measurements=following,
-        remarks=(*found.remarks, *set_aside(aside, clear.otherwise), *doubtful(doubted)),
+        remarks=(
+            *found.remarks,
+            *misnumbered(problem, attribution, rng),
+            *set_aside(aside, clear.otherwise),
+            *doubtful(doubted),
+        ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,

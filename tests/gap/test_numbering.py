@@ -1,0 +1,79 @@
+"""Wrong orders are told from a gap: planted by the simulator, numbered wrongly by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.attribution import attributed
+from shm.gap.numbering import misnumbered
+from shm.gap.observations import observed
+from shm.gap.options import GapOptions
+from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from tests.helpers.hangers import HANGER_3
+
+CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
+KNOWN = ("point_mass", "timebase")
+PLAN = CampaignPlan(
+    modes=6,
+    shapes=False,
+    temperatures_c=(10.0,),
+    amplitudes=(1.0,),
+    mass_share=0.0,
+    tension_spread=0.0,
+)
+
+
+def _remarks(shifts: Mapping[str, int], *effects: PlantedEffect) -> tuple[str, ...]:
+    rng = np.random.default_rng(1)
+    tests = campaign(HANGER_3, HangerState(711e3), effects, PLAN, rng)
+    numbered = [
+        replace(
+            test,
+            modes=tuple(
+                replace(mode, order=mode.order + shifts.get(mode.plane, 0))
+                for mode in test.modes
+                if mode.order + shifts.get(mode.plane, 0) > 0
+            ),
+        )
+        for test in tests
+    ]
+    problem = GapProblem(HANGER_3, "beam1", observed(numbered, HANGER_3))
+    without = tuple(name for name in EFFECTS if name not in KNOWN)
+    return misnumbered(problem, attributed(problem, GapOptions(without=without), rng), rng)
+
+
+@pytest.mark.parametrize(
+    ("shifts", "said"),
+    [
+        (
+            {"transverse": -1, "longitudinal": -1},
+            "were the modes of both planes numbered one higher",
+        ),
+        ({"transverse": -1}, "were the transverse modes numbered one higher, the"),
+        (
+            {"transverse": 1, "longitudinal": -1},
+            "were the transverse modes numbered one lower and the longitudinal modes",
+        ),
+    ],
+)
+def test_wrong_orders_are_said_with_the_right_ones(shifts: dict[str, int], said: str) -> None:
+    (remark,) = _remarks(shifts)
+    assert said in remark
+    tension_kn = float(remark.split(", at ")[1].split(" kN")[0])
+    assert tension_kn == pytest.approx(711, rel=0.02)
+
+
+def test_a_gap_does_not_hide_wrong_orders() -> None:
+    (remark,) = _remarks({"transverse": -1, "longitudinal": -1}, CLAMP)
+    assert "both planes numbered one higher" in remark
+
+
+def test_of_right_orders_nothing_is_said() -> None:
+    assert _remarks({}) == ()
+    assert _remarks({}, CLAMP) == ()
