@@ -28,7 +28,7 @@ from shm_cli.common import (
     table,
     tests_and_hanger,
 )
-from shm_cli.update import modes_argument, tell_irregular
+from shm_cli.update import modes_argument, tell_irregular, tell_poor_fit
 
 
 @click.command()
@@ -76,6 +76,7 @@ def command(
     options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         selection = select(tests, chosen, options, progress)
+    tell_poor_fit(selection.selected)
     if as_json:
         show({**selection_document(selection), "not_applicable": not_applicable})
         return

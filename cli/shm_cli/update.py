@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, summary
@@ -26,6 +27,9 @@ from shm_cli.common import (
     table,
     tests_and_hanger,
 )
+
+_POOR_FIT = 0.05
+"""Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
 modes_argument = click.argument(
     "modes_file",
@@ -76,6 +80,7 @@ def command(
     options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         posterior = update(tests, build(model, hanger), options, progress)
+    tell_poor_fit(posterior)
     if as_json:
         show(posterior_document(posterior))
         return
@@ -93,6 +98,18 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
                     "For the cause: shm gap diagnose",
                     err=True,
                 )
+
+
+def tell_poor_fit(posterior: Posterior) -> None:
+    """Says on stderr where a class misses the frequencies as no class of this bar should."""
+    sigma = posterior.parameter("sigma")
+    if np.quantile(sigma, 0.05) > _POOR_FIT:
+        click.echo(
+            f"Poor fit: {posterior.model} misses the frequencies by {100 * sigma.mean():.0f} %. Do "
+            "not trust its tension: look at the orders of the modes and at the hanger's "
+            "description. For the cause: shm gap diagnose",
+            err=True,
+        )
 
 
 def show_posterior(posterior: Posterior) -> None:

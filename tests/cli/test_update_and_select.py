@@ -142,3 +142,21 @@ def test_a_mode_that_is_left_out_is_said(
     found = ended.document["models"][0] if command[0] == "select" else ended.document
     assert found["tension_n"]["mean"] == pytest.approx(0.9 * 711e3, rel=0.05)
     assert len(found["predicted"]) == len(document["tests"][0]["modes"]) - 1
+
+
+@pytest.mark.parametrize(
+    "command", [("update", "--model", "beam1"), ("select", "--models", "beam1")]
+)
+def test_a_class_that_misses_the_frequencies_by_far_is_said(
+    shm: Shm, modes_file: Path, hanger_file: Path, command: tuple[str, ...]
+) -> None:
+    call = (*command, modes_file, "--hanger-file", hanger_file, *QUICK, "--json")
+    assert "Poor fit" not in shm(*call).err
+    document = json.loads(modes_file.read_text(encoding="utf-8"))
+    for test in document["tests"]:
+        test["modes"] = [mode | {"order": mode["order"] + 1} for mode in test["modes"]]
+    modes_file.write_text(json.dumps(document), encoding="utf-8")
+    ended = shm(*call)
+    assert ended.code == 0
+    assert "Poor fit: beam1 misses the frequencies by" in ended.err
+    assert "look at the orders of the modes" in ended.err
