@@ -12,7 +12,6 @@ from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.laws import mixed
 from shm.gap.next_measurement import ranked
-from shm.gap.numbering import misnumbered
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.places import places
@@ -100,7 +99,7 @@ def diagnose(
         next_measurements=following,
         remarks=(
             *found.remarks,
-            *misnumbered(problem, attribution, rng),
+            *([clear.misnumbered] if clear.misnumbered else []),
             *set_aside(aside, clear.otherwise),
             *doubtful(doubted),
         ),

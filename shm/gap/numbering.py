@@ -22,23 +22,22 @@ _SHIFTS = {0: "", 1: "one higher", -1: "one lower"}
 Shifts = tuple[int, ...]
 
 
-def misnumbered(
-    problem: GapProblem, attribution: Attribution, rng: np.random.Generator
-) -> tuple[str, ...]:
-    """A remark where the baseline explains the modes far better under other orders, else none.
+def misnumbered(problem: GapProblem, attribution: Attribution) -> str:
+    """A remark where the baseline explains the modes far better under other orders, else "".
 
     Tried are orders one higher or lower, of either plane or both, with and without a remainder.
     """
     if attribution.leads == "no gap":
-        return ()
+        return ""
+    rng = np.random.default_rng(0)  # for the draws of fits, which are not used
     found = [(_evidence(other, rng), shifts, other) for shifts, other in _renumbered(problem)]
     log_evidence, shifts, other = max(found, key=lambda each: each[0])
     if log_evidence < max(each.log_evidence for each in attribution.tried) + FAR_BETTER:
-        return ()
+        return ""
     return (
         f"The orders look wrong: were {_told(shifts)}, the baseline alone would fit better than "
         f"any cause does now{_tension(other, rng)}. Was the lowest mode missed, or one counted "
-        f"that is none? If so, number them anew and diagnose again.",
+        f"that is none? If so, number them anew and diagnose again."
     )
 
 

@@ -11,6 +11,7 @@ from shm.gap.answer import answered
 from shm.gap.attribution import Attribution, attributed, more_thorough
 from shm.gap.contract import Fit
 from shm.gap.gross_error import LeftOut, at, log_gross, log_ordinary, without_shape
+from shm.gap.numbering import misnumbered
 from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.outliers import SURE, GrossError, gross_errors
 from shm.gap.problem import GapProblem
@@ -26,6 +27,7 @@ class Cleared:
 
     `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
     but not surely. `otherwise` is the cause that would lead, were none of `aside` one; "" for none.
+    `misnumbered` is a remark where the orders look wrong, or "".
     """
 
     whole: GapProblem
@@ -35,6 +37,7 @@ class Cleared:
     aside: tuple[GrossError, ...] = ()
     doubted: tuple[GrossError, ...] = ()
     otherwise: str = ""
+    misnumbered: str = ""
 
     def seen(self, error: GrossError, fit: Fit) -> LeftOut:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""
@@ -50,7 +53,7 @@ def cleared(
 
     Where the last attribution expects one of them as it was measured, the first one stands. It is
     searched thoroughly only then, for among many pairs there always is one that takes a gross error
-    for its own.
+    for its own, and not where the orders look wrong: they must be put right first.
     """
     every = np.arange(whole.design.frequencies)
     first = found = Cleared(whole, whole, every, attributed(whole, options, rng, progress))
@@ -66,8 +69,10 @@ def cleared(
         again = attributed(part, options, rng, lambda label, _: progress(label, 1.0))
         found = Cleared(whole, part, rows, again, (*found.aside, *sure))
     found = found if all(_stands(found, each) for each in found.aside) else first
-    thorough = more_thorough(found.attribution)
-    return replace(found, attribution=thorough, otherwise=_led_before(first.attribution, thorough))
+    wrong = misnumbered(found.problem, found.attribution)
+    last = found.attribution if wrong else more_thorough(found.attribution)
+    otherwise = _led_before(first.attribution, last)
+    return replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
 
 
 def _led_before(first: Attribution, last: Attribution) -> str:

@@ -29,7 +29,7 @@ PLAN = CampaignPlan(
 )
 
 
-def _remarks(shifts: Mapping[str, int], *effects: PlantedEffect) -> tuple[str, ...]:
+def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
     rng = np.random.default_rng(1)
     tests = campaign(HANGER_3, HangerState(711e3), effects, PLAN, rng)
     numbered = [
@@ -45,7 +45,7 @@ def _remarks(shifts: Mapping[str, int], *effects: PlantedEffect) -> tuple[str, .
     ]
     problem = GapProblem(HANGER_3, "beam1", observed(numbered, HANGER_3))
     without = tuple(name for name in EFFECTS if name not in KNOWN)
-    return misnumbered(problem, attributed(problem, GapOptions(without=without), rng), rng)
+    return misnumbered(problem, attributed(problem, GapOptions(without=without), rng))
 
 
 @pytest.mark.parametrize(
@@ -63,17 +63,17 @@ def _remarks(shifts: Mapping[str, int], *effects: PlantedEffect) -> tuple[str, .
     ],
 )
 def test_wrong_orders_are_said_with_the_right_ones(shifts: dict[str, int], said: str) -> None:
-    (remark,) = _remarks(shifts)
+    remark = _remark(shifts)
     assert said in remark
     tension_kn = float(remark.split(", at ")[1].split(" kN")[0])
     assert tension_kn == pytest.approx(711, rel=0.02)
 
 
 def test_a_gap_does_not_hide_wrong_orders() -> None:
-    (remark,) = _remarks({"transverse": -1, "longitudinal": -1}, CLAMP)
+    remark = _remark({"transverse": -1, "longitudinal": -1}, CLAMP)
     assert "both planes numbered one higher" in remark
 
 
 def test_of_right_orders_nothing_is_said() -> None:
-    assert _remarks({}) == ()
-    assert _remarks({}, CLAMP) == ()
+    assert _remark({}) == ""
+    assert _remark({}, CLAMP) == ""
