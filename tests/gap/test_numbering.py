@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import attributed
+from shm.gap.diagnose import diagnose
 from shm.gap.numbering import misnumbered
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.values import ModalTest
 from tests.helpers.hangers import HANGER_3
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
@@ -27,12 +29,13 @@ PLAN = CampaignPlan(
     mass_share=0.0,
     tension_spread=0.0,
 )
+OPTIONS = GapOptions(without=tuple(name for name in EFFECTS if name not in KNOWN))
 
 
-def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
+def _numbered(shifts: Mapping[str, int], *effects: PlantedEffect) -> list[ModalTest]:
     rng = np.random.default_rng(1)
     tests = campaign(HANGER_3, HangerState(711e3), effects, PLAN, rng)
-    numbered = [
+    return [
         replace(
             test,
             modes=tuple(
@@ -43,9 +46,12 @@ def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
         )
         for test in tests
     ]
-    problem = GapProblem(HANGER_3, "beam1", observed(numbered, HANGER_3))
-    without = tuple(name for name in EFFECTS if name not in KNOWN)
-    return misnumbered(problem, attributed(problem, GapOptions(without=without), rng))
+
+
+def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
+    tests = _numbered(shifts, *effects)
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    return misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1)))
 
 
 @pytest.mark.parametrize(
@@ -77,3 +83,9 @@ def test_a_gap_does_not_hide_wrong_orders() -> None:
 def test_of_right_orders_nothing_is_said() -> None:
     assert _remark({}) == ""
     assert _remark({}, CLAMP) == ""
+
+
+def test_a_diagnosis_says_so_first() -> None:
+    found = diagnose(_numbered({"transverse": -1, "longitudinal": -1}), HANGER_3, OPTIONS)
+    assert found.remarks[0].startswith("The orders look wrong: were the modes of both planes")
+    assert not diagnose(_numbered({}), HANGER_3, OPTIONS).remarks
