@@ -139,6 +139,14 @@ class Mark:
         """Whether it has a bound to keep."""
         return math.isfinite(self.lower) or math.isfinite(self.upper)
 
+    @property
+    def by_whole_interval(self) -> bool:
+        """Whether the whole interval is on the side of its value: chance alone hardly did it."""
+        low, high = self.score.low, self.score.high
+        if self.met:
+            return self.lower <= low and high <= self.upper
+        return self.met is False and (high < self.lower or low > self.upper)
+
 
 @dataclass(frozen=True)
 class Bin:

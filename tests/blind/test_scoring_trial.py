@@ -10,7 +10,7 @@ import pytest
 from shm.blind.scoring import trial_score
 from shm.blind.scoring.calibration import by_chance, calibration_error, corrected, counted
 from shm.blind.scoring.estimates import Samples, share
-from shm.values import Answer, Mark, MarkName, TrialScore, TrueCase
+from shm.values import Answer, Mark, MarkName, Score, TrialScore, TrueCase
 from tests.helpers.trial_answers import a_truth, an_answer, liar, oracle, plausible, some_truths
 
 SHA = ("0" * 64, "1" * 64)
@@ -196,3 +196,21 @@ def test_what_few_cases_add_is_taken_off_a_perfect_forecast_but_not_off_an_overc
     assert less < 0.7 * raw
     overconfident = [corrected(forecasts(0.2, seed), rng).score.value for seed in range(40)]
     assert np.mean(overconfident) == pytest.approx(0.2, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("met", "interval", "surely"),
+    [
+        (True, (0.96, 0.99), True),
+        (True, (0.94, 0.99), False),
+        (False, (0.90, 0.94), True),
+        (False, (0.90, 0.96), False),
+        (False, (math.nan, math.nan), False),
+        (None, (0.96, 0.99), False),
+    ],
+)
+def test_a_mark_is_met_or_missed_with_the_whole_interval_or_not(
+    met: bool | None, interval: tuple[float, float], surely: bool
+) -> None:
+    asked = Mark("detected", Score(0.95, *interval, 100), 0.95, math.inf, met=met)
+    assert asked.by_whole_interval is surely

@@ -103,7 +103,7 @@ def test_the_summary_says_what_was_tried_and_what_came_out(pages: dict[str, Outl
     assert "gave false alarm at 0 of 96 sound hangers" in page
     assert "The tension was off by 5.00 % before and 0.10 % after" in page
     assert "Marks that are missed" not in page
-    assert "marks met, none missed; of" in page
+    assert re.search(r"marks met \(\d+ with the whole interval\), none missed; of", page)
 
 
 def test_every_missed_mark_stands_on_top_and_every_wrong_case_in_a_table(
@@ -114,6 +114,10 @@ def test_every_missed_mark_stands_on_top_and_every_wrong_case_in_a_table(
     assert len(missed) > 5
     top = page[: page.index("Figures")]
     assert top.count(", asked at ") == len(missed)
+    surely = [m for m in missed if m.score.high < m.lower or m.score.low > m.upper]
+    assert 0 < len(surely) < len(missed)
+    assert top.count(", missed with the whole interval; ") == len(surely)
+    assert f"{len(missed)} are missed ({len(surely)} with the whole interval), listed" in page
     wrong = [c.case for c in score.first_round if c.kind == "none" and not c.right]
     assert wrong
     assert all(case in page for case in wrong)

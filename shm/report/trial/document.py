@@ -16,7 +16,12 @@ def trial_json(score: TrialScore) -> dict[str, Any]:
     """A document for `shm.documents.dump`; unknown numbers and absent bounds become null there."""
     document = asdict(score)
     marks = [
-        {**asdict(mark), "title": title(mark.name), "outcome": outcome(mark)}
+        {
+            **asdict(mark),
+            "title": title(mark.name),
+            "outcome": outcome(mark),
+            "by_whole_interval": mark.by_whole_interval,
+        }
         for mark in score.marks
     ]
     return {

@@ -108,12 +108,20 @@ def _known(score: TrialScore, name: MarkName) -> Mark | None:
 
 def _marks(score: TrialScore) -> str:
     told = Counter(outcome(mark) for mark in asked(score))
+    sure = Counter(outcome(mark) for mark in asked(score) if mark.by_whole_interval)
     few = f"; of {told['too few']} too few cases speak" if told["too few"] else ""
     lost = told["missed"]
     missed = (
-        f"{lost} {'is' if lost == 1 else 'are'} missed, listed below" if lost else "none missed"
+        f"{lost} {'is' if lost == 1 else 'are'} missed ({_surely(sure['missed'])}), listed below"
+        if lost
+        else "none missed"
     )
-    return f"{verdict(score)}, {missed}{few}."
+    return f"{verdict(score)} ({_surely(sure['met'])}), {missed}{few}."
+
+
+def _surely(marks: int) -> str:
+    """Of so many marks chance alone hardly did what they did."""
+    return f"{marks or 'none'} with the whole interval"
 
 
 def misses(score: TrialScore) -> list[str]:
@@ -124,7 +132,8 @@ def misses(score: TrialScore) -> list[str]:
 def sentence(mark: Mark) -> str:
     told = f"{found(mark)} ({interval(mark.score, is_cost(mark))})"
     what = f"{title(mark.name)} ({scope(mark)})"
-    return f"{what[0].upper()}{what[1:]}: {told}, asked {bounds(mark)}; {count(mark.score)}."
+    sure = ", missed with the whole interval" if mark.by_whole_interval else ""
+    return f"{what[0].upper()}{what[1:]}: {told}, asked {bounds(mark)}{sure}; {count(mark.score)}."
 
 
 def names_of(score: TrialScore) -> list[MarkName]:
