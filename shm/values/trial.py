@@ -100,6 +100,7 @@ MarkName = Literal[
     "calibration error",
     "calibration error as counted",
     "calibration error by chance",
+    "calibration missed if perfect",
     "calibration error above size four",
     "log score",
     "Brier score",

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from shm.blind.scoring import trial_score
-from shm.blind.scoring.calibration import by_chance, calibration_error, corrected, counted
+from shm.blind.scoring.calibration import (
+    by_chance,
+    calibration_error,
+    corrected,
+    counted,
+    missed_if_perfect,
+)
 from shm.blind.scoring.estimates import Samples, share
 from shm.values import Answer, Mark, MarkName, Score, TrialScore, TrueCase
 from tests.helpers.trial_answers import a_truth, an_answer, liar, oracle, plausible, some_truths
@@ -196,6 +202,20 @@ def test_what_few_cases_add_is_taken_off_a_perfect_forecast_but_not_off_an_overc
     assert less < 0.7 * raw
     overconfident = [corrected(forecasts(0.2, seed), rng).score.value for seed in range(40)]
     assert np.mean(overconfident) == pytest.approx(0.2, abs=0.03)
+
+
+def test_few_perfect_forecasts_may_miss_the_mark_and_many_do_not() -> None:
+    rng = np.random.default_rng(0)
+    few, many = np.full(40, 0.8), np.full(1000, 0.8)
+    missed = np.mean(
+        [corrected((few, rng.random(40) < few), rng).score.value > 0.06 for _ in range(100)]
+    )
+    told = missed_if_perfect(0.06)((few, np.zeros(40)), rng).score
+    assert told.value == pytest.approx(missed, abs=0.12)
+    assert 0.1 < told.value < 0.6
+    assert told.cases == 40
+    assert missed_if_perfect(0.06)((many, np.zeros(1000)), rng).score.value == 0.0
+    assert math.isnan(missed_if_perfect(0.06)((few[:1], few[:1]), rng).score.value)
 
 
 @pytest.mark.parametrize(

@@ -85,13 +85,19 @@ _UNKNOWN_CAUSE = (
     ),
 )  # fmt: skip
 
+_MISCALIBRATED = 0.06
+
 _CALIBRATED = (
     Question(
         "calibration error", everything, _LEADING, calibration.corrected,
-        overall=at_most(0.06), each=every(at_most(0.06)), better=-1,
+        overall=at_most(_MISCALIBRATED), each=every(at_most(_MISCALIBRATED)), better=-1,
     ),
     Question("calibration error as counted", everything, _LEADING, calibration.counted),
     Question("calibration error by chance", everything, _LEADING, calibration.by_chance),
+    Question(
+        "calibration missed if perfect", everything, _LEADING,
+        calibration.missed_if_perfect(_MISCALIBRATED),
+    ),
     Question(
         "calibration error above size four", everything, _LEADING, calibration.corrected,
         above=LARGE,

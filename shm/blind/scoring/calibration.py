@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.blind.scoring.estimates import ENDS, Estimate, Samples, resampled, share
+from shm.blind.scoring.estimates import ENDS, Estimate, Estimator, Samples, resampled, share
 from shm.values import NAN, Bin, FloatArray, Score
 
 _IN_A_BIN = 15
 _MOST_BINS = 10
 _TRIALS = 1000
+_PERFECT_TRIALS, _RESAMPLES = 200, 200
 
 
 def bins_of(cases: int) -> int:
@@ -47,9 +48,13 @@ def corrected(samples: Samples, rng: np.random.Generator) -> Estimate:
     draws = np.maximum(0.0, 2 * found.score.value - found.draws)
     if len(draws) < 2:
         return found
-    value = max(0.0, 2 * found.score.value - float(found.draws.mean()))
+    value = _less_bias(found.score.value, found.draws)
     low, high = (float(end) for end in np.quantile(draws, ENDS))
     return Estimate(replace(found.score, value=value, low=low, high=high), draws)
+
+
+def _less_bias(value: float, draws: FloatArray) -> float:
+    return max(0.0, 2 * value - float(draws.mean()))
 
 
 def by_chance(samples: Samples, rng: np.random.Generator) -> Estimate:
@@ -61,6 +66,32 @@ def by_chance(samples: Samples, rng: np.random.Generator) -> Estimate:
     draws = calibration_error(np.broadcast_to(probability, right.shape), right.astype(float))
     low, high = (float(end) for end in np.quantile(draws, ENDS))
     return Estimate(Score(float(draws.mean()), low, high, len(probability)), draws)
+
+
+def missed_if_perfect(most: float) -> Estimator:
+    """In what share of trials a corrected error above `most` were found of perfect forecasts.
+
+    Were each probability just so, as many cases would still scatter so far.
+    """
+
+    def estimate(samples: Samples, rng: np.random.Generator) -> Estimate:
+        probability = samples[0]
+        cases = len(probability)
+        if cases < 2:
+            return Estimate(Score(NAN), np.array([NAN]))
+        errors = [_error_if_perfect(probability, rng) for _ in range(_PERFECT_TRIALS)]
+        found = share((np.array([error > most for error in errors], dtype=float),), rng)
+        return Estimate(replace(found.score, cases=cases), found.draws)
+
+    return estimate
+
+
+def _error_if_perfect(probability: FloatArray, rng: np.random.Generator) -> float:
+    """The corrected error of one trial in which each probability is just so."""
+    right = (rng.random(len(probability)) < probability).astype(float)
+    rows = rng.integers(len(probability), size=(_RESAMPLES, len(probability)))
+    draws = calibration_error(probability[rows], right[rows])
+    return _less_bias(float(calibration_error(probability, right)), draws)
 
 
 def reliability(samples: Samples, rng: np.random.Generator) -> tuple[Bin, ...]:

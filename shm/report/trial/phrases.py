@@ -66,6 +66,10 @@ PHRASES: dict[MarkName, Phrase] = {
     "calibration error by chance": Phrase(
         "calibration error by chance alone", "what would be counted were every probability right"
     ),
+    "calibration missed if perfect": Phrase(
+        "calibration's mark missed by perfect forecasts",
+        "share of trials that would miss it although every probability is right",
+    ),
     "calibration error above size four": Phrase(
         "calibration error without small gaps",
         "of sound hangers and sizes above four, which a diagnosis cannot know to be so large",
