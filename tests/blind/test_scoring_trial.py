@@ -206,7 +206,7 @@ def test_what_few_cases_add_is_taken_off_a_perfect_forecast_but_not_off_an_overc
 
 def test_few_perfect_forecasts_may_miss_the_mark_and_many_do_not() -> None:
     rng = np.random.default_rng(0)
-    few, many = np.full(40, 0.8), np.full(1000, 0.8)
+    few, many = np.full(40, 0.8), np.full(2000, 0.8)
     missed = np.mean(
         [corrected((few, rng.random(40) < few), rng).score.value > 0.06 for _ in range(100)]
     )
@@ -214,7 +214,7 @@ def test_few_perfect_forecasts_may_miss_the_mark_and_many_do_not() -> None:
     assert told.value == pytest.approx(missed, abs=0.12)
     assert 0.1 < told.value < 0.6
     assert told.cases == 40
-    assert missed_if_perfect(0.06)((many, np.zeros(1000)), rng).score.value == 0.0
+    assert missed_if_perfect(0.06)((many, np.zeros(2000)), rng).score.value < 0.05
     assert math.isnan(missed_if_perfect(0.06)((few[:1], few[:1]), rng).score.value)
 
 
