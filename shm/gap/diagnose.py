@@ -99,7 +99,7 @@ def diagnose(
         next_measurements=following,
         remarks=(
             *found.remarks,
-            *([clear.misnumbered] if clear.misnumbered else []),
+            *clear.misnumbered,
             *set_aside(aside, clear.otherwise),
             *doubtful(doubted),
         ),

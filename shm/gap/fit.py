@@ -7,6 +7,7 @@ points; the evidence is the sum of their integrals. Mirror images count as what 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -60,6 +61,12 @@ def baseline_fit(problem: GapProblem, rng: np.random.Generator) -> Fit:
     if BASELINE not in problem.fits:
         problem.fits[BASELINE] = fitted(problem, BASELINE, rng)
     return problem.fits[BASELINE]
+
+
+def with_remainder(problem: GapProblem, base: Fit, rng: np.random.Generator) -> Fit:
+    """What `base` fits, fitted from there with a flexible remainder of something unknown."""
+    hypothesis = replace(base.hypothesis, flexible=True)
+    return fitted(problem, hypothesis, rng, base.z[None])
 
 
 def _starts(problem: GapProblem, hypothesis: Hypothesis, rng: np.random.Generator) -> FloatArray:

@@ -9,8 +9,7 @@ from itertools import product
 import numpy as np
 
 from shm.gap.attribution import Attribution
-from shm.gap.contract import Hypothesis
-from shm.gap.fit import baseline_fit, fitted
+from shm.gap.fit import baseline_fit, with_remainder
 from shm.gap.problem import GapProblem
 from shm.values import PLANES
 
@@ -22,22 +21,29 @@ _SHIFTS = {0: "", 1: "one higher", -1: "one lower"}
 Shifts = tuple[int, ...]
 
 
-def misnumbered(problem: GapProblem, attribution: Attribution) -> str:
-    """A remark where the baseline explains the modes far better under other orders, else "".
+def misnumbered(problem: GapProblem, attribution: Attribution) -> tuple[str, ...]:
+    """A remark where the baseline explains the modes far better under other orders, else none.
 
-    Tried are orders one higher or lower, of either plane or both, with and without a remainder.
+    Tried are orders one higher or lower, of either plane or both. A remainder, which costs time,
+    is tried only with those that the baseline alone fits better than the orders as they are.
     """
     if attribution.leads == "no gap":
-        return ""
+        return ()
     rng = np.random.default_rng(0)  # for the draws of fits, which are not used
-    found = [(_evidence(other, rng), shifts, other) for shifts, other in _renumbered(problem)]
+    found = [
+        (_evidence(other, rng), shifts, other)
+        for shifts, other in _renumbered(problem)
+        if baseline_fit(other, rng).log_evidence > attribution.baseline.log_evidence
+    ]
+    if not found:
+        return ()
     log_evidence, shifts, other = max(found, key=lambda each: each[0])
     if log_evidence < max(each.log_evidence for each in attribution.tried) + FAR_BETTER:
-        return ""
+        return ()
     return (
         f"The orders look wrong: were {_told(shifts)}, the baseline alone would fit better than "
         f"any cause does now{_tension(other, rng)}. Was the lowest mode missed, or one counted "
-        f"that is none? If so, number them anew and diagnose again."
+        f"that is none? If so, number them anew and diagnose again.",
     )
 
 
@@ -59,8 +65,7 @@ def _renumbered(problem: GapProblem) -> Iterator[tuple[Shifts, GapProblem]]:
 def _evidence(problem: GapProblem, rng: np.random.Generator) -> float:
     """The log evidence of the baseline, or of it with a remainder where that is more."""
     alone = baseline_fit(problem, rng)
-    flexible = fitted(problem, Hypothesis(flexible=True), rng, alone.z[None])
-    return max(alone.log_evidence, flexible.log_evidence)
+    return max(alone.log_evidence, with_remainder(problem, alone, rng).log_evidence)
 
 
 def _told(shifts: Shifts) -> str:

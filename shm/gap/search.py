@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.fit import baseline_fit, fitted
+from shm.gap.fit import baseline_fit, fitted, with_remainder
 from shm.gap.hypotheses import hypotheses, invisible
 from shm.gap.laws import by_its_laws, mixed, otherwise
 from shm.gap.options import GapOptions, Progress
@@ -269,8 +269,7 @@ class Search:
 
     def _flexible(self, base: Fit) -> Tried:
         self._tell("something unknown", 0.65)
-        hypothesis = replace(base.hypothesis, flexible=True)
-        return self._tried(fitted(self.problem, hypothesis, self.rng, base.z[None]))
+        return self._tried(with_remainder(self.problem, base, self.rng))
 
     def _foremost(self, tried: Sequence[Tried]) -> list[Family]:
         """The likeliest families of one effect and of two."""

@@ -27,7 +27,7 @@ class Cleared:
 
     `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
     but not surely. `otherwise` is the cause that would lead, were none of `aside` one; "" for none.
-    `misnumbered` is a remark where the orders look wrong, or "".
+    `misnumbered` is a remark where the orders look wrong.
     """
 
     whole: GapProblem
@@ -37,7 +37,7 @@ class Cleared:
     aside: tuple[GrossError, ...] = ()
     doubted: tuple[GrossError, ...] = ()
     otherwise: str = ""
-    misnumbered: str = ""
+    misnumbered: tuple[str, ...] = ()
 
     def seen(self, error: GrossError, fit: Fit) -> LeftOut:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""

@@ -13,8 +13,8 @@ from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
@@ -31,11 +31,10 @@ def _found(
     planted = [each for each in (CLAMP, SWING) if each.name in effects]
     tests = campaign(HANGER_3, STATE, planted, PLAN, np.random.default_rng(seed))
     problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    without = tuple(name for name in EFFECTS if name not in known)
     told: list[tuple[str, float]] = []
     found = attributed(
         problem,
-        GapOptions(without=without),
+        GapOptions(without=all_but(*known)),
         np.random.default_rng(seed),
         lambda label, fraction: told.append((label, fraction)),
     )
@@ -124,8 +123,8 @@ def test_an_effect_that_would_drown_in_the_errors_is_told_to_be_invisible() -> N
     )  # fmt: skip
     tests = campaign(HANGER_3, STATE, (), plan, np.random.default_rng(1))
     problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    without = tuple(name for name in EFFECTS if name != "distributed_mass")
-    found = attributed(problem, GapOptions(without=without), np.random.default_rng(1))
+    options = GapOptions(without=all_but("distributed_mass"))
+    found = attributed(problem, options, np.random.default_rng(1))
     assert "drown" in dict(found.invisible)["distributed_mass"]
     assert found.leading is None
     assert found.explanations == ()

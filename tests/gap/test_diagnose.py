@@ -11,15 +11,15 @@ from shm.diagnosis_document import diagnosis_document
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, diagnose
-from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
+from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
 PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 KNOWN = ("timebase", "bending_stiffness", "effective_length", "rotational_end_flexibility")
-FEW_EFFECTS = GapOptions(without=tuple(name for name in EFFECTS if name not in KNOWN))
+FEW_EFFECTS = GapOptions(without=all_but(*KNOWN))
 ONE_TEST = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 
 

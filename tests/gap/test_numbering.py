@@ -14,9 +14,9 @@ from shm.gap.numbering import misnumbered
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.values import ModalTest
+from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
@@ -29,7 +29,7 @@ PLAN = CampaignPlan(
     mass_share=0.0,
     tension_spread=0.0,
 )
-OPTIONS = GapOptions(without=tuple(name for name in EFFECTS if name not in KNOWN))
+OPTIONS = GapOptions(without=all_but(*KNOWN))
 
 
 def _numbered(shifts: Mapping[str, int], *effects: PlantedEffect) -> list[ModalTest]:
@@ -51,7 +51,7 @@ def _numbered(shifts: Mapping[str, int], *effects: PlantedEffect) -> list[ModalT
 def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
     tests = _numbered(shifts, *effects)
     problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    return misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1)))
+    return "".join(misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1))))
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ from shm.gap.gross_error import FREEDOM, GROSS_ERROR, left_out, log_gross, log_o
 from shm.gap.observations import observed
 from shm.gap.outliers import SURE
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign
 from shm.values import Diagnosis, ModalTest
+from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
 PLAIN = replace(HANGER_3, plate=None)
@@ -28,7 +28,7 @@ ONE_TEST = CampaignPlan(
 
 
 TRIED = {"point_mass", "sag", "support_motion", "bending_stiffness"}
-QUICK = GapOptions(without=tuple(name for name in EFFECTS if name not in TRIED))
+QUICK = GapOptions(without=all_but(*TRIED))
 
 
 def measured(*effects: PlantedEffect, seed: int = 101) -> tuple[ModalTest, ...]:
