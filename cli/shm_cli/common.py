@@ -29,7 +29,7 @@ from rich.table import Column, Table
 from shm.bridge import load_hanger
 from shm.documents import dump, load_modes
 from shm.errors import NothingThere, UsageError
-from shm.update import METHODS
+from shm.inference import METHODS
 from shm.values import Hanger, ModalTest
 from shm_cli import completers
 

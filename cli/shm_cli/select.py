@@ -10,7 +10,7 @@ import rich_click as click
 from shm.documents import selection_document
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
-from shm.update import UpdateOptions, select
+from shm.inference import UpdateOptions, select
 from shm.values import Selection
 from shm_cli import completers
 from shm_cli.common import (

@@ -10,7 +10,7 @@ import rich_click as click
 
 from shm.documents import posterior_document, summary
 from shm.models import build
-from shm.update import UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.values import ModalTest, Posterior
 from shm_cli import completers
 from shm_cli.common import (

@@ -1,7 +1,7 @@
 """The steps as a researcher calls them in a notebook; `import shm` offers them under their names.
 
 Each has the defaults of the command of its name and gives the value that the step itself gives.
-The steps behind them (`shm.identify.identify`, `shm.update.update`, ...) take options as values and
+The steps behind them (`shm.identify.identify`, `shm.inference.update`, ...) take options as values and
 model classes as objects; these here take names and numbers.
 """
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from shm.api.tests import Tests, modal_tests
 from shm.models import build, competing_names
 from shm.settings import load_settings
-from shm.update import METHODS, Progress, UpdateOptions, updating
+from shm.inference import METHODS, Progress, UpdateOptions, updating
 from shm.values import Hanger, Posterior, Selection
 
 
@@ -28,7 +28,7 @@ def update(
     `solid2`), or a baseline with an adopted effect (`beam1+point_mass@everywhere`). The likelihood
     is f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2), thesis (4.5), with the unknown fractional model
     error sigma and the identification's standard deviation sd. `repeat` counts the data set N_D
-    times, as the thesis does. `method` is one of `shm.update.METHODS`. `progress` hears a label
+    times, as the thesis does. `method` is one of `shm.inference.METHODS`. `progress` hears a label
     and the fraction done.
 
     `Posterior.samples` (samples, parameters) are equally weighted draws, `Posterior.tension_n`

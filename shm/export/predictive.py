@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.models import described
-from shm.update.likelihood import Likelihood
+from shm.inference.likelihood import Likelihood
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
 
 _TOLERANCE = 1e-6

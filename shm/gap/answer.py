@@ -6,7 +6,7 @@ import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation
 from shm.gap.contract import Fit
-from shm.update.tmcmc import normalised
+from shm.inference.tmcmc import normalised
 
 
 def answered(attribution: Attribution) -> list[tuple[float, Fit]]:

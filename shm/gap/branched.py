@@ -11,8 +11,8 @@ from scipy.special import logsumexp
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch
 from shm.gap.landscape import log_normal
-from shm.update.mixture import Normal, TMixture
-from shm.update.tmcmc import normalised
+from shm.inference.mixture import Normal, TMixture
+from shm.inference.tmcmc import normalised
 from shm.values import FloatArray, IntArray
 
 _FROM_PRIOR = 0.1

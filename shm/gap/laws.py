@@ -23,7 +23,7 @@ from shm.gap.fit import fitted, scattered
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.update.tmcmc import normalised
+from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
 SHOWN = 3.0

@@ -21,7 +21,7 @@ from shm.gap.coordinates import Branch
 from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
-from shm.update.tmcmc import normalised, systematic
+from shm.inference.tmcmc import normalised, systematic
 from shm.values import FloatArray
 
 _TRIAL, _MOST_TRIALS = 100, 4

@@ -26,7 +26,7 @@ from shm.gap.screening import (
     varied,
 )
 from shm.gap.sensitivity import Scan
-from shm.update.tmcmc import normalised
+from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
 SAMPLED_WITHIN = 4.0

@@ -22,9 +22,9 @@ from shm.models.adopted_name import AdoptedName
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.terms import update_terms
 from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredSelection, Workspace
-from shm.update import UpdateOptions, update
-from shm.update.options import Progress, silent
-from shm.update.tmcmc import normalised
+from shm.inference import UpdateOptions, update
+from shm.inference.options import Progress, silent
+from shm.inference.tmcmc import normalised
 from shm.values import Hanger, Posterior
 from shm.watch import gap_percent, has_grown
 

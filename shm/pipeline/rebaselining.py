@@ -14,8 +14,8 @@ from shm.errors import NothingThere
 from shm.models import build
 from shm.pipeline.terms import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
-from shm.update import UpdateOptions, update
-from shm.update.options import Progress, silent
+from shm.inference import UpdateOptions, update
+from shm.inference.options import Progress, silent
 from shm.values import Hanger
 
 

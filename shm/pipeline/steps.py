@@ -19,7 +19,7 @@ from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
-from shm.update import UpdateOptions, refresh, select, update
+from shm.inference import UpdateOptions, refresh, select, update
 from shm.values import Alert, Hanger, ModalTest, Posterior, Selection, WatchedTest
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.models import Model, build
-from shm.update import UpdateOptions, refresh, update
+from shm.inference import UpdateOptions, refresh, update
 from shm.values import PLANES, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 

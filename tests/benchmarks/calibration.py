@@ -55,8 +55,8 @@ from scipy.stats import chisquare, cramervonmises
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.models import Model, build
-from shm.update import UpdateOptions, update
-from shm.update.likelihood import Likelihood
+from shm.inference import UpdateOptions, update
+from shm.inference.likelihood import Likelihood
 from shm.values import NAN, PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 

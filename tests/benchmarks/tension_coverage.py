@@ -18,7 +18,7 @@ from rich.progress import track
 from shm.identify import IdentifyOptions, identify
 from shm.models import build
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.update import UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.values import Hanger, Posterior
 
 DIAMETER_M = 0.130

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models import Model
-from shm.update import UpdateOptions
+from shm.inference import UpdateOptions
 from shm.values import Hanger, ModalTest, Posterior, Selection
 from tests.helpers.workspaces import modes_of
 

@@ -17,7 +17,7 @@ from shm.pipeline.adopting import Wish, adopt, gap_watch
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.reporting import hanger_report
 from shm.store import Lineage, Store, StoredAdoption, Workspace
-from shm.update import UpdateOptions
+from shm.inference import UpdateOptions
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis
@@ -312,7 +312,7 @@ def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
 def test_adopting_with_the_real_sampler_closes_the_gap(
     begun: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from shm.update import update
+    from shm.inference import update
 
     monkeypatch.setattr(adopting, "update", update)
     made = adopted(begun, "bending_stiffness", at=["everywhere"])

@@ -13,7 +13,7 @@ from shm.models import Model
 from shm.pipeline import rebaselining
 from shm.pipeline.rebaselining import Order, rebaseline
 from shm.store import Baseline, Stage, Workspace
-from shm.update import UpdateOptions
+from shm.inference import UpdateOptions
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, a_flow, ingest, receive_all

@@ -19,7 +19,7 @@ from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
 from shm.read import Limits
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
-from shm.update import UpdateOptions
+from shm.inference import UpdateOptions
 from shm.values import Alert, Hanger, ModalTest, Recording, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.nouns import NOW, a_check, a_foreign_mode, a_response, a_test

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.models import build
-from shm.update import UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.values import PLANES, ModalTest, Mode, Posterior, Thresholds
 from shm.watch import (
     Newest,

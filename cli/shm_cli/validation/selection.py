@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.documents import load_modes
 from shm.models import build
-from shm.update import UpdateOptions, select
+from shm.inference import UpdateOptions, select
 from shm.values import Hanger, Posterior, Selection
 from shm_cli import thesis
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.models import build
-from shm.update import UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.values import TENSION, ModalTest, Reading, WatchedQuantity, WatchedTest
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader

@@ -2,7 +2,7 @@
 
 Beam 2 on hanger 3 of the thesis with table 1.1: six parameters with uniform priors and the model
 error sigma, uniform on [0, 1], as a seventh ("sampled") or integrated out ("integrated"). The
-frequencies and the likelihood are those of the package, `shm.models` and `shm.update.likelihood`.
+frequencies and the likelihood are those of the package, `shm.models` and `shm.inference.likelihood`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from importlib.metadata import version
 import numpy as np
 
 from shm.models import build
-from shm.update.likelihood import Likelihood
+from shm.inference.likelihood import Likelihood
 from shm.values import FloatArray
 from tests.helpers.evidence_oracle import TABLES, modal_test
 from tests.helpers.hangers import HANGER_3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from problem import Outcome, Target, moments, report
 
-from shm.update import UpdateOptions, update
+from shm.inference import UpdateOptions, update
 
 
 def run(target: Target, seed: int) -> Outcome:

@@ -9,10 +9,10 @@ import pytest
 
 from shm.models import build
 from shm.models.beam import Beam2
-from shm.update import UpdateOptions, select, update
-from shm.update.hint import hinted
-from shm.update.likelihood import Likelihood
-from shm.update.problem import Problem
+from shm.inference import UpdateOptions, select, update
+from shm.inference.hint import hinted
+from shm.inference.likelihood import Likelihood
+from shm.inference.problem import Problem
 from shm.values import Posterior
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
 from tests.helpers.hangers import HANGER_3

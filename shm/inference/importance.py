@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.update.mixture import TMixture
-from shm.update.problem import Points, Problem
-from shm.update.search import Anchors
-from shm.update.tmcmc import normalised, systematic
-from shm.update.valley import along
+from shm.inference.mixture import TMixture
+from shm.inference.problem import Points, Problem
+from shm.inference.search import Anchors
+from shm.inference.tmcmc import normalised, systematic
+from shm.inference.valley import along
 from shm.values import FloatArray
 
 _CLUSTERS = 16

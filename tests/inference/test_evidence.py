@@ -12,10 +12,10 @@ from scipy.stats import multivariate_normal
 
 from shm.errors import UsageError
 from shm.models import Model, build
-from shm.update import METHODS, BiasedEvidenceWarning, UpdateOptions, update
-from shm.update.likelihood import Likelihood
-from shm.update.problem import Problem
-from shm.update.updating import infer
+from shm.inference import METHODS, BiasedEvidenceWarning, UpdateOptions, update
+from shm.inference.likelihood import Likelihood
+from shm.inference.problem import Problem
+from shm.inference.updating import infer
 from shm.values import FloatArray, Posterior
 from tests.helpers.evidence_oracle import (
     ORACLE,

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from shm.models import build
-from shm.update.mixture import Normal, TMixture
-from shm.update.options import silent
-from shm.update.problem import Problem
-from shm.update.search import Anchors, search
-from shm.update.updating import infer
-from shm.update.valley import along
+from shm.inference.mixture import Normal, TMixture
+from shm.inference.options import silent
+from shm.inference.problem import Problem
+from shm.inference.search import Anchors, search
+from shm.inference.updating import infer
+from shm.inference.valley import along
 from shm.values import PLANES, BoolArray, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 

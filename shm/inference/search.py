@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.update.hint import Hint
-from shm.update.mixture import Normal
-from shm.update.problem import Problem
+from shm.inference.hint import Hint
+from shm.inference.mixture import Normal
+from shm.inference.problem import Problem
 from shm.values import FloatArray, IntArray
 
 _STARTS = 40

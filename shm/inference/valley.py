@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.update.problem import Problem
-from shm.update.search import Anchors, carried
-from shm.update.tmcmc import normalised
+from shm.inference.problem import Problem
+from shm.inference.search import Anchors, carried
+from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
 _POINTS = 80

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from shm.update.importance import Weighted
-from shm.update.likelihood import Likelihood
-from shm.update.mixture import Normal
-from shm.update.options import UpdateOptions
-from shm.update.problem import Problem
-from shm.update.tmcmc import Mover
+from shm.inference.importance import Weighted
+from shm.inference.likelihood import Likelihood
+from shm.inference.mixture import Normal
+from shm.inference.options import UpdateOptions
+from shm.inference.problem import Problem
+from shm.inference.tmcmc import Mover
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"

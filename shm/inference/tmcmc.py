@@ -3,24 +3,24 @@
 A population goes from the prior to the posterior in stages; each next stage is as far away as a
 coefficient of variation of the weights of 2 allows; the population is resampled and moved.
 
-The likelihood is not raised to a power, as the textbook (`shm.update.textbook`) has it: on this
+The likelihood is not raised to a power, as the textbook (`shm.inference.textbook`) has it: on this
 problem that path meets a phase transition (the model error sigma collapses at some power) and its
 evidence is biased by -1 to -7. Instead a fictitious error `floor` is added to the variance of the
 likelihood and lowered from infinity (the prior) to 0 (the posterior). A stage makes several moves:
 t-preconditioned Crank-Nicolson steps (Grumitt, Karamanis and Seljak 2023), which suit the heavy
 tails better than a random walk, and independent proposals that jump between the population and the
 anchors of a least-squares search. Since the evidence comes from a last step
-(`shm.update.importance`), few particles and long strides do.
+(`shm.inference.importance`), few particles and long strides do.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from shm.update.hint import Hint
-from shm.update.mixture import Normal, TMixture
-from shm.update.problem import Points, Problem
-from shm.update.search import Anchors
+from shm.inference.hint import Hint
+from shm.inference.mixture import Normal, TMixture
+from shm.inference.problem import Points, Problem
+from shm.inference.search import Anchors
 from shm.values import FloatArray, IntArray
 
 _TARGET_VARIATION = 2.0

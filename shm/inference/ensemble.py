@@ -23,12 +23,12 @@ from emcee.moves import DEMove, KDEMove
 
 from shm.errors import UsageError
 from shm.models import Model
-from shm.update.importance import Weighted, weigh
-from shm.update.options import Progress, UpdateOptions, silent
-from shm.update.outcome import posterior_of
-from shm.update.problem import Problem
-from shm.update.search import Anchors, carried, search
-from shm.update.updating import update
+from shm.inference.importance import Weighted, weigh
+from shm.inference.options import Progress, UpdateOptions, silent
+from shm.inference.outcome import posterior_of
+from shm.inference.problem import Problem
+from shm.inference.search import Anchors, carried, search
+from shm.inference.updating import update
 from shm.values import FloatArray, ModalTest, Posterior
 
 RE_WEIGHTED = "re-weighted"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.models import Model
-from shm.update.coordinates import Coordinates
-from shm.update.likelihood import Likelihood
-from shm.update.options import Progress
+from shm.inference.coordinates import Coordinates
+from shm.inference.likelihood import Likelihood
+from shm.inference.options import Progress
 from shm.values import BoolArray, FloatArray, IntArray, ModalTest
 
 

@@ -10,8 +10,8 @@ from scipy.special import gammaincc, gammaln, logsumexp
 
 from shm.errors import BadInput, UsageError
 from shm.models import Model, build
-from shm.update import UpdateOptions, select, update
-from shm.update.likelihood import Likelihood
+from shm.inference import UpdateOptions, select, update
+from shm.inference.likelihood import Likelihood
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from shm.update.ensemble import refresh
-from shm.update.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
-from shm.update.textbook import BiasedEvidenceWarning
-from shm.update.updating import select, update
+from shm.inference.ensemble import refresh
+from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
+from shm.inference.textbook import BiasedEvidenceWarning
+from shm.inference.updating import select, update
 
 __all__ = [
     "METHODS",

@@ -9,14 +9,14 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.models import Model
-from shm.update.hint import hinted
-from shm.update.importance import Weighted, weigh
-from shm.update.options import TEXTBOOK, Progress, UpdateOptions, silent
-from shm.update.outcome import assembled, posterior_of
-from shm.update.problem import Problem
-from shm.update.search import search
-from shm.update.textbook import textbook
-from shm.update.tmcmc import normalised, sample
+from shm.inference.hint import hinted
+from shm.inference.importance import Weighted, weigh
+from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
+from shm.inference.outcome import assembled, posterior_of
+from shm.inference.problem import Problem
+from shm.inference.search import search
+from shm.inference.textbook import textbook
+from shm.inference.tmcmc import normalised, sample
 from shm.values import ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.update.importance import Weighted
-from shm.update.outcome import Outcome
-from shm.update.problem import Points, Problem
-from shm.update.tmcmc import normalised
+from shm.inference.importance import Weighted
+from shm.inference.outcome import Outcome
+from shm.inference.problem import Points, Problem
+from shm.inference.tmcmc import normalised
 from shm.values import BoolArray, FloatArray, IntArray
 
 _SCALE = 0.2

@@ -10,8 +10,8 @@ import pytest
 from shm.models import Model, build
 from shm.models.conditions import Conditions
 from shm.simulate import HangerState, TestConditions, planted_modes
-from shm.update import UpdateOptions, update
-from shm.update.likelihood import Likelihood
+from shm.inference import UpdateOptions, update
+from shm.inference.likelihood import Likelihood
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest, norm
 
 from shm.models import build
-from shm.update.coordinates import Coordinates
+from shm.inference.coordinates import Coordinates
 from tests.helpers.hangers import HANGER_3
 
 OWN = 3e6

@@ -10,9 +10,9 @@ import pytest
 from shm.documents import posterior_document
 from shm.errors import BadInput, UsageError
 from shm.models import Model, build
-from shm.update import UpdateOptions, ensemble, refresh, update
-from shm.update.importance import Weighted
-from shm.update.problem import Points
+from shm.inference import UpdateOptions, ensemble, refresh, update
+from shm.inference.importance import Weighted
+from shm.inference.problem import Points
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.update.coordinates import log_normal, quantile
-from shm.update.mixture import Normal, TMixture
-from shm.update.problem import Problem
+from shm.inference.coordinates import log_normal, quantile
+from shm.inference.mixture import Normal, TMixture
+from shm.inference.problem import Problem
 from shm.values import FloatArray, IntArray, Posterior
 
 _WIDER = 3.0
