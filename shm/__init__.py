@@ -24,7 +24,7 @@ In a notebook, from a recording to the tension and what limits it::
 - What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
 
 SI units throughout (N, m, kg, s, Hz), temperatures in deg C, unknown numbers NaN. The same seed
-gives the same result. `read`, `identify`, `update` and `simulate` are packages too: call the name
+gives the same result. `read`, `identify` and `simulate` are packages too: call the name
 for the step, import from it what else it holds (`from shm.identify import IdentifyOptions`).
 """
 
@@ -65,10 +65,10 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_STEPS_AND_PACKAGES = ("identify", "read", "simulate", "update")
+_STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
     "shm.api": (
-        "Store", "diagnose", "load_hanger", "load_modes", "round_bar", "select",
+        "Store", "diagnose", "load_hanger", "load_modes", "round_bar", "select", "update",
     ),
     "shm.errors": ("ShmError",),
     "shm.identify": ("Identification",),

@@ -41,15 +41,18 @@ def load_ipython_extension(shell: Any) -> None:
 def hanger_html(hanger: Hanger) -> str:
     """The description of a hanger, in the units of a drawing."""
     from shm.report import words
+    from shm.values.force_units import force_unit
 
+    nominal_n, stiffness = hanger.nominal_tension_n, hanger.bending_stiffness_n_m2
+    unit = force_unit(nominal_n)
     round_bar = math.isfinite(hanger.diameter_m)
     rows = [
         ("diameter", f"{1e3 * hanger.diameter_m:.0f} mm" if round_bar else "not round"),
         ("length", f"{hanger.length_m:.3f} m"),
         ("area", f"{1e6 * hanger.area_m2:.0f} mm²"),
         ("mass", f"{hanger.mass_per_length_kg_m:.1f} kg/m"),
-        ("bending stiffness", f"{hanger.bending_stiffness_n_m2 / 1e3:.0f} kN m²"),
-        ("nominal tension", f"{hanger.nominal_tension_n / 1e3:.1f} kN"),
+        ("bending stiffness", f"{words.rounded_tension(stiffness, force_unit(stiffness))} m²"),
+        ("nominal tension", f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"),
         ("ends", f"{hanger.supports.deck} (deck), {hanger.supports.arch} (arch)"),
         ("end plates", "yes" if hanger.plate else "none"),
     ]
@@ -59,11 +62,15 @@ def hanger_html(hanger: Hanger) -> str:
 def posterior_html(posterior: Posterior) -> str:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.report import Interval, words
+    from shm.values.force_units import force_unit
 
-    tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+    tension_n = Interval.of_samples(posterior.tension_n)
+    unit = force_unit(tension_n.mean)
     best = dict(zip(posterior.names, posterior.most_probable, strict=True))
-    at_best = best["theta_F"] * posterior.nominal_tension_n / 1e3
-    rows = [_interval_row("tension", tension, at_best, "tension in kN")]
+    at_best = unit.of(best["theta_F"] * posterior.nominal_tension_n)
+    rows = [
+        _interval_row("tension", tension_n.in_unit(unit), at_best, f"tension in {unit.name}"),
+    ]
     for name in posterior.names:
         interval = Interval.of_samples(posterior.parameter(name))
         rows.append(_interval_row(name, interval, best[name], words.meaning(name, posterior.model)))
@@ -78,10 +85,15 @@ def posterior_html(posterior: Posterior) -> str:
 def selection_html(selection: Selection) -> str:
     """The model classes, most probable first, with the tension that each gives."""
     from shm.report import Interval, words
+    from shm.values.force_units import force_unit
 
+    tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
+    unit = force_unit(*(each.mean for each in tensions_n))
     rows = []
-    for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
-        tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+    for posterior, probability, tension_n in zip(
+        selection.posteriors, selection.probabilities, tensions_n, strict=True
+    ):
+        tension = tension_n.in_unit(unit)
         rows.append(
             (
                 words.model_class(posterior.model),
@@ -91,7 +103,7 @@ def selection_html(selection: Selection) -> str:
                 words.span(tension),
             )
         )
-    head = ("class", "probability", "log evidence", "tension, kN", "90 % interval, kN")
+    head = ("class", "probability", "log evidence", *words.tension_headings(unit))
     return _table(f"{_whose(selection.selected)}, model classes", head, rows)
 
 

@@ -49,7 +49,7 @@ Data = TypeVar("Data")
 
 
 def tension(posterior: Posterior, hanger: Hanger, baseline: Posterior | None = None) -> Figure:
-    """The posterior of the tension in kN: histogram, 90 % interval, nominal and baseline tension.
+    """The posterior of the tension: histogram, 90 % interval, nominal and baseline tension.
 
     Example:
         >>> figure = shm.plot.tension(posterior, hanger)
@@ -65,7 +65,7 @@ def trend(
     hanger: Hanger,
     baseline: Posterior | None = None,
 ) -> Figure:
-    """The tension in kN over time: mean and 90 % band by each test, nominal, baseline, thresholds.
+    """The tension over time: mean and 90 % band by each test, nominal, baseline, thresholds.
 
     `posteriors` and `tests` go together, one posterior a test; tests without a time are left out.
 

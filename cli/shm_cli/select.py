@@ -8,10 +8,11 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import selection_document
+from shm.inference import UpdateOptions, select
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
-from shm.inference import UpdateOptions, select
 from shm.values import Selection
+from shm.values.force_units import force_unit
 from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
@@ -98,20 +99,22 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
 
 def show_selection(selection: Selection) -> None:
     """The model classes as a table, most probable first."""
+    unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     made = table(
         f"model classes of hanger {selection.selected.hanger}, most probable first",
-        "class", "probability", "log evidence", "tension (kN)", "90 % interval (kN)", "to nominal",
-        "most probable values",
+        "class", "probability", "log evidence", f"tension ({unit.name})",
+        f"90 % interval ({unit.name})", "to nominal", "most probable values",
     )  # fmt: skip
     for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
-        low, high = np.quantile(posterior.tension_n, [0.05, 0.95]) / 1e3
-        mean = posterior.tension_n.mean()
+        low, high = unit.of(np.quantile(posterior.tension_n, [0.05, 0.95]))
+        mean = float(posterior.tension_n.mean())
+        places = unit.decimals(mean)
         made.add_row(
             posterior.model,
             f"{probability:.3f}",
             f"{posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
-            f"{mean / 1e3:.1f}",
-            f"{low:.1f} to {high:.1f}",
+            f"{unit.of(mean):.{places}f}",
+            f"{low:.{places}f} to {high:.{places}f}",
             f"{mean / posterior.nominal_tension_n - 1:+.1%}",
             ", ".join(
                 f"{name} {value:.3g}"

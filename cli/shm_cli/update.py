@@ -9,9 +9,10 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, summary
-from shm.models import build
 from shm.inference import UpdateOptions, update
+from shm.models import build
 from shm.values import ModalTest, Posterior
+from shm.values.force_units import force_unit
 from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
@@ -119,10 +120,14 @@ def show_posterior(posterior: Posterior) -> None:
         f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
         "parameter", "mean", "sd", "5 %", "median", "95 %", "most probable",
     )  # fmt: skip
-    tension = summary(
-        posterior.tension_n / 1e3, posterior.most_probable[0] * posterior.nominal_tension_n / 1e3
+    tension_n = summary(
+        posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n
     )
-    made.add_row("tension (kN)", *(f"{value:.1f}" for value in tension.values()))
+    unit = force_unit(tension_n["mean"])
+    places = unit.decimals(tension_n["mean"])
+    made.add_row(
+        f"tension ({unit.name})", *(f"{unit.of(each):.{places}f}" for each in tension_n.values())
+    )
     for name, best in zip(posterior.names, posterior.most_probable, strict=True):
         figures = summary(posterior.parameter(name), best)
         made.add_row(name, *(f"{value:.4g}" for value in figures.values()))

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 from shm.bridge.effects import effect_priors_of, scatter_of
 from shm.bridge.supports import supports_of
 from shm.bridge.table import Table
-from shm.values import NAN, EndPlate, Hanger, Thresholds, Turnbuckle
+from shm.values import NAN, EndPlate, Hanger, Kind, Limits, Thresholds, Turnbuckle
 
 _REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
 _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
-    "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports",
+    "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
+    "limits",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -50,7 +51,34 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         scatter=scatter_of(table.table("scatter")),
         effect_priors=effect_priors_of(table.table("effects")),
         supports=supports_of(table.table("supports")),
+        kind=_kind(table),
+        family=str(values.get("family", "")),
+        limits=_limits(table.table("limits")),
     )
+
+
+def _kind(table: Table) -> Kind:
+    """A strand where it says so, or where its wires are said to slip."""
+    slips = table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1) < 1
+    value = table.values.get("kind", "strand" if slips else "rod")
+    for kind in get_args(Kind):
+        if value == kind:
+            return cast(Kind, kind)
+    raise table.refusal(f"kind = {value!r} is no kind of hanger", 'Write "rod" or "strand".')
+
+
+def _limits(table: Table | None) -> Limits:
+    if table is None:
+        return Limits()
+    table.refuse_unknown(field.name for field in fields(Limits))
+    limits = Limits(**{key: table.positive(key) for key in table.values})
+    if limits.tension_min_n >= limits.tension_max_n:
+        raise table.refusal(
+            f"tension_min_n = {limits.tension_min_n:g} is not below tension_max_n = "
+            f"{limits.tension_max_n:g}",
+            "Both are in N: the hanger is slack below the first and overloaded above the second.",
+        )
+    return limits
 
 
 def _section(table: Table) -> tuple[float, float, float]:

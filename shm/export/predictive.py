@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.errors import BadInput
-from shm.models import described
+from shm.models import class_of
 from shm.inference.likelihood import Likelihood
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
 
@@ -34,7 +34,7 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
     """
     likelihood = Likelihood(tests)
     sigma, theta = posterior.samples[:, -1], posterior.samples[:, :-1]
-    model = described(posterior.model, hanger)
+    model = class_of(posterior, hanger)
     model.prepare(likelihood.highest_order)
     predicted = likelihood.predict(model, theta)
     measured = likelihood.frequency_hz

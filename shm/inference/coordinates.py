@@ -48,6 +48,7 @@ class Coordinates:
         self, prior: Prior, swaps: Sequence[tuple[str, str]], wave_stiffness_n_m_rad: float
     ):
         self.prior = prior
+        self.dimension = len(prior.names)
         self._own = wave_stiffness_n_m_rad
         self._width: FloatArray = prior.upper - prior.lower
         self._pairs = [(prior.names.index(one), prior.names.index(other)) for one, other in swaps]
@@ -85,6 +86,10 @@ class Coordinates:
             rows = np.flatnonzero(rng.random(len(theta)) < 0.5)[:, None]
             theta[rows, [one, other]] = theta[rows, [other, one]]
         return theta
+
+    def finished(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Draws of the parameters (n, d) at `z` (n, d), unfolded."""
+        return self.unfold(self.theta(z), rng)
 
     def log_prior(self, z: FloatArray) -> FloatArray:
         """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""

@@ -69,7 +69,7 @@ def refresh(
     """
     options = options or UpdateOptions()
     _refuse_stranger(model, known)
-    problem = Problem.of(tests, model, options.repeat, progress)
+    problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

@@ -11,8 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from shm.inference.coordinates import log_normal, quantile
+from shm.inference.described import DescribedCoordinates
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.problem import Problem
+from shm.models import DESCRIPTION
 from shm.values import FloatArray, IntArray, Posterior
 
 _WIDER = 3.0
@@ -27,11 +29,8 @@ class Hint:
 
     def __init__(self, problem: Problem, posterior: Posterior):
         self._problem = problem
-        self._columns = _shared(problem, posterior)
-        names = [problem.prior.names[i] for i in self._columns]
-        lower, upper = problem.prior.lower[self._columns], problem.prior.upper[self._columns]
-        samples = np.column_stack([posterior.parameter(name) for name in names])
-        found = Normal.of(quantile((samples - lower) / (upper - lower)))
+        self._columns, z = _shared_places(problem, posterior)
+        found = Normal.of(z)
         self._near = TMixture([Normal(found.mean, _WIDER**2 * found.covariance)], np.ones(1))
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
@@ -50,9 +49,23 @@ class Hint:
 
 def hinted(problem: Problem, posterior: Posterior | None) -> Hint | None:
     """The hint that a posterior gives; None where there is none or no parameter is shared."""
-    if posterior is None or not len(_shared(problem, posterior)):
+    if posterior is None or not len(_shared_places(problem, posterior)[0]):
         return None
     return Hint(problem, posterior)
+
+
+def _shared_places(problem: Problem, posterior: Posterior) -> tuple[IntArray, FloatArray]:
+    """Which columns of z the posterior knows, and its draws there (n, columns)."""
+    coordinates = problem.coordinates
+    if isinstance(coordinates, DescribedCoordinates):
+        if posterior.priors != DESCRIPTION:
+            return np.empty(0, dtype=int), np.empty((0, 0))
+        return coordinates.shared(posterior.names, posterior.samples)
+    columns = _shared(problem, posterior)
+    lower, upper = problem.prior.lower[columns], problem.prior.upper[columns]
+    names = [problem.prior.names[i] for i in columns]
+    samples = np.array([posterior.parameter(name) for name in names]).reshape(len(names), -1).T
+    return columns, quantile((samples - lower) / (upper - lower))
 
 
 def _shared(problem: Problem, posterior: Posterior) -> IntArray:

@@ -79,6 +79,10 @@ class Likelihood:
             first = measured.stop
         return rows
 
+    def by_mode(self, predicted: FloatArray) -> FloatArray:
+        """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
+        return predicted
+
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Fractional differences (n, measurements) of predictions from the measurements."""
         return predicted / self.frequency_hz - 1

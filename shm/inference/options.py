@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from shm.errors import UsageError
+from shm.inference.described import Calibration
 
 Progress = Callable[[str, float], None]
 
@@ -23,6 +24,8 @@ def silent(label: str, fraction: float) -> None:
 class UpdateOptions:
     """How to update: posterior samples to keep, seed, how often the data set counts (N_D), method.
 
+    `calibration` is what an earlier measured tension taught of the bar (`calibration_of`).
+
     Raises UsageError for a method that is not one of `METHODS`.
     """
 
@@ -30,6 +33,7 @@ class UpdateOptions:
     seed: int = 1
     repeat: int = 1
     method: str = NOISE_FLOOR
+    calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from shm.inference.described import DescribedCoordinates
+from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Weighted
-from shm.inference.likelihood import Likelihood
 from shm.inference.mixture import Normal
 from shm.inference.options import UpdateOptions
 from shm.inference.problem import Problem
@@ -20,6 +22,10 @@ from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 SIGMA = "sigma"
 _FINAL_STEPS = 5
 _DIFFERENCE = 1e-6
+
+_EDGE, _MANY = 0.02, 5.0
+"""A parameter is at its bound where the outermost 2 % of its range hold five times the draws that
+a posterior as flat as the prior puts there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +83,23 @@ def assembled(
         names=(*problem.prior.names, SIGMA),
         samples=samples,
         log_likelihood=log_likelihood,
-        most_probable=_most_probable(problem, samples[int(log_likelihood.argmax())]),
+        most_probable=_most_probable(problem, samples, log_likelihood),
         nominal_tension_n=model.hanger.nominal_tension_n,
         log_evidence=outcome.log_evidence,
         log_evidence_sd=outcome.log_evidence_sd,
         effective_sample_size=outcome.effective_sample_size,
         r_hat=outcome.r_hat,
         evaluations=problem.evaluations,
-        predicted=_predicted(problem.likelihood, outcome.predicted),
+        predicted=_predicted(problem, outcome.predicted),
         tests=tuple(test.id for test in tests),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         method=outcome.method,
+        priors=model.priors,
+        repeatability_sd_n=repeatability_sd_n(problem, outcome),
+        at_bounds=_at_bounds(problem, samples),
+        misfit_percent=_misfit_percent(problem, outcome.predicted),
+        log_occam=outcome.log_evidence - _highest(problem, outcome.predicted),
     )
 
 
@@ -100,11 +111,105 @@ def _draws(
     points = Mover(problem, 0.0, Normal.of(points.z), step=0.5).walk(points, _FINAL_STEPS, rng)
     points = points.take(rng.permutation(n))
     sigma = problem.likelihood.draw_sigma(points.predicted, rng)
-    theta = problem.coordinates.unfold(problem.coordinates.theta(points.z), rng)
+    theta = problem.coordinates.finished(points.z, rng)
     return np.column_stack([theta, sigma]), points.predicted
 
 
-def _most_probable(problem: Problem, best: FloatArray) -> FloatArray:
+def _most_probable(
+    problem: Problem, samples: FloatArray, log_likelihood: FloatArray
+) -> FloatArray:
+    """The MAP estimate with sigma (parameters + 1,), climbed to from the likeliest sample."""
+    coordinates = problem.coordinates
+    if isinstance(coordinates, DescribedCoordinates):
+        return _highest_described(problem, coordinates, samples, log_likelihood)
+    return _highest_in_box(problem, samples[int(log_likelihood.argmax())])
+
+
+def _highest_described(
+    problem: Problem,
+    coordinates: DescribedCoordinates,
+    samples: FloatArray,
+    log_likelihood: FloatArray,
+) -> FloatArray:
+    """Of flat and normal priors: the squares of the deviates seen belong to the fit."""
+    z = coordinates.places(samples[:, :-1])
+    shares, seen = coordinates.smooth(z)
+    at = int((log_likelihood - 0.5 * (seen**2).sum(axis=1)).argmax())
+    count, sigma = shares.shape[1], samples[at, -1]
+    noise = np.hypot(sigma, problem.likelihood.identification_error)
+
+    def scaled(points: FloatArray) -> FloatArray:
+        theta = coordinates.of_smooth(points[:, :count], points[:, count:])
+        return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, points[:, count:]])
+
+    def slopes(point: FloatArray) -> FloatArray:
+        steps = np.where(point < 0.5, _DIFFERENCE, -_DIFFERENCE)
+        found = scaled(np.vstack([point, point + np.diag(steps)]))
+        return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
+
+    start = np.append(shares[at].clip(0, 1), seen[at])
+    lower = np.append(np.zeros(count), np.full(len(start) - count, -np.inf))
+    upper = np.append(np.ones(count), np.full(len(start) - count, np.inf))
+    fit = least_squares(
+        lambda point: scaled(point[None])[0], start, slopes, bounds=(lower, upper), max_nfev=30
+    )
+    theta = coordinates.of_smooth(fit.x[None, :count], fit.x[None, count:])
+    tau = problem.likelihood.likeliest_sigma(problem.run(theta))
+    return np.append(theta[0], tau)
+
+
+def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
+    """The standard deviation, in N, with which the same test would give the tension again.
+
+    To first order about the middle of the draws: the identification's errors alone change between
+    tests, whatever the description, the model and what repeats are off by (Gauss and Markov's
+    estimate with the prior as one more datum). NaN with the priors of the thesis.
+    """
+    coordinates, likelihood = problem.coordinates, problem.likelihood
+    if not isinstance(coordinates, DescribedCoordinates):
+        return math.nan
+    places = coordinates.places(outcome.samples[:, :-1])
+    middle = places[[int(((places - np.median(places, axis=0)) ** 2).sum(axis=1).argmin())]]
+    slopes = problem.slopes(middle)[0]
+    own = np.asarray(likelihood.identification_error)
+    common = np.median(outcome.samples[:, -1])
+    known = likelihood.frequencies if isinstance(likelihood, FieldLikelihood) else len(own)
+    variance = own**2 + np.where(np.arange(len(own)) < known, common**2, 0.0)
+    precision = slopes.T @ (slopes / variance[:, None]) + np.eye(slopes.shape[1])
+    gain = np.linalg.solve(precision, (slopes / variance[:, None]).T)[:, :known]
+    step = 1e-4 * np.eye(slopes.shape[1])
+    tension_n = coordinates.tension_n(np.vstack([middle, middle + step]))
+    rise = (tension_n[1:] - tension_n[0]) / 1e-4
+    return float(np.sqrt(((rise @ gain * own[:known]) ** 2).sum()))
+
+
+def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
+    """Parameters with many more draws at an end of their prior than a flat posterior has."""
+    coordinates = problem.coordinates
+    if isinstance(coordinates, DescribedCoordinates):
+        shares = coordinates.smooth(coordinates.places(samples[:, :-1]))[0]
+        names = coordinates.box.names
+    else:
+        prior = problem.prior
+        shares = (samples[:, :-1] - prior.lower) / (prior.upper - prior.lower)
+        names = prior.names
+    outermost = np.maximum(np.mean(shares < _EDGE, axis=0), np.mean(shares > 1 - _EDGE, axis=0))
+    return tuple(n for n, share in zip(names, outermost, strict=True) if share > _MANY * _EDGE)
+
+
+def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
+    """Root mean square of mean predictions over measured frequencies less 1, in per cent."""
+    count = getattr(problem.likelihood, "frequencies", predicted.shape[1])
+    off = problem.likelihood.misfit(predicted.mean(axis=0)[None])[0, :count]
+    return float(100 * np.sqrt(np.mean(off**2)))
+
+
+def _highest(problem: Problem, predicted: FloatArray) -> float:
+    """The largest log likelihood among the draws, noise integrated out."""
+    return float(problem.likelihood.marginal(predicted).max())
+
+
+def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
     """The parameter set with sigma (d + 1,) of largest density, climbed to from the best sample.
 
     The priors are uniform, so that at given sigma the climb is a bounded least-squares fit.
@@ -134,8 +239,9 @@ def _most_probable(problem: Problem, best: FloatArray) -> FloatArray:
     return np.asarray(candidates[likelihood.joint(predicted, candidates[:, -1]).argmax()])
 
 
-def _predicted(likelihood: Likelihood, predicted: FloatArray) -> tuple[PredictedFrequency, ...]:
+def _predicted(problem: Problem, predicted: FloatArray) -> tuple[PredictedFrequency, ...]:
     """Mean and standard deviation of each measured frequency's prediction, thesis (4.14)."""
+    likelihood = problem.likelihood
     return tuple(
         PredictedFrequency(
             plane=mode.plane,
@@ -144,5 +250,5 @@ def _predicted(likelihood: Likelihood, predicted: FloatArray) -> tuple[Predicted
             sd_hz=float(samples.std(ddof=1)),
             measured_hz=mode.frequency_hz,
         )
-        for mode, samples in zip(likelihood.modes, predicted.T, strict=True)
+        for mode, samples in zip(likelihood.modes, likelihood.by_mode(predicted).T, strict=True)
     )

@@ -7,11 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.models import Model
+from shm.errors import UsageError
 from shm.inference.coordinates import Coordinates
+from shm.inference.described import Calibration, DescribedCoordinates, reading_of
+from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import Likelihood
 from shm.inference.options import Progress
+from shm.models import THESIS, AsMade, Model
+from shm.models.as_made import TENSION
 from shm.values import BoolArray, FloatArray, IntArray, ModalTest
+
+_DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,21 +44,39 @@ class Points:
 
 
 class Problem:
-    """The prior and the likelihood of one model class and one set of measurements."""
+    """The prior and the likelihood of one model class and one set of measurements.
 
-    def __init__(self, model: Model, likelihood: Likelihood):
+    A class with the priors of a description has the noise of the field; one with those of the
+    thesis has the thesis's own.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        likelihood: Likelihood | FieldLikelihood,
+        calibration: Calibration | None = None,
+    ):
         self.model = model
         self.likelihood = likelihood
-        self.prior = model.prior
-        self.dimension = len(self.prior.names)
         self.evaluations = 0
         middle = (1 + likelihood.highest_order) / 2
         own = model.wave_stiffness_n_m_rad(middle)
-        self.coordinates = Coordinates(model.prior, model.swaps, own)
+        self.coordinates: Coordinates | DescribedCoordinates
+        if isinstance(model, AsMade):
+            self.coordinates = DescribedCoordinates(model, likelihood.tests, own, calibration)
+        else:
+            self.coordinates = Coordinates(model.prior, model.swaps, own)
+        self.prior = model.prior
+        self.dimension = self.coordinates.dimension
 
     @classmethod
     def of(
-        cls, tests: Sequence[ModalTest], model: Model, repeat: int, progress: Progress
+        cls,
+        tests: Sequence[ModalTest],
+        model: Model,
+        repeat: int,
+        progress: Progress,
+        calibration: Calibration | None = None,
     ) -> Problem:
         """The problem of `tests`, each of which the model can describe, the model made ready.
 
@@ -60,7 +84,7 @@ class Problem:
         """
         for test in tests:
             model.refuse(test)
-        problem = cls(model, Likelihood(tests, repeat))
+        problem = cls(model, _likelihood(tests, model, repeat, calibration), calibration)
         label = f"{model.name}: reduced basis"
         model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
         return problem
@@ -72,14 +96,45 @@ class Problem:
     def run(self, theta: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
         self.evaluations += len(theta)
-        return self.likelihood.predict(self.model, theta)
+        found = self.likelihood.predict(self.model, theta)
+        if isinstance(self.likelihood, FieldLikelihood) and self.likelihood.has_reading:
+            ratio = theta[:, self.model.parameter_names.index(TENSION)]
+            tension_n = ratio * self.model.hanger.nominal_tension_n
+            found = np.column_stack([found, tension_n])
+        return found
 
     def evaluate(self, z: FloatArray) -> Points:
         """Runs the model at `z` (n, d)."""
         return Points(z, self.predict(z))
+
+    def slopes(self, z: FloatArray) -> FloatArray:
+        """Derivatives of the fractional misfit by z (m, d): (m, measurements, d)."""
+        steps = _DIFFERENCE * np.eye(z.shape[1])
+        shifted = np.vstack([z, *(z + step for step in steps)])
+        misfit = self.likelihood.misfit(self.predict(shifted)).reshape(len(steps) + 1, len(z), -1)
+        return np.asarray(np.moveaxis(misfit[1:] - misfit[0], 0, -1) / _DIFFERENCE)
 
     def log_posterior(self, points: Points, floor: float = 0.0) -> FloatArray:
         """Log of prior times likelihood (n,) with the fictitious error `floor`."""
         return self.coordinates.log_prior(points.z) + self.likelihood.marginal(
             points.predicted, floor
         )
+
+
+def _likelihood(
+    tests: Sequence[ModalTest], model: Model, repeat: int, calibration: Calibration | None
+) -> Likelihood | FieldLikelihood:
+    if model.priors == THESIS:
+        return Likelihood(tests, repeat)
+    if repeat != 1:
+        raise UsageError(
+            f"a data set that counts {repeat} times is the thesis's: real tests count once.",
+            remedy="Leave repeat out, or take the priors of the thesis.",
+        )
+    reading = reading_of(tests)
+    if reading is None:
+        return FieldLikelihood(tests, model)
+    sd = reading.sd
+    if isinstance(model, AsMade):
+        sd = DescribedCoordinates(model, tests, 1.0, calibration).reading_sd
+    return FieldLikelihood(tests, model, (reading.tension_n, sd))

@@ -26,7 +26,6 @@ _STEPS = 8
 _LAST_STEPS = 80
 _FIRST_SIGMA, _FELT_SIGMA = 0.02, 0.001
 _APART = 0.1
-_DIFFERENCE = 1e-4
 _DAMPING = 1e-2
 _WIDEST = 0.4
 _INFLATION = 1.3
@@ -69,7 +68,7 @@ def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None)
     ends, _ = _descend(problem, z[promising], sigma[promising], _LAST_STEPS)
     z = problem.coordinates.fold(np.vstack([z, ends]))
     z = z[_distinct(problem, z)]
-    return Anchors(z, _model_error(problem, z), _slopes(problem, z), problem)
+    return Anchors(z, _model_error(problem, z), problem.slopes(z), problem)
 
 
 def carried(
@@ -131,7 +130,7 @@ def _descend(
     damping = np.full(len(z), first_damping)
     residual, cost = fit(z)
     for _ in range(steps):
-        step = _step(_slopes(problem, z) / noise[..., None], residual, z - centre, damping)
+        step = _step(problem.slopes(z) / noise[..., None], residual, z - centre, damping)
         trial_residual, trial_cost = fit(z + step)
         better = trial_cost < cost
         z = np.where(better[:, None], z + step, z)
@@ -145,14 +144,6 @@ def _noise(problem: Problem, sigma: FloatArray) -> FloatArray:
     """Fractional standard deviations (m, measurements) for model errors (m,)."""
     own = problem.likelihood.identification_error
     return np.asarray(np.hypot(sigma[:, None], own) / np.sqrt(problem.likelihood.repeat))
-
-
-def _slopes(problem: Problem, z: FloatArray) -> FloatArray:
-    """Derivatives of the fractional misfit, shape (m, measurements, d)."""
-    steps = _DIFFERENCE * np.eye(z.shape[1])
-    shifted = np.vstack([z, *(z + step for step in steps)])
-    misfit = problem.likelihood.misfit(problem.predict(shifted)).reshape(len(steps) + 1, len(z), -1)
-    return np.asarray(np.moveaxis(misfit[1:] - misfit[0], 0, -1) / _DIFFERENCE)
 
 
 def _step(

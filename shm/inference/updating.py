@@ -42,7 +42,7 @@ def update(
     that the model class cannot describe. Warns (BiasedEvidenceWarning) about the textbook method.
     """
     options = options or UpdateOptions()
-    problem = Problem.of(tests, model, options.repeat, progress)
+    problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

@@ -12,14 +12,15 @@ from shm.errors import UsageError
 from shm.models.adopted import Adopted
 from shm.models.adopted import unfit as adopted_unfit
 from shm.models.adopted_name import AdoptedName, is_adopted
-from shm.models.base import Model, held_otherwise
+from shm.models.as_made import AsMade
+from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
 from shm.models.composed import AS_DESCRIBED
 from shm.models.registry import MODELS
-from shm.values import Hanger
+from shm.values import Hanger, Posterior
 
 
-def build(name: str, hanger: Hanger) -> Model:
-    """The model class `name` of `hanger`.
+def build(name: str, hanger: Hanger, priors: str = DESCRIPTION) -> Model:
+    """The model class `name` of `hanger`, with the priors of its description or of the thesis.
 
     Raises UsageError for an unknown name, and where the hanger does not admit the class or the
     class cannot describe the hanger.
@@ -31,7 +32,7 @@ def build(name: str, hanger: Hanger) -> Model:
             f"model class {name} does not apply to hanger {hanger.id}: {reason}",
             remedy=f"Classes that apply: {', '.join(fitting) or 'none'}.",
         )
-    return described(name, hanger)
+    return described(name, hanger, priors)
 
 
 def check_baseline(name: str, hanger: Hanger) -> None:
@@ -50,10 +51,23 @@ def check_baseline(name: str, hanger: Hanger) -> None:
         )
 
 
-def described(name: str, hanger: Hanger) -> Model:
-    """The model class `name` of `hanger`, be it admitted or not; UsageError for an unknown name."""
+def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
+    """The model class `name` of `hanger`, be it admitted or not.
+
+    Raises UsageError for an unknown name, of a class or of priors.
+    """
+    if priors not in PRIORS:
+        raise UsageError(f"unknown priors {priors!r}.", remedy=f"Known: {', '.join(PRIORS)}.")
     _refuse_unknown(name, hanger)
-    return Adopted(name, hanger) if is_adopted(name) else MODELS[name](hanger)
+    if is_adopted(name):
+        return Adopted(name, hanger, priors)
+    model = MODELS[name](hanger)
+    return AsMade(model) if priors == DESCRIPTION else model
+
+
+def class_of(posterior: Posterior, hanger: Hanger) -> Model:
+    """The model class that a posterior's parameters are those of."""
+    return described(posterior.model, hanger, posterior.priors)
 
 
 def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
@@ -102,12 +116,17 @@ def _refuse_unknown(name: str, hanger: Hanger) -> None:
 
 
 __all__ = [
+    "DESCRIPTION",
     "MODELS",
+    "PRIORS",
+    "THESIS",
     "AdoptedName",
+    "AsMade",
     "Model",
     "applicable",
     "build",
     "check_baseline",
+    "class_of",
     "competing_names",
     "described",
     "is_adopted",

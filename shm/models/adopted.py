@@ -16,7 +16,8 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.models.adopted_name import AdoptedEffect, AdoptedName
-from shm.models.base import Model
+from shm.models.as_made import AsMade
+from shm.models.base import DESCRIPTION, THESIS, Model
 from shm.models.composed import ComposedHanger
 from shm.models.conditions import Conditions
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
@@ -37,8 +38,9 @@ class Adopted(Model):
 
     expensive = True
 
-    def __init__(self, name: str, hanger: Hanger):
+    def __init__(self, name: str, hanger: Hanger, priors: str = THESIS):
         super().__init__(hanger)
+        self.priors = priors
         made = checked(name, hanger)
         self._effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
         self._reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
@@ -53,6 +55,9 @@ class Adopted(Model):
         self._logarithmic = np.array([in_log(each) for each in free])
         half = {name: _HALF_WIDTH_IN_SD * sd for name, sd in asdict(hanger.scatter).items()}
         bounds = {own_name(e): bounds_of(e) for e in free}
+        if priors == DESCRIPTION:
+            known = AsMade(MODELS[made.baseline](hanger)).bounds
+            bounds |= {own: known[own] for own in bounds if own in MODELS[made.baseline].bounds}
         bounds |= {name: (-half[name], half[name]) for name in bounds if name in half}
         for each in made.effects:
             for parameter, both in each.ranges.items():

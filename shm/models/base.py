@@ -15,6 +15,10 @@ from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
 
+THESIS, DESCRIPTION = "thesis", "description"
+PRIORS = (DESCRIPTION, THESIS)
+"""Ranges made for the hanger of the thesis, an exact description; or what the description says."""
+
 
 def silent(fraction: float) -> None:
     """No progress is shown."""
@@ -41,7 +45,9 @@ class Model:
 
     `bounds` are the uniform priors of the parameters; `swaps` lists pairs of end springs (log10)
     that can be exchanged without changing any frequency, so that sampling may keep to one copy.
-    `expensive` says that an evaluation costs much more than a beam's.
+    `expensive` says that an evaluation costs much more than a beam's, `sees_section` that the
+    area matters beyond mass and bending stiffness (see `shm.models.as_made`); `priors` is one of
+    `PRIORS`.
     """
 
     name: str
@@ -49,6 +55,8 @@ class Model:
     bounds: Mapping[str, tuple[float, float]]
     swaps: Sequence[Swap] = ()
     expensive: ClassVar[bool] = False
+    sees_section: ClassVar[bool] = False
+    priors: str = THESIS
 
     def __init__(self, hanger: Hanger):
         self.hanger = hanger

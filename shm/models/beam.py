@@ -1,10 +1,10 @@
-"""Beam 1 (clamped ends) and Beam 2 (rotational end springs), thesis 2.4 and 5.1."""
+"""Beam 1 (clamped ends), Beam 2 (rotational end springs), thesis 2.4 and 5.1; Beam 3 (shear, too)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from shm.models import stepped, tensioned_beam
+from shm.models import stepped, tensioned_beam, timoshenko_beam
 from shm.models.base import Model
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -115,3 +115,46 @@ class Beam2(Beam):
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         springs = 10 ** theta[:, 2:]
         return springs[:, :2], springs[:, 2:]
+
+
+class Beam3(Beam2):
+    """Beam 2 that shears and whose sections resist turning: Timoshenko's beam.
+
+    Shear stiffness is kappa G A with kappa = 6 (1 + nu) / (7 + 6 nu) of a round section (Cowper
+    1966, J. Appl. Mech. 33, 335).
+    """
+
+    name = "beam3"
+    title = "Beam 3: rotational end springs, shear and rotary inertia"
+    sees_section = True
+
+    @classmethod
+    def unfit(cls, hanger: Hanger) -> str:
+        if hanger.kind == "strand":
+            return "its section shears as a solid bar's, not as wires that slip."
+        return "it does not model turnbuckles." if hanger.turnbuckles else super().unfit(hanger)
+
+    def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        return self.frequencies_of_section(theta, np.ones(len(theta)), modes)
+
+    def frequencies_of_section(
+        self, theta: FloatArray, section: FloatArray, modes: int
+    ) -> FloatArray:
+        """Frequencies (n, 2, modes) of bars of the described bending stiffness and mass whose area
+        is `section` (n,) times the described one: it changes shear and rotary inertia alone.
+        """
+        hanger, nu = self.hanger, self.hanger.poissons_ratio
+        shear_modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
+        coefficient = 6 * (1 + nu) / (7 + 6 * nu)
+        deck, arch = self.springs_n_m_rad(theta)
+        return timoshenko_beam.frequencies_hz(
+            self._length_m(theta)[:, None],
+            self._tension_n(theta)[:, None],
+            np.asarray(hanger.bending_stiffness_n_m2),
+            np.asarray(hanger.mass_per_length_kg_m),
+            coefficient * shear_modulus_pa * hanger.area_m2 / section[:, None],
+            np.sqrt(hanger.second_moment_m4 / hanger.area_m2 * section)[:, None],
+            deck,
+            arch,
+            modes,
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.models import described
+from shm.models import class_of
 from shm.values import PLANES, FloatArray, Hanger, Posterior
 
 
@@ -13,7 +13,7 @@ def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]
 
     It is 2/(1/k_deck + 1/k_arch), because frequencies alone cannot tell the ends apart.
     """
-    model = described(posterior.model, hanger)
+    model = class_of(posterior, hanger)
     theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
     deck, arch = model.springs_n_m_rad(theta)
     flexibility = 1 / deck + 1 / arch

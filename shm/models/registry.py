@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from shm.errors import UsageError
 from shm.models.base import Model, held_otherwise
-from shm.models.beam import Beam1, Beam2
+from shm.models.beam import Beam1, Beam2, Beam3
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
 
 MODELS: dict[str, type[Model]] = {
-    model.name: model for model in (Beam1, Beam2, S1, S2, Solid0, Solid1, Solid2)
+    model.name: model for model in (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)
 }
 
 

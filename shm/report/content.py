@@ -27,6 +27,7 @@ from shm.values import (
     Selection,
     Summary,
 )
+from shm.values.force_units import ForceUnit, force_unit
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
 
@@ -62,6 +63,10 @@ class Interval:
     def scaled(self, factor: float) -> Interval:
         """The same quantity in a unit 1/`factor` as large."""
         return Interval(self.mean * factor, self.low * factor, self.high * factor)
+
+    def in_unit(self, unit: ForceUnit) -> Interval:
+        """A force in N in another unit."""
+        return self.scaled(1 / unit.newtons)
 
     @property
     def width(self) -> float:
@@ -210,3 +215,9 @@ class HangerReport:
         if self.baseline is None or self.baseline.tests == self.posterior.tests:
             return None
         return Interval.of_samples(self.baseline.tension_n)
+
+    @property
+    def tension_unit(self) -> ForceUnit:
+        """The one unit of this tension and the baseline's, so that they compare at a glance."""
+        both = (self.tension_n, self.baseline_tension_n)
+        return force_unit(*(each.mean for each in both if each))

@@ -9,9 +9,14 @@ from shm.report.summary import is_found, of_nominal, tension_change
 
 def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
     """What, value, what stands beside it."""
-    tension = words.kilonewtons(data.tension_n)
+    unit = data.tension_unit
+    tension = data.tension_n.in_unit(unit)
     return (
-        ("Tension", f"{words.mean(tension)} kN", f"90 % interval {words.span(tension)} kN"),
+        (
+            "Tension",
+            f"{words.mean(tension)} {unit.name}",
+            f"90 % interval {words.span(tension)} {unit.name}",
+        ),
         _of_nominal(data),
         _since_baseline(data),
         (
@@ -31,7 +36,7 @@ def _of_nominal(data: HangerReport) -> tuple[str, str, str]:
     share = of_nominal(data.tension_n, data.hanger)
     if share is None:
         return ("Of nominal", "not known", "the hanger has no nominal tension")
-    nominal = f"{data.hanger.nominal_tension_n / 1e3:.0f} kN"
+    nominal = words.rounded_tension(data.hanger.nominal_tension_n, data.tension_unit)
     return (
         "Of nominal",
         f"{words.mean(share)} %",

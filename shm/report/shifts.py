@@ -7,6 +7,8 @@ import math
 from shm.report import words
 from shm.report.content import Interval
 from shm.values import NAN, TENSION, Drift
+from shm.values.force_units import ForceUnit, force_unit
+from shm.watch.neighbours import BridgePattern
 
 _UNMOVED = 0.01
 _LARGEST_FACTOR = 1e3
@@ -28,6 +30,16 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
         threshold_cell(row),
         words.probability(row.probability),
     )
+
+
+def shift_unit(pattern: BridgePattern) -> tuple[ForceUnit, int]:
+    """The one unit of all shifts of tension, and the decimals that they deserve.
+
+    By the tensions that shift, not by the shifts: of hangers at rest they are all but 0.
+    """
+    largest_n = max(row.baseline_n for row in pattern.rows)
+    unit = force_unit(largest_n)
+    return unit, unit.decimals(largest_n)
 
 
 def _about_none(row: Drift) -> str:

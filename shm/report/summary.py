@@ -11,7 +11,7 @@ import numpy as np
 from shm.report import words
 from shm.report.content import HangerReport, Interval
 from shm.report.diagnosis.summary import next_step, verdict
-from shm.report.diagnosis.tensions import AFTER, tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_of
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
@@ -127,7 +127,7 @@ def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
 
 def _tension(data: HangerReport) -> str:
     name = words.hanger_name(data.hanger.id, data.hanger.name)
-    tension = words.with_interval(words.kilonewtons(data.tension_n), "kN")
+    tension = words.tension(data.tension_n, data.tension_unit)
     when = words.moment(data.latest.time)
     return (
         f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
@@ -141,14 +141,15 @@ def _against_nominal(data: HangerReport) -> str:
         return "It has no nominal tension to compare with."
     shift = data.tension_n.scaled(1 / nominal)
     fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
-    return f"Against the nominal {nominal / 1e3:.0f} kN that is {words.signed_percent(fraction)}."
+    given = words.rounded_tension(nominal, data.tension_unit)
+    return f"Against the nominal {given} that is {words.signed_percent(fraction)}."
 
 
 def _against_baseline(data: HangerReport) -> str:
     then, change = data.baseline_tension_n, tension_change(data)
     if then is None or change is None or data.baseline is None:
         return "There is no earlier test to compare with: this one is the baseline."
-    tension = words.with_interval(words.kilonewtons(then), "kN")
+    tension = words.tension(then, data.tension_unit)
     tests = told_tests(data.baseline.tests)
     found = f"Against the baseline, {tests} with {tension}, it is {words.signed_percent(change)}"
     return f"{found}{'' if is_found(data) else ', if it has moved at all'}."
@@ -253,7 +254,7 @@ def _gap(data: HangerReport) -> str:
     """What the model does not explain, and why as far as that was diagnosed."""
     if data.diagnosis is None:
         return _outside(data)
-    told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data.diagnosis)]
+    told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data, data.diagnosis)]
     return " ".join([part for part in told if part] + [data.gap_watch] * bool(data.gap_watch))
 
 
@@ -292,14 +293,13 @@ def _diagnosed_on(diagnosis: Diagnosis) -> str:
     )
 
 
-def _allowing(diagnosis: Diagnosis) -> str:
+def _allowing(data: HangerReport, diagnosis: Diagnosis) -> str:
     """The tension that the diagnosis arrives at."""
-    tension_n = diagnosis.tension_after_n
-    if math.isnan(tension_n.mean):
+    estimate = diagnosis.tension_after_n
+    if math.isnan(estimate.mean):
         return ""
-    unit = tension_unit(diagnosis)
-    told = words.with_interval(unit.interval(tension_n), unit.name)
-    return f"{AFTER.capitalize()}, the tension is {told}."
+    tension = words.tension(tension_of(estimate), data.tension_unit)
+    return f"{AFTER.capitalize()}, the tension is {tension}."
 
 
 def _chosen(data: HangerReport) -> str:

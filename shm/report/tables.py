@@ -16,6 +16,7 @@ from shm.report.summary import misfits_percent, of_nominal, tension_change, told
 from shm.report.table import Table
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
+from shm.values.force_units import ForceUnit, force_unit
 
 
 def tables(data: HangerReport) -> tuple[Table, ...]:
@@ -34,9 +35,10 @@ def origins(data: HangerReport) -> tuple[Table, ...]:
 
 
 def tension(data: HangerReport) -> Table:
-    rows = [_tension_row("now", data.tension_n, data.hanger)]
+    unit = data.tension_unit
+    rows = [_tension_row("now", data.tension_n, data.hanger, unit)]
     if data.baseline_tension_n is not None:
-        rows.append(_tension_row("baseline", data.baseline_tension_n, data.hanger))
+        rows.append(_tension_row("baseline", data.baseline_tension_n, data.hanger, unit))
     if (fraction := tension_change(data)) is not None:
         change = fraction.scaled(100)
         rows.append(
@@ -47,20 +49,21 @@ def tension(data: HangerReport) -> Table:
         )  # fmt: skip
     nominal_n = data.hanger.nominal_tension_n
     if nominal_n > 0:
-        rows.append(
-            ("nominal (as designed)", f"{nominal_n / 1e3:.1f} kN", "given, no interval", "100 %")
-        )
+        nominal = f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"
+        rows.append(("nominal (as designed)", nominal, "given, no interval", "100 %"))
     return Table(
         "Tension", ("tension", "mean", "90 % interval", "of nominal (90 % interval)"), tuple(rows)
     )
 
 
-def _tension_row(label: str, tension_n: Interval, hanger: Hanger) -> tuple[str, ...]:
-    kilonewtons, share = words.kilonewtons(tension_n), of_nominal(tension_n, hanger)
+def _tension_row(
+    label: str, tension_n: Interval, hanger: Hanger, unit: ForceUnit
+) -> tuple[str, ...]:
+    tension, share = tension_n.in_unit(unit), of_nominal(tension_n, hanger)
     return (
         label,
-        f"{words.mean(kilonewtons)} kN",
-        f"{words.span(kilonewtons)} kN",
+        f"{words.mean(tension)} {unit.name}",
+        f"{words.span(tension)} {unit.name}",
         f"{words.with_span(share)} %" if share else "no nominal",
     )
 
@@ -183,10 +186,11 @@ def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
 def models(data: HangerReport) -> Table:
     chosen = data.selection
     pairs = list(zip(chosen.posteriors, chosen.probabilities, strict=True)) if chosen else []
+    unit = force_unit(*(float(posterior.tension_n.mean()) for posterior, _ in pairs))
     return Table(
         "Model classes",
-        ("model", "probability", "log evidence", "its sd", "tension, kN", "90 % interval, kN"),
-        tuple(_model_row(posterior, share) for posterior, share in pairs),
+        ("model", "probability", "log evidence", "its sd", *words.tension_headings(unit)),
+        tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
         note=f"Compared on {told_tests(pairs[0][0].tests)}, all classes held equally probable "
         "before. Evidence in natural logarithms, with the standard deviation of its sampling."
         if pairs
@@ -194,15 +198,15 @@ def models(data: HangerReport) -> Table:
     )
 
 
-def _model_row(posterior: Posterior, share: float) -> tuple[str, ...]:
-    kilonewtons = words.kilonewtons(Interval.of_samples(posterior.tension_n))
+def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str, ...]:
+    tension = Interval.of_samples(posterior.tension_n).in_unit(unit)
     return (
         words.model_class(posterior.model),
         words.probability(share),
         f"{posterior.log_evidence:.2f}",
         words.number(posterior.log_evidence_sd, ".2f"),
-        words.mean(kilonewtons),
-        words.span(kilonewtons),
+        words.mean(tension),
+        words.span(tension),
     )
 
 
@@ -246,7 +250,8 @@ def _kelvins(first: TrendRow, last: TrendRow) -> str:
 
 def _tension_course(first: Interval, last: Interval) -> tuple[str, ...]:
     change = last.since(first).scaled(100)
-    both = (f"{words.with_span(words.kilonewtons(each))} kN" for each in (first, last))
+    unit = force_unit(first.mean, last.mean)
+    both = (f"{words.with_span(each.in_unit(unit))} {unit.name}" for each in (first, last))
     return ("tension", *both, f"{words.with_span(change, signed=True)} %")
 
 
@@ -263,23 +268,24 @@ def _stiffness_course(name: str, first: Interval, last: Interval) -> tuple[str, 
 
 def history(data: HangerReport) -> Table:
     within = f" in the period {data.period}" if data.period else ""
+    unit = force_unit(*(row.tension_n.mean for row in data.trend))
     return Table(
         f"Tests{within}, latest first",
-        ("time", "test", "temperature", "model", "tension, kN", "90 % interval, kN"),
-        tuple(_history_row(row) for row in reversed(data.trend)),
+        ("time", "test", "temperature", "model", *words.tension_headings(unit)),
+        tuple(_history_row(row, unit) for row in reversed(data.trend)),
     )
 
 
-def _history_row(row: TrendRow) -> tuple[str, ...]:
-    kilonewtons = words.kilonewtons(row.tension_n)
+def _history_row(row: TrendRow, unit: ForceUnit) -> tuple[str, ...]:
+    tension = row.tension_n.in_unit(unit)
     return (
         words.moment(row.time),
         row.test,
         words.number(row.temperature_c, ".1f", "not recorded")
         + (" °C" if math.isfinite(row.temperature_c) else ""),
         words.model_class(row.model),
-        words.mean(kilonewtons),
-        words.span(kilonewtons),
+        words.mean(tension),
+        words.span(tension),
     )
 
 

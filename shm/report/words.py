@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.report.content import Interval
+from shm.values.force_units import ForceUnit
 
 _LONGEST_NAME = 24
 _ROTATIONAL_SPRINGS = {
@@ -52,6 +53,21 @@ def with_interval(interval: Interval, unit: str) -> str:
         f"{interval.mean:z.{places}f}{space} (90 % interval "
         f"{interval.low:z.{places}f} to {interval.high:z.{places}f}{space})"
     )
+
+
+def tension(tension_n: Interval, unit: ForceUnit) -> str:
+    """`655 kN (90 % interval 640 to 671 kN)` of a tension in N."""
+    return with_interval(tension_n.in_unit(unit), unit.name)
+
+
+def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
+    """`711 kN` of a tension in N that stands without an interval: to three digits at least."""
+    return f"{plain(unit.of(tension_n))} {unit.name}"
+
+
+def tension_headings(unit: ForceUnit) -> tuple[str, str]:
+    """Of the columns that `mean` and `span` of tensions stand in."""
+    return f"tension, {unit.name}", f"90 % interval, {unit.name}"
 
 
 def span(interval: Interval, signed: bool = False) -> str:
@@ -112,10 +128,6 @@ def temperature(celsius: float) -> str:
 def moment(time: datetime | None) -> str:
     """`2026-05-01 10:00 UTC`."""
     return f"{time.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if time else "time not recorded"
-
-
-def kilonewtons(interval: Interval) -> Interval:
-    return interval.scaled(1e-3)
 
 
 def hanger_name(hanger_id: int, name: str) -> str:

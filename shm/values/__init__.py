@@ -39,6 +39,8 @@ from shm.values.hanger import (
     EffectPrior,
     EndPlate,
     Hanger,
+    Kind,
+    Limits,
     Scatter,
     Support,
     Supports,
@@ -64,6 +66,9 @@ from shm.values.modes import (
     ShapePoint,
 )
 from shm.values.posterior import (
+    ENOUGH_EFFECTIVE,
+    MOST_MISFIT_PERCENT,
+    Averaged,
     Posterior,
     PredictedFrequency,
     Prior,
@@ -94,6 +99,8 @@ from shm.values.trial import (
 )
 
 __all__ = [
+    "ENOUGH_EFFECTIVE",
+    "MOST_MISFIT_PERCENT",
     "NAN",
     "PLANES",
     "TENSION",
@@ -101,6 +108,7 @@ __all__ = [
     "Alert",
     "AlertKind",
     "Answer",
+    "Averaged",
     "Bin",
     "BoolArray",
     "CaseScore",
@@ -120,7 +128,9 @@ __all__ = [
     "GapPlace",
     "Hanger",
     "IntArray",
+    "Kind",
     "Leads",
+    "Limits",
     "Mark",
     "MarkName",
     "ModalTest",

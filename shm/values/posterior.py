@@ -7,7 +7,14 @@ from typing import Self
 
 import numpy as np
 
-from shm.values.kinds import FloatArray, Plane
+from shm.values.hanger import Limits
+from shm.values.kinds import NAN, FloatArray, Plane
+
+ENOUGH_EFFECTIVE = 200
+"""Effective draws from which on a 90 % interval's ends are right to 0.15 of its half width."""
+
+MOST_MISFIT_PERCENT = 1.0
+"""Beyond it, predictions are off by more than tolerances of manufacture move any frequency."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +63,12 @@ class Posterior:
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
     batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
     `tmcmc` or `textbook` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
+    `priors` are those of the `thesis` or of the hanger's `description`. The tension's draws are
+    absolute: they hold the uncertainty of the description. `repeatability_sd_n` is the standard
+    deviation, in N, with which the same test repeats it, description held: what counts in shifts.
+    `at_bounds` are parameters of which many draws lie at an end of their prior; `misfit_percent`
+    is the root mean square of predicted over measured frequencies less 1; `log_occam` the log
+    evidence less the largest log likelihood, never above 0 where the sampler did its work.
     """
 
     model: str
@@ -75,6 +88,35 @@ class Posterior:
     seed: int
     seconds: float
     method: str = "tmcmc"
+    priors: str = "thesis"
+    repeatability_sd_n: float = NAN
+    at_bounds: tuple[str, ...] = ()
+    misfit_percent: float = NAN
+    log_occam: float = NAN
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
+        found = []
+        if self.effective_sample_size < ENOUGH_EFFECTIVE:
+            found.append(
+                f"The sampler failed: {self.effective_sample_size:.0f} effective draws of "
+                f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. Do not use this tension."
+            )
+        if self.log_occam > 0:
+            found.append(
+                f"The evidence is wrong: its log Occam factor is {self.log_occam:.1f}, above 0. "
+                "Do not compare this model class with others."
+            )
+        if self.at_bounds:
+            names = ", ".join(self.at_bounds)
+            found.append(f"At the bound of its prior: {names}. The interval is cut off there.")
+        if self.misfit_percent > MOST_MISFIT_PERCENT:
+            found.append(
+                f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
+                "(root mean square): the description or the model class does not fit this hanger."
+            )
+        return tuple(found)
 
     def parameter(self, name: str) -> FloatArray:
         """Samples of one parameter, shape (samples,)."""
@@ -87,6 +129,23 @@ class Posterior:
 
 
 @dataclass(frozen=True, eq=False)
+class Averaged:
+    """The tension over all model classes, each with its probability: what a report leads with.
+
+    `tension_n` is absolute; `repeatability_sd_n` that of the most probable class, in N.
+    `probability_above_limit` and `probability_slack` are those of a tension beyond the hanger's
+    limits (the thesis's robust reliability, 4.18), NaN where the owner sets none. `caveats` are
+    what keeps it from being taken at its word.
+    """
+
+    tension_n: Summary
+    repeatability_sd_n: float
+    probability_above_limit: float = NAN
+    probability_slack: float = NAN
+    caveats: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Selection:
     """Model classes compared on the same tests, most probable first."""
 
@@ -96,3 +155,28 @@ class Selection:
     @property
     def selected(self) -> Posterior:
         return self.posteriors[0]
+
+    @property
+    def tension_n(self) -> FloatArray:
+        """Draws (samples,) of the tension over all classes, each as often as it is probable."""
+        count = len(self.selected.samples)
+        share = np.cumsum(np.array(self.probabilities) / sum(self.probabilities))
+        ends = np.append(0, np.round(count * share).astype(int))
+        parts = [
+            posterior.tension_n[np.arange(low, high) % len(posterior.samples)]
+            for posterior, low, high in zip(self.posteriors, ends[:-1], ends[1:], strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def averaged(self, limits: Limits | None = None) -> Averaged:
+        """What all classes together say of the tension."""
+        draws, limits = self.tension_n, limits or Limits()
+        above, slack = limits.tension_max_n, limits.tension_min_n
+        likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]
+        return Averaged(
+            Summary.of(draws),
+            self.selected.repeatability_sd_n,
+            float(np.mean(draws > above)) if above == above else NAN,
+            float(np.mean(draws < slack)) if slack == slack else NAN,
+            tuple(dict.fromkeys(each for posterior in likely for each in posterior.caveats)),
+        )

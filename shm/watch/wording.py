@@ -7,6 +7,7 @@ from collections.abc import Sequence, Set
 from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, End, Hanger, Moved, Plane, WatchedTest
+from shm.values.force_units import force_unit
 
 _NINETY_PERCENT = 1.645
 _CERTAIN = 0.999
@@ -237,16 +238,18 @@ def _threshold(drift: Drift) -> str:
 
 
 def _now(test: WatchedTest, beyond: Sequence[Drift], change: Change | None) -> str:
-    """The tension in kN where it is spoken of: a figure that the owner knows."""
+    """The tension where it is spoken of: a figure that the owner knows."""
     spoken = [drift.quantity for drift in beyond] + (
         [each.quantity for each in suspects(change)] if change else []
     )
     for drift in test.drifts:
         if drift.quantity == TENSION and TENSION in spoken:
-            now, before = drift.value / 1e3, drift.baseline / 1e3
+            now_n, before_n = drift.value, drift.baseline
+            unit = force_unit(now_n, before_n)
             return (
-                f"Tension is now {now:.4g} kN, {100 * abs(now / before - 1):.1f} % "
-                f"{'below' if now < before else 'above'} the {before:.4g} kN of the baseline."
+                f"Tension is now {unit.told(now_n)}, {100 * abs(now_n / before_n - 1):.1f} % "
+                f"{'below' if now_n < before_n else 'above'} the {unit.told(before_n)} of the "
+                "baseline."
             )
     return ""
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+from math import pi, sqrt
 from pathlib import Path
 
 import pytest
 
+from shm.documents import dump, modes_document
 from shm.store import Workspace
+from shm.values import PLANES, ModalTest, Mode
 from tests.cli.conftest import Shm
 
 QUANTILES = {"mean", "sd", "q05", "q50", "q95", "map"}
@@ -67,6 +71,56 @@ def test_the_tables_name_units_and_intervals(shm: Shm, modes_file: Path, hanger_
     assert "R-hat" in updated.out
     selected = shm("select", modes_file, "--hanger-file", hanger_file, "--models", "beam1", *QUICK)
     assert "90 % interval (kN)" in selected.out
+
+
+def _clamped_string(
+    folder: Path, diameter_m: float, length_m: float, tension_n: float
+) -> tuple[Path, Path]:
+    """Its description, and its first modes: n/(2 L) sqrt(T/m), raised by its stiffness (Morse)."""
+    hanger = folder / "H.toml"
+    hanger.write_text(
+        f"[[hanger]]\nid = 3\ndiameter_m = {diameter_m}\nlength_m = {length_m}\n"
+        f"elastic_modulus_pa = 200e9\ndensity_kg_m3 = 7850\nnominal_tension_n = {tension_n}\n"
+    )
+    mass_kg_m, bending = 7850 * pi * diameter_m**2 / 4, 200e9 * pi * diameter_m**4 / 64
+    slack = sqrt(bending / tension_n) / length_m
+    modes = tuple(
+        Mode(
+            plane,
+            n,
+            n / (2 * length_m) * sqrt(tension_n / mass_kg_m)
+            * (1 + 2 * slack + (4 + (n * pi) ** 2 / 2) * slack**2),
+        )
+        for plane in PLANES
+        for n in range(1, 6)
+    )  # fmt: skip
+    path = folder / "t1.modes.json"
+    path.write_text(dump(modes_document([ModalTest("t1", modes, 3)])))
+    return path, hanger
+
+
+@pytest.mark.parametrize(
+    ("unit", "diameter_m", "length_m", "tension_n"),
+    [("N", 0.3e-3, 0.65, 5.4), ("kN", 0.012, 6.0, 20e3), ("MN", 0.2, 100.0, 12e6)],
+    ids=["string", "tie rod", "cable"],
+)
+def test_tensions_are_told_in_the_unit_that_fits_them(
+    shm: Shm, tmp_path: Path, unit: str, diameter_m: float, length_m: float, tension_n: float
+) -> None:
+    modes, hanger = _clamped_string(tmp_path, diameter_m, length_m, tension_n)
+    updated = shm("update", modes, "--hanger-file", hanger, "--model", "beam1", *QUICK)
+    assert updated.code == 0, updated.err
+    (row,) = [line for line in updated.out.splitlines() if f"tension ({unit})" in line]
+    mean, *rest = map(float, re.findall(r"[\d.]+", row.split(")")[1]))
+    expected = tension_n / {"N": 1.0, "kN": 1e3, "MN": 1e6}[unit]
+    assert mean == pytest.approx(expected, rel=0.05)
+    assert min(rest) > 0  # the sd among them
+    selected = shm("select", modes, "--hanger-file", hanger, "--models", "beam1", *QUICK)
+    told = " ".join(selected.out.split())
+    assert f"({unit})" in told
+    assert not {"N", "kN", "MN"} - {unit} & set(re.findall(r"\((\w+)\)", told))
+    low, high = map(float, re.findall(r"([\d.]+) to ([\d.]+)", told)[0])
+    assert 0 < low < high
 
 
 def test_the_latest_test_of_a_hanger_of_the_workspace_is_taken(shm: Shm, bridge: Workspace) -> None:

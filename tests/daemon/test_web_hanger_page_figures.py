@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import timedelta
 from types import SimpleNamespace
@@ -117,6 +118,23 @@ def trace(document: dict[str, Any], name: str) -> dict[str, Any]:
 def test_a_short_trend_is_drawn_whole() -> None:
     dots = trace(drawn(a_view(30), TREND), "test by itself")
     assert len(dots["x"]) == 30
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), [(5.4, "N"), (20e3, "kN"), (12e6, "MN")])
+def test_tensions_are_drawn_in_the_unit_that_fits_them(tension_n: float, unit: str) -> None:
+    points = [
+        replace(a_point(number), tension_n=summed_up(tension_n, 0.01 * tension_n))
+        for number in range(5)
+    ]
+    baseline = replace(BASELINE, tension_n=summed_up(tension_n, 0.01 * tension_n))
+    view = a_view(5, trend=tuple(points), baseline=baseline)
+    for figure in (TREND, TEMPERATURE):
+        document = drawn(view, figure)
+        assert document["layout"]["yaxis"]["title"]["text"] == f"tension ({unit})"
+        assert f" {unit}" in document["alt"]
+        assert not re.search(r"(?<![\d.])0\.0*(?!\d)", document["alt"])
+    low, high = drawn(view, TREND)["layout"]["yaxis"]["range"]
+    assert low < tension_n / {"N": 1.0, "kN": 1e3, "MN": 1e6}[unit] < high
 
 
 def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None:

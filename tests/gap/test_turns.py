@@ -95,4 +95,5 @@ def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: Moda
     without = without_shape(whole, 0).observations
     others = whole.observations.design.shape_mode != 0
     _, _, *of_others = turn_loads(whole.observations)[others].T
-    assert np.array_equal(turn_loads(without), np.column_stack(of_others))
+    # A sum over fewer components rounds otherwise; what is no load of a mode is 0 in both.
+    np.testing.assert_allclose(turn_loads(without), np.column_stack(of_others), rtol=1e-13)

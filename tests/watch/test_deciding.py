@@ -214,6 +214,21 @@ def test_a_sudden_loss_says_first_what_moved_and_last_what_to_do() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("baseline_n", "said"),
+    [
+        (5.4, "Tension is now 4.968 N, 8.0 % below the 5.4 N of the baseline."),
+        (20e3, "Tension is now 18.4 kN, 8.0 % below the 20 kN of the baseline."),
+        (12e6, "Tension is now 11.04 MN, 8.0 % below the 12 MN of the baseline."),
+        (10.5e6, "Tension is now 9.66 MN, 8.0 % below the 10.5 MN of the baseline."),
+    ],
+)
+def test_the_tension_is_told_in_the_unit_that_fits_it(baseline_n: float, said: str) -> None:
+    test = day(2, change(called=True, began=2), 0.3)
+    shift = replace(test.drifts[0], baseline=baseline_n, value=0.92 * baseline_n)
+    assert said in only(replace(test, drifts=(shift,))).message
+
+
 def test_beyond_the_threshold_comes_first_and_asks_for_a_decision() -> None:
     message = only(day(2, probability=0.99)).message
     assert message.startswith(

@@ -11,8 +11,8 @@ Physics, one plane. A straight bar between two supports that do not deflect, x f
 * the tension works on the slope of the axis, T w'^2/2 (Timoshenko & Gere, Theory of Elastic
   Stability, the Engesser form); with own weight it grows upwards by m g per metre (a vertical
   hanger) and the stated tension is the one at mid-length;
-* rotational springs on the rotation of the end sections; point masses, lateral springs and
-  stretches of reduced section anywhere.
+* rotational springs on the rotation of the end sections; point masses, lateral springs and a
+  stretch of reduced section anywhere.
 
 Elements. The deflection is split as w = b + s, where b' is the rotation of the section and s' the
 shear strain. b is C1 (Hermite cubic plus bubbles from Legendre polynomials integrated twice), s is
@@ -49,9 +49,6 @@ STRAND_DENSITY_KG_M3 = 83e3 / GRAVITY_M_S2
 DEGREE = 8  # of the deflection inside an element
 
 
-# ---------------------------------------------------------------- the bar and its elements
-
-
 @dataclass(frozen=True)
 class Bar:
     """One plane of a hanger as it really is."""
@@ -77,15 +74,9 @@ def _reference() -> dict[str, Array]:
     The two slope functions of b are those for a unit slope in the coordinate -1..1; the element
     of length h scales them by h/2.
     """
-    cubic = [
-        legendre.poly2leg([2, -3, 0, 1]) / 4,
-        legendre.poly2leg([1, -1, -1, 1]) / 4,
-        legendre.poly2leg([2, 3, 0, -1]) / 4,
-        legendre.poly2leg([-1, -1, 1, 1]) / 4,
-    ]
-    bending = cubic + [
-        legendre.legint(np.eye(j + 1)[j], m=2, lbnd=-1) for j in range(2, DEGREE - 1)
-    ]
+    hermite = ([2, -3, 0, 1], [1, -1, -1, 1], [2, 3, 0, -1], [-1, -1, 1, 1])
+    bending = [legendre.poly2leg(c) / 4 for c in hermite]
+    bending += [legendre.legint(np.eye(j + 1)[j], m=2, lbnd=-1) for j in range(2, DEGREE - 1)]
     shear = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
     shear += [legendre.legint(np.eye(j + 1)[j], lbnd=-1) for j in range(1, DEGREE)]
     point, weight = legendre.leggauss(DEGREE + 2)  # exact to degree 19; 17 is needed
@@ -112,6 +103,10 @@ def _mesh(bar: Bar, elements: int) -> Array:
     stations = {0.0, bar.length_m, *(x for x, _ in bar.masses), *(x for x, _ in bar.supports)}
     if bar.loss[2] > 0:
         stations |= {bar.loss[0], bar.loss[1]}
+    if bar.tension_n > 0:  # elements of their own for the end layers, exp(-x sqrt(T/EI))
+        layer = 5 * math.sqrt(bar.bending_stiffness_n_m2 / bar.tension_n)
+        if layer < bar.length_m / elements:
+            stations |= {layer, bar.length_m - layer}
     marks = sorted(stations)
     nodes = [0.0]
     for start, end in pairwise(marks):
@@ -142,12 +137,11 @@ def natural_frequencies_hz(bar: Bar, count: int, elements: int | None = None) ->
         tension = bar.tension_n + bar.tension_gradient_n_m * (middle - bar.length_m / 2)
         half = h / 2
         k = second_moment * bar.bending_stiffness_n_m2 / half**3 * reference["curvature"]
-        k = k + tension / half * reference["slope"]
-        k = k + bar.tension_gradient_n_m * reference["slope_x"]
+        k += tension / half * reference["slope"] + bar.tension_gradient_n_m * reference["slope_x"]
         m = area * bar.mass_per_length_kg_m * half * reference["deflection"]
-        m = m + second_moment * bar.rotary_inertia_kg_m / half * reference["rotation"]
+        m += second_moment * bar.rotary_inertia_kg_m / half * reference["rotation"]
         if with_shear:
-            k = k + area * bar.shear_stiffness_n / half * reference["strain"]
+            k += area * bar.shear_stiffness_n / half * reference["strain"]
         scale = np.ones(local)
         scale[[1, 3]] = half
         where = np.concatenate(
@@ -177,9 +171,6 @@ def natural_frequencies_hz(bar: Bar, count: int, elements: int | None = None) ->
     # M v = (1/omega^2) K v: the low modes are the large values, the ones that rounding spares.
     values = eigh(mass[keep], stiffness[keep], eigvals_only=True, check_finite=False)
     return 1 / (2 * math.pi * np.sqrt(values[::-1][:count]))
-
-
-# ---------------------------------------------------------------- nuisances and cases
 
 
 @dataclass(frozen=True)
@@ -279,6 +270,8 @@ def _sound(rng: np.random.Generator) -> _Draw:
     kind = rng.random()
     bounds = (0.03, 10.0) if kind < 0.2 else (100.0, 1000.0) if kind < 0.4 else (0.03, 1000.0)
     springs = _springs(rng, *bounds)
+    while kind >= 0.4 and (max(springs) < 10 or min(springs) > 100):  # so a fifth is a fifth
+        springs = _springs(rng, *bounds)
     mix = rng.random()
     if mix < 0.2:
         ratio = _log_uniform(rng, 0.05, 0.5)
@@ -303,7 +296,7 @@ def _plant(rng: np.random.Generator, cause: str, bar: Bar) -> dict[str, float | 
     """Return the record of a cause, fit for this hanger. Always the same draws."""
     length, place = bar.length_m, bar.length_m * float(rng.uniform(0.15, 0.85))
     draw, width, coin = float(rng.random()), float(rng.uniform(0.03, 0.10)) * length, rng.random()
-    planes = PLANES
+    planes = " ".join(PLANES)
     if cause == "point_mass":
         size, width = 2 + 13 * draw, 0.0  # kg: a lamp, a sign
     elif cause == "section_loss":
@@ -315,11 +308,11 @@ def _plant(rng: np.random.Generator, cause: str, bar: Bar) -> dict[str, float | 
         own = bar.tension_n * across + 3 * bar.bending_stiffness_n_m2 / length * across**2
         size, width = own * 0.2 * 100**draw, 0.0
         if coin < 0.5:  # a part that touches on one side
-            planes = (PLANES[int(coin < 0.25)],)
+            planes = PLANES[int(coin < 0.25)]
     else:
         return {"cause": ""}
-    record = {"cause": cause, "cause_planes": " ".join(planes)}
-    return {**record, "cause_place_m": place, "cause_size": size, "cause_length_m": width}
+    where = {"cause_place_m": place, "cause_length_m": width}
+    return {"cause": cause, "cause_planes": planes, "cause_size": size, **where}
 
 
 def _with_cause(bar: Bar, plane: str, planted: dict[str, float | str]) -> Bar:
@@ -342,7 +335,7 @@ def _measure(
     repeat = _log_uniform(rng, *nuisances.repeat_sd)
     without_sd = bool(rng.random() < nuisances.absent_sd)
     bias = {p: repeat * rng.standard_normal(20) for p in PLANES}
-    record: dict[str, float | str] = {"modes": 0.0}
+    record: dict[str, float | str] = {}
     orders: dict[str, list[int]] = {}
     for plane, count in zip(PLANES, draw.modes, strict=True):
         lacking, which = bool(rng.random() < nuisances.missing_order), rng.random()
@@ -358,25 +351,20 @@ def _measure(
         for plane in draw.planes:
             for n in orders[plane]:
                 f = float(exact[plane][n - 1] * (1 + bias[plane][n - 1] + error[plane][n - 1]))
-                mode: dict[str, object] = {"plane": plane, "order": n, "frequency_hz": f}
-                modes.append(mode if without_sd else {**mode, "frequency_sd_hz": f * stated})
+                sd = {} if without_sd else {"frequency_sd_hz": f * stated}
+                modes.append({"plane": plane, "order": n, "frequency_hz": f, **sd})
         time = f"2026-{5 + number:02d}-01T10:00:00Z"
-        test: dict[str, object] = {"id": f"t{number + 1}", "time": time}
-        tests.append({**test, "temperature_c": round(float(warmth), 1), "modes": modes})
+        air = round(float(warmth), 1)  # for show: the truth is the same in every test
+        tests.append({"id": f"t{number + 1}", "time": time, "temperature_c": air, "modes": modes})
     record |= {"frequency_sd": stated, "scatter_sd": real, "repeat_sd": repeat}
     record |= {"sd_stated": float(not without_sd), "tests": float(draw.tests)}
     return {"schema": "shm.modes/1", "hanger": 1, "tests": tests}, record
 
 
-def _groups(truth: dict[str, float | str], draw: _Draw) -> tuple[str, ...]:
-    belongs = {
-        "rods": not draw.strand,
-        "strands": draw.strand,
-        "slack": draw.ratio < 0.5,
-        "slim": float(truth["diameter_m"]) < 0.030,
-        "one plane": len(draw.planes) == 1,
-        "soft ends": max(draw.springs) < 10,
-    }
+def _groups(draw: _Draw, diameter_m: float) -> tuple[str, ...]:
+    belongs = {"rods": not draw.strand, "strands": draw.strand, "slack": draw.ratio < 0.5}
+    belongs |= {"slim": diameter_m < 0.030, "one plane": len(draw.planes) == 1}
+    belongs |= {"soft ends": max(draw.springs) < 10}
     return tuple(name for name, yes in belongs.items() if yes)
 
 
@@ -406,7 +394,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
     true_density = density * (1 + nuisances.density_sd * float(off[2]))
     true_length = length * (1 + nuisances.length_sd * float(off[3]))
     factor = float(rng.uniform(*nuisances.bending_factor))
-    second_moment = true_area**2 / (4 * math.pi)
+    second_moment = true_area**2 / (4 * math.pi)  # a round
     bending = (factor if draw.strand else 1.0) * true_modulus * second_moment
     shear = COWPER_ROUND * true_modulus / (2 * (1 + POISSON)) * true_area
     mass, tension = true_density * true_area, draw.ratio * nominal
@@ -423,6 +411,7 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
         tension_gradient_n_m=mass * GRAVITY_M_S2 if nuisances.own_weight else 0.0,
         masses=((sensor_m, sensor_kg),),
     )
+    diameter = draw.diameter_m * math.sqrt(true_area / area)  # overall, for a strand
     planted = _plant(rng, draw.cause, bare)
     exact: dict[str, Array] = {}
     for plane, ends, count in zip(PLANES, ((0, 2), (1, 3)), draw.modes, strict=True):
@@ -431,44 +420,30 @@ def _case(rng: np.random.Generator, index: int, draw: _Draw, nuisances: Nuisance
         if plane in draw.planes:
             exact[plane] = natural_frequencies_hz(_with_cause(bar, plane, planted), count)
     modes, measured = _measure(rng, draw, exact, nuisances)
-    truth: dict[str, float | str] = {
-        "tension_n": tension,
-        "tension_ratio": draw.ratio,
-        "diameter_m": draw.diameter_m * math.sqrt(true_area / area),  # overall, for a strand
-        "kind": "strand" if draw.strand else "rod",
-        "planes": float(len(draw.planes)),
-        "length_m": true_length,
-        "area_m2": true_area,
-        "elastic_modulus_pa": true_modulus,
-        "second_moment_m4": second_moment,
-        "bending_stiffness_n_m2": bending,
-        "bending_factor": factor if draw.strand else 1.0,
-        "mass_per_length_kg_m": mass,
-        "sensor_mass_kg": sensor_kg,
-        "sensor_place_m": sensor_m,
-        **{f"spring_k{i}": k for i, k in enumerate(draw.springs, 1)},  # k L/EI
-        **planted,
-        **measured,
-    }
-    return Case(index, toml, modes, truth, _groups(truth, draw))
+    truth: dict[str, float | str] = {"tension_n": tension, "tension_ratio": draw.ratio}
+    truth |= {"kind": "strand" if draw.strand else "rod", "planes": float(len(draw.planes))}
+    truth |= {"diameter_m": diameter, "length_m": true_length, "area_m2": true_area}
+    truth |= {"elastic_modulus_pa": true_modulus, "second_moment_m4": second_moment}
+    truth |= {"bending_stiffness_n_m2": bending, "mass_per_length_kg_m": mass}
+    truth |= {"bending_factor": factor if draw.strand else 1.0}
+    truth |= {"sensor_mass_kg": sensor_kg, "sensor_place_m": sensor_m}
+    truth |= {f"spring_k{i}": k for i, k in enumerate(draw.springs, 1)}  # k L/EI
+    truth |= planted | measured
+    return Case(index, toml, modes, truth, _groups(draw, diameter))
 
 
 def _population(
-    draw: Callable[[np.random.Generator], _Draw],
-    entropy: tuple[int, int],
-    count: int,
-    nuisances: Nuisances | None,
+    draw: Callable[[np.random.Generator], _Draw], entropy: tuple[int, int], count: int, n: Nuisances
 ) -> list[Case]:
     generators = [np.random.default_rng(s) for s in np.random.SeedSequence(entropy).spawn(count)]
-    chosen = nuisances or Nuisances()
-    return [_case(rng, i, draw(rng), chosen) for i, rng in enumerate(generators)]
+    return [_case(rng, i, draw(rng), n) for i, rng in enumerate(generators)]
 
 
 def sound_hangers(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:
     """Return hangers with nothing wrong; case i depends on (seed, i) alone, not on the count."""
-    return _population(_sound, (seed, 1), count, nuisances)
+    return _population(_sound, (seed, 1), count, nuisances or Nuisances())
 
 
 def hangers_with_a_cause(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:
     """Return rods of which about half carry one planted cause, named in truth["cause"]."""
-    return _population(_perhaps_with_a_cause, (seed, 2), count, nuisances)
+    return _population(_perhaps_with_a_cause, (seed, 2), count, nuisances or Nuisances())

@@ -18,7 +18,6 @@ it is on or off, so that two trials with the same seed differ only by what was s
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,12 +28,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 Array = NDArray[np.float64]
+Law = Callable[[Array], Array]
 GRAVITY_M_S2 = 9.81
 POISSON = 0.3
 SHEAR_FACTOR = 6 * (1 + POISSON) / (7 + 6 * POISSON)  # Cowper 1966, solid circle
 STEEL_KG_M3 = 7850.0  # EN 1991-1-1, table A.4
 STATED_FACTOR = 0.7  # the bending factor of a strand, as described
 PLANES = ("transverse", "longitudinal")
+GROUPS = ("rods", "strands", "slack", "slim", "one plane", "soft ends")
 SPRINGS = {"transverse": ("k1", "k3"), "longitudinal": ("k2", "k4")}
 
 
@@ -74,12 +75,12 @@ class Nuisances:
     @classmethod
     def none(cls) -> "Nuisances":
         """The textbook: uniform bar as described, exact frequencies, all modes."""
-        zero = (0.0, 0.0)
+        off: dict[str, Any] = {
+            name: (0.0, 0.0) if isinstance(value, tuple) else type(value)()
+            for name, value in vars(cls()).items()
+        }
         factor = (STATED_FACTOR, STATED_FACTOR)
-        return cls(
-            *(0.0, 0.0, 0.0, 0.0, factor, 0.0, 0.2, 0.0, zero, False),
-            *(zero, 0.0, 0.0, 0.0, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        )
+        return cls(**off | {"strand_factor": factor, "wander_length_share": 0.2})
 
 
 @dataclass(frozen=True)
@@ -108,13 +109,13 @@ class Bar:
     bending_nm2: float
     shear_n: float
     rotary_kg_m: float
-    wander: Callable[[Array], Array] | None = None
-    zones: tuple[EndZone, EndZone] = (EndZone(), EndZone())
+    wander: Law | None = None
+    zones: tuple[EndZone, ...] = (EndZone(), EndZone())
     self_weight: bool = False
     sensor_kg: float = 0.0
     sensor_at_m: float = 0.0
 
-    def section(self, x: Array) -> tuple[Array, Array, Array, Array]:
+    def section(self, x: Array) -> tuple[Array, ...]:
         """Mass, bending stiffness, shear stiffness and rotary inertia at x, per metre."""
         area = np.ones_like(x) if self.wander is None else 1 + self.wander(x)
         bending, mass = area**2, area.copy()  # a round section that grows: I goes with A^2
@@ -123,12 +124,9 @@ class Bar:
             bending[inside] *= zone.bending_ratio
             mass[inside] *= zone.mass_ratio
             area[inside] *= np.sqrt(zone.bending_ratio)
-        return (
-            self.mass_kg_m * mass,
-            self.bending_nm2 * bending,
-            self.shear_n * area,
-            self.rotary_kg_m * bending,
-        )
+        per_m = (self.mass_kg_m, self.bending_nm2, self.shear_n, self.rotary_kg_m)
+        ratios = (mass, bending, area, bending)
+        return tuple(base * ratio for base, ratio in zip(per_m, ratios, strict=True))
 
     def weight_n(self, x: Array) -> Array:
         """Weight of the bar between mid length and x, positive above (x > L/2)."""
@@ -137,12 +135,12 @@ class Bar:
         grid = np.linspace(0.0, self.length_m, 4001)
         middle = (grid[1:] + grid[:-1]) / 2
         below = np.append(0.0, np.cumsum(self.section(middle)[0] * np.diff(grid)))
-        return GRAVITY_M_S2 * (np.interp(x, grid, below) - below[2000])
+        return np.asarray(GRAVITY_M_S2 * (np.interp(x, grid, below) - below[2000]))
 
-    def breaks_m(self, pieces: int) -> Array:
-        """Borders of the subdomains: zones, boundary layers, sensor, equal pieces between."""
+    def breaks_m(self) -> Array:
+        """Borders of the subdomains: zones, boundary layers, sensor, five equal pieces between."""
         deck, arch = (zone.length_m for zone in self.zones)
-        inner = np.linspace(deck + 0.05 * self.length_m, 0.95 * self.length_m - arch, pieces + 1)
+        inner = np.linspace(deck + 0.05 * self.length_m, 0.95 * self.length_m - arch, 6)
         marks = [0.0, deck, *inner, self.length_m - arch, self.length_m]
         if self.sensor_kg > 0:
             marks.append(self.sensor_at_m)
@@ -161,36 +159,32 @@ def _reference(degree: int) -> tuple[Array, Array, Array]:
 
 
 def natural_frequencies_hz(
-    bar: Bar,
-    tensions_n: list[float],
-    ends: tuple[End, End],
-    count: int,
-    degree: int = 12,
-    pieces: int = 5,
+    bar: Bar, tensions_n: list[float], ends: tuple[End, End], count: int, degree: int = 12
 ) -> Array:
     """First `count` frequencies in one plane for each tension at mid length (one row each).
 
-    Solved as M v = (1/omega^2) K v: the low modes are then the large eigenvalues, which keeps
-    them exact to rounding even if the shear stiffness is very high.
+    Solved as M v = (1/omega^2) K v, of which only the few largest eigenvalues are wanted.  Good
+    to 1e-8 with the shear stiffness of steel; a very high one costs digits.
     """
     weights, value, slope = _reference(degree)
     points = legendre.leggauss(degree + 3)[0]
-    breaks = bar.breaks_m(pieces)
+    breaks = bar.breaks_m()
     n = (len(breaks) - 1) * degree + 1  # deflections first, rotations after
     elastic, string, inertia = np.zeros((2 * n, 2 * n)), np.zeros((n, n)), np.zeros((2 * n, 2 * n))
-    for e, (left, right) in enumerate(zip(breaks[:-1], breaks[1:], strict=True)):
-        half = (right - left) / 2
-        x = left + half * (points + 1)
-        mass, bending, shear, rotary = bar.section(x)
-        dx, slope_x = half * weights, slope / half
+    halves = np.diff(breaks) / 2
+    x = (breaks[:-1, None] + halves[:, None] * (points + 1)).ravel()
+    laws = [*bar.section(x), bar.weight_n(x)]
+    per_piece = zip(*(law.reshape(len(halves), -1) for law in laws), strict=True)
+    for e, (mass, bending, shear, rotary, weight) in enumerate(per_piece):
+        dx, slope_x = halves[e] * weights, slope / halves[e]
         at = slice(e * degree, (e + 1) * degree + 1)
         turn = slice(n + e * degree, n + (e + 1) * degree + 1)
-        elastic[at, at] += (slope_x.T * (dx * (shear + bar.weight_n(x)))) @ slope_x
+        elastic[at, at] += (slope_x.T * (dx * (shear + weight))) @ slope_x
         coupling = (slope_x.T * (dx * shear)) @ value
         elastic[at, turn] -= coupling
         elastic[turn, at] -= coupling.T
-        elastic[turn, turn] += (slope_x.T * (dx * bending)) @ slope_x
-        elastic[turn, turn] += (value.T * (dx * shear)) @ value
+        bent, sheared = (slope_x.T * (dx * bending)) @ slope_x, (value.T * (dx * shear)) @ value
+        elastic[turn, turn] += bent + sheared
         string[at, at] += (slope_x.T * dx) @ slope_x
         inertia[at, at] += (value.T * (dx * mass)) @ value
         inertia[turn, turn] += (value.T * (dx * rotary)) @ value
@@ -205,39 +199,25 @@ def natural_frequencies_hz(
         else:
             free[node] = False
     keep, size = np.ix_(free, free), int(free.sum())
+    wanted = [size - count, size - 1]
     rows = []
     for tension_n in tensions_n:
         stiffness = elastic.copy()
         stiffness[:n, :n] += tension_n * string
-        inverse = eigh(
-            *(inertia[keep], stiffness[keep]),
-            eigvals_only=True,
-            subset_by_index=[size - count, size - 1],
-            check_finite=False,
-        )
+        inverse = eigh(inertia[keep], stiffness[keep], eigvals_only=True, subset_by_index=wanted)
         rows.append(1 / np.sqrt(inverse[::-1]) / (2 * np.pi))
     return np.array(rows)
 
 
-def hub_on_plate_nm_per_rad(
-    modulus_pa: float, thickness_m: float, hub_radius_m: float, outer_radius_m: float
-) -> float:
+def hub_on_plate_nm(rigidity_nm: float, hub_radius_m: float, outer_radius_m: float) -> float:
     """Rotational stiffness of a rigid hub in a round plate clamped at its outer edge.
 
     Kirchhoff plate under a central couple, w = (A r + B r^3 + C/r + F r ln r) cos(phi), which
     gives rotation = M/(4 pi D) [ln(a/b) - (a^2-b^2)/(a^2+b^2)] (Timoshenko and
     Woinowsky-Krieger, Theory of Plates and Shells, art. 63; Roark's Formulas, trunnion).
     """
-    rigidity = modulus_pa * thickness_m**3 / (12 * (1 - POISSON**2))
     a2, b2 = outer_radius_m**2, hub_radius_m**2
-    return float(4 * np.pi * rigidity / (np.log(a2 / b2) / 2 - (a2 - b2) / (a2 + b2)))
-
-
-def gusset_nm_per_rad(
-    modulus_pa: float, thickness_m: float, width_m: float, free_length_m: float
-) -> float:
-    """Out-of-plane stiffness of a gusset: cantilever strip of Whitmore's width (1952), EI/l."""
-    return modulus_pa * width_m * thickness_m**3 / 12 / free_length_m
+    return float(4 * np.pi * rigidity_nm / (np.log(a2 / b2) / 2 - (a2 - b2) / (a2 + b2)))
 
 
 @dataclass(frozen=True)
@@ -261,7 +241,7 @@ class Case:
 
 @dataclass(frozen=True)
 class _Kind:
-    """A product as described in the catalogue; `soft` and `zoned` belong to its end detail."""
+    """A product as described in the catalogue, and its detailing at the ends."""
 
     rod: bool
     diameter_m: float
@@ -270,9 +250,11 @@ class _Kind:
     second_moment_m4: float
     mass_kg_m: float
     stress_pa: float
-    soft: bool
+    soft: bool  # spherical bearings or loose pins at both ends
     zone_chance: float  # has end zones if below Nuisances.end_zone_share
     strand_chance: float  # place of the true bending factor in its range
+    deck_style: float  # pin below 0.3, nut on a plate below 0.7, else gusset
+    arch_style: float
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -287,35 +269,34 @@ def _draw_kind(rng: np.random.Generator) -> _Kind:
     modulus = round(rng.uniform(*((195, 212) if rod else (150, 165)))) * 1e9
     fill, lay = rng.uniform(0.73, 0.88), rng.uniform(1.0, 1.03)  # lay: filler and helix of wires
     fill, lay = (1.0, 1.0) if rod else (fill, lay)
-    area = np.pi / 4 * diameter**2 * fill
-    return _Kind(
-        *(rod, diameter, modulus, area, area * diameter**2 / 16, STEEL_KG_M3 * area * lay),
-        stress_pa=rng.uniform(60e6, 250e6),
-        soft=bool(rng.random() < 0.2),
-        zone_chance=float(rng.random()),
-        strand_chance=float(rng.random()),
-    )
+    area = float(np.pi / 4 * diameter**2 * fill)
+    section = (area, area * diameter**2 / 16, STEEL_KG_M3 * area * lay)
+    stress, chance = rng.uniform(60e6, 250e6), rng.random(5).tolist()
+    return _Kind(rod, diameter, modulus, *section, stress, chance[0] < 0.2, *chance[1:])
 
 
-def _draw_end(rng: np.random.Generator, kind: _Kind, unit_nm: float) -> tuple[float, float]:
+def _draw_end(
+    rng: np.random.Generator, kind: _Kind, style: float, unit_nm: float
+) -> tuple[float, float]:
     """Rotational stiffness of one end (transverse, longitudinal); unit_nm is EI/L.
 
     Pins with friction are drawn as k L/EI.  Plates follow from their size in diameters; a nut
     bears on part of its face only (contact 2 to 100 %).  Thread and bearing add compliance in
     series, so that no end is stiffer than 1000 EI/L.
     """
-    u = rng.random(8)
+    u = rng.random(6)
     d, steel = kind.diameter_m, 205e9
-    if kind.soft:  # spherical bearing or loose pin, both planes
-        low = 0.03 * (9.9 / 0.03) ** u[:2]
-        return float(low[0] * unit_nm), float(low[1] * unit_nm)
-    if u[0] < 0.3:  # clevis: turns about its pin, the fork holds across
+    if kind.soft:
+        pair = [0.03 * (9.9 / 0.03) ** q * unit_nm for q in u[:2]]
+    elif style < 0.3:  # clevis: turns about its pin, the fork holds across
         pair = [0.03 * (10 / 0.03) ** u[1] * unit_nm, 15 * (300 / 15) ** u[2] * unit_nm]
-    elif u[0] < 0.7:  # nut on a plate
-        stiff = hub_on_plate_nm_per_rad(steel, d * (0.4 + u[1]), 0.9 * d, d * (2 + 4 * u[2]))
+    elif style < 0.7:  # nut on a plate
+        rigidity = steel * (d * (0.4 + u[1])) ** 3 / (12 * (1 - POISSON**2))
+        stiff = hub_on_plate_nm(rigidity, 0.9 * d, d * (2 + 4 * u[2]))
         pair = [stiff * 0.02**q for q in u[3:5]]
     else:  # gusset: bends across its plane, holds within it
-        strip = gusset_nm_per_rad(steel, d * (0.3 + 0.5 * u[1]), d * (3 + 3 * u[2]), d * (2 + u[3]))
+        thick, width, free = d * (0.3 + 0.5 * u[1]), d * (3 + 3 * u[2]), d * (2 + u[3])
+        strip = steel * width * thick**3 / 12 / free  # EI/l over Whitmore's width (1952)
         pair = [strip, strip * 100]
     if u[5] < 0.5:
         pair.reverse()
@@ -323,9 +304,7 @@ def _draw_end(rng: np.random.Generator, kind: _Kind, unit_nm: float) -> tuple[fl
     return float(first), float(second)
 
 
-def _wander(
-    rng: np.random.Generator, length_m: float, sd: float, share: float
-) -> Callable[[Array], Array]:
+def _wander(rng: np.random.Generator, length_m: float, sd: float, share: float) -> Law:
     """Smooth Gaussian field of correlation exp(-(s/l)^2) by the spectral representation.
 
     Shinozuka and Deodatis, Applied Mechanics Reviews 44 (1991); period 2 L.
@@ -338,44 +317,29 @@ def _wander(
 
     def relative(x: Array) -> Array:
         angle = np.pi / length_m * np.multiply.outer(x, order)
-        return np.cos(angle) @ a + np.sin(angle) @ b
+        return np.asarray(np.cos(angle) @ a + np.sin(angle) @ b)
 
     return relative
 
 
 def _toml(kind: _Kind, length_m: float, hanger: int, family: str | None) -> str:
-    lines = ["[[hanger]]", f"id = {hanger}"]
-    if family is not None:
-        lines.append(f'family = "{family}"')
-    if kind.rod:
-        lines.append(f"diameter_m = {kind.diameter_m!r}")
-    else:
-        lines.append('kind = "strand"')
-    lines.append(f"length_m = {length_m!r}")
-    lines.append(f"elastic_modulus_pa = {kind.modulus_pa!r}")
-    if kind.rod:
-        lines.append(f"density_kg_m3 = {STEEL_KG_M3!r}")
-    else:
-        lines.append(f"area_m2 = {float(kind.area_m2)!r}")
-        lines.append(f"second_moment_m4 = {float(kind.second_moment_m4)!r}")
-        lines.append(f"mass_per_length_kg_m = {float(kind.mass_kg_m)!r}")
-        lines.append(f"bending_stiffness_factor = {STATED_FACTOR!r}")
-    lines.append(f"nominal_tension_n = {float(kind.stress_pa * kind.area_m2)!r}")
-    return "\n".join(lines) + "\n"
+    rod = {"diameter_m": kind.diameter_m, "density_kg_m3": STEEL_KG_M3}
+    strand = {"kind": "strand", "area_m2": kind.area_m2, "second_moment_m4": kind.second_moment_m4}
+    strand |= {"mass_per_length_kg_m": kind.mass_kg_m, "bending_stiffness_factor": STATED_FACTOR}
+    entry: dict[str, Any] = {"id": hanger} | ({} if family is None else {"family": family})
+    entry |= rod if kind.rod else strand
+    entry |= {"length_m": length_m, "elastic_modulus_pa": kind.modulus_pa}
+    entry |= {"nominal_tension_n": kind.stress_pa * kind.area_m2}
+    lines = (f"{k} = {json.dumps(v)}\n" for k, v in entry.items())  # also right for TOML
+    return "[[hanger]]\n" + "".join(lines)
 
 
 def _build(
-    kind: _Kind,
-    root: np.random.SeedSequence,
-    knobs: Nuisances,
-    index: int,
-    batch: Array,
-    own: float,
-    hanger: int = 1,
-    family: str | None = None,
-    reading: bool = False,
+    kind: _Kind, root: np.random.SeedSequence, knobs: Nuisances, index: int, batch: Array | None
 ) -> Case:
-    """One case; `batch` holds standard deviates (area, modulus, density) of the rolling batch."""
+    """One case; `batch`: standard deviates (area, modulus, density) of a family, or None."""
+    alone = batch is None
+    hanger, family = (1, None) if alone else (index + 1, "A")
     design, made, ends_rng, field, errors = (np.random.default_rng(s) for s in root.spawn(5))
     d = kind.diameter_m
     slender = _log_uniform(design, max(40.0, 2.0 / d), min(250.0, 25.0 / d))
@@ -385,43 +349,33 @@ def _build(
     tension = ratio * kind.stress_pa * kind.area_m2
 
     # As made.
-    deviates = batch + own * made.standard_normal(3)
-    area_off, modulus_off, density_off = 1 + deviates * [
-        *(knobs.area_sd, knobs.modulus_sd, knobs.density_sd),
-    ]
+    sds = np.array([knobs.area_sd, knobs.modulus_sd, knobs.density_sd])
+    deviates = made.standard_normal(3)
+    made_as = 1 + sds * (deviates if batch is None else batch + deviates / 5)
+    area_off, modulus_off, density_off = (float(v) for v in made_as)
     length = stated_length * (1 + knobs.length_sd * made.standard_normal())
-    low, high = knobs.strand_factor
-    factor = 1.0 if kind.rod else low + (high - low) * kind.strand_chance
-    area = kind.area_m2 * area_off
+    factor = 1.0 if kind.rod else float(np.interp(kind.strand_chance, [0, 1], knobs.strand_factor))
+    area, second_moment = kind.area_m2 * area_off, kind.second_moment_m4 * area_off**2
     modulus = kind.modulus_pa * modulus_off
-    second_moment = kind.second_moment_m4 * area_off**2
     mass = kind.mass_kg_m * area_off * density_off
     wander = _wander(made, length, knobs.wander_sd, knobs.wander_length_share)
-    shares, stiffer = made.uniform(0.01, 0.03, 2), made.uniform(1.2, 4.0, 2)
-    heavier = made.uniform(1.1, 2.0, 2)
     zoned = kind.zone_chance < knobs.end_zone_share
-    zones = [
-        EndZone(length * shares[i], stiffer[i], heavier[i]) if zoned else EndZone() for i in (0, 1)
-    ]
+    low, high = np.array([[0.01 * length, 1.2, 1.1], [0.03 * length, 4.0, 2.0]])
+    drawn = (EndZone(*(float(v) for v in made.uniform(low, high))) for _ in range(2))
+    zones = tuple(drawn) if zoned else (EndZone(), EndZone())
     height = min(field.uniform(1.0, 2.2), field.uniform(0.15, 0.40) * length)  # within reach
     sensor = field.uniform(*knobs.sensor_kg)
-    bar = Bar(
-        *(length, mass, factor * modulus * second_moment),
-        shear_n=SHEAR_FACTOR * modulus / (2 * (1 + POISSON)) * area,
-        rotary_kg_m=mass * second_moment / area,
-        wander=wander if knobs.wander_sd > 0 else None,
-        zones=(zones[0], zones[1]),
-        self_weight=knobs.self_weight,
-        sensor_kg=sensor,
-        sensor_at_m=height,
-    )
+    shear, rotary = SHEAR_FACTOR * modulus * area / (2 + 2 * POISSON), mass * second_moment / area
+    mean = (mass, factor * modulus * second_moment, shear, rotary)
+    field_of_area = wander if knobs.wander_sd > 0 else None
+    bar = Bar(length, *mean, field_of_area, zones, knobs.self_weight, sensor, height)
     unit = bar.bending_nm2 / length
-    stiffness = dict(zip(("k1", "k2"), _draw_end(ends_rng, kind, unit), strict=True))
-    stiffness |= zip(("k3", "k4"), _draw_end(ends_rng, kind, unit), strict=True)
-    ends = {
-        k: End(v, _log_uniform(ends_rng, *knobs.lateral_flexibility_m_per_n))
-        for k, v in stiffness.items()
-    }
+    stiffness = dict(
+        zip(("k1", "k2"), _draw_end(ends_rng, kind, kind.deck_style, unit), strict=True)
+    )
+    stiffness |= zip(("k3", "k4"), _draw_end(ends_rng, kind, kind.arch_style, unit), strict=True)
+    soft = [_log_uniform(ends_rng, *knobs.lateral_flexibility_m_per_n) for _ in range(4)]
+    ends = {k: End(v, f) for (k, v), f in zip(stiffness.items(), soft, strict=True)}
 
     # As measured.
     single, which = field.random() < 0.35, field.random()
@@ -442,22 +396,24 @@ def _build(
     repeat_sd = _log_uniform(field, *knobs.repeat_sd)
     clock = 1 + knobs.clock_sd * field.standard_normal()
     is_stated = field.random() >= knobs.unstated_sd_share
-    started = datetime(2026, 5, 1, 10, tzinfo=UTC)
-    documents: list[dict[str, Any]] = []
-    for t in range(tests):
-        time = (started + timedelta(days=7 * t)).strftime("%Y-%m-%dT%H:%M:%SZ")
-        document = {"id": f"t{t + 1}", "time": time, "temperature_c": float(temperature[t])}
-        documents.append({**document, "modes": []})
+    documents: list[dict[str, Any]] = [
+        {
+            "id": f"t{t + 1}",
+            "time": f"2026-05-{t + 1:02}T10:00:00Z",
+            "temperature_c": c,
+            "modes": [],
+        }
+        for t, c in enumerate(temperature.tolist())
+    ]
     read_at, read_off = int(field.integers(0, tests)), field.standard_normal()
-    if reading:  # at mid length: the crew has allowed for the weight below
+    if not alone and index == 0:  # at mid length: the crew has allowed for the weight below
         read = float(forces[read_at] * (1 + knobs.reading_error_sd * read_off))
         documents[read_at] |= {"tension_read_n": read, "tension_read_sd_n": 0.01 * read}
     exact: dict[str, list[float]] = {}
     mistaken: list[tuple[str, int]] = []
     for plane in planes:
         deck, arch = (ends[k] for k in SPRINGS[plane])
-        many = count[plane] + 1
-        table = natural_frequencies_hz(bar, [tension, *forces], (deck, arch), many)
+        table = natural_frequencies_hz(bar, [tension, *forces], (deck, arch), count[plane] + 1)
         exact[plane] = [float(f) for f in table[0, : count[plane]]]
         repeat = repeat_sd * errors.standard_normal(14)
         scatter = real_sd * errors.standard_normal((5, 14))
@@ -472,60 +428,41 @@ def _build(
                 true_hz = table[t + 1, o - 1] + move * min(gap, table[t + 1, o - 1])
                 hz = float(true_hz * clock * (1 + repeat[o - 1]) * (1 + scatter[t, o - 1]))
                 mode: dict[str, Any] = {"plane": plane, "order": o, "frequency_hz": hz}
-                if is_stated:
-                    mode["frequency_sd_hz"] = stated_sd * hz
-                document["modes"].append(mode)
+                document["modes"].append(
+                    mode | ({"frequency_sd_hz": stated_sd * hz} if is_stated else {})
+                )
     relative = {k: v / unit for k, v in stiffness.items()}
-    flags = {
-        "rods": kind.rod,
-        "strands": not kind.rod,
-        "slack": ratio < 0.5,
-        "slim": d < 0.030,
-        "one plane": len(planes) == 1,
-        "soft ends": max(relative.values()) < 10,
-    }
+    flags = (kind.rod, not kind.rod, ratio < 0.5, d < 0.030, len(planes) == 1)
+    groups = zip(GROUPS, (*flags, max(relative.values()) < 10), strict=True)
     mean_area = area * (1 + float(wander(np.linspace(0, length, 201)).mean()))
-    truth = {
-        "tension_n": float(tension),
-        "tension_ratio": float(ratio),
-        "reference_temperature_c": reference,
-        "diameter_m": d,
-        "kind": "rod" if kind.rod else "strand",
-        "length_m": float(length),
-        "area_m2": float(mean_area),
-        "modulus_pa": float(modulus),
-        "mass_kg_m": float(mass * mean_area / area),
-        "bending_nm2": float(bar.bending_nm2),
-        "bending_factor": float(factor),
+    truth: dict[str, Any] = {
         "end_stiffness_nm_per_rad": stiffness,
         "end_kl_over_ei": relative,
         "end_zones": [vars(z) for z in zones] if zoned else [],
-        "sensor_kg": float(sensor),
-        "sensor_at_m": float(height),
-        "planes": list(planes),
         "modes": {p: len(orders[p]) for p in planes},
-        "tests": tests,
-        "stated_sd": stated_sd if is_stated else None,
-        "frequency_sd": float(real_sd),
-        "repeat_sd": repeat_sd,
-        "clock": float(clock),
         "exact_frequency_hz": exact,
-        "mistaken": mistaken,
+        "test_tension_n": forces.tolist(),
     }
-    document = {"schema": "shm.modes/1", "hanger": hanger, "tests": documents}
-    toml = _toml(kind, stated_length, hanger, family)
-    return Case(index, toml, document, truth, tuple(k for k, v in flags.items() if v))
+    truth |= {"kind": "rod" if kind.rod else "strand", "diameter_m": d, "planes": list(planes)}
+    truth |= {"tension_n": float(tension), "tension_ratio": float(ratio), "tests": tests}
+    truth |= {"reference_temperature_c": reference, "length_m": float(length)}
+    truth |= {"area_m2": float(mean_area), "modulus_pa": float(modulus)}
+    truth |= {"mass_kg_m": float(mass * mean_area / area), "bending_nm2": float(bar.bending_nm2)}
+    truth |= {"bending_factor": float(factor), "clock": float(clock), "mistaken": mistaken}
+    truth |= {"sensor_kg": float(sensor), "sensor_at_m": float(height), "repeat_sd": repeat_sd}
+    truth |= {"stated_sd": stated_sd if is_stated else None, "frequency_sd": float(real_sd)}
+    measured = {"schema": "shm.modes/1", "hanger": hanger, "tests": documents}
+    names = tuple(name for name, yes in groups if yes)
+    return Case(index, _toml(kind, stated_length, hanger, family), measured, truth, names)
 
 
 def sound_hangers(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:
     """Sound hangers; case i depends on (seed, i) only, not on the count."""
     knobs = Nuisances() if nuisances is None else nuisances
-    cases = []
-    for i in range(count):
-        root = np.random.SeedSequence(seed, spawn_key=(0, i))
-        kind = _draw_kind(np.random.default_rng(root))
-        cases.append(_build(kind, root, knobs, i, np.zeros(3), 1.0))
-    return cases
+    roots = [np.random.SeedSequence(seed, spawn_key=(0, i)) for i in range(count)]
+    kinds = [_draw_kind(np.random.default_rng(root)) for root in roots]
+    pairs = zip(kinds, roots, strict=True)
+    return [_build(kind, root, knobs, i, None) for i, (kind, root) in enumerate(pairs)]
 
 
 def families(
@@ -538,10 +475,5 @@ def families(
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1, i)))
         kind, batch = _draw_kind(rng), rng.standard_normal(3)
         roots = [np.random.SeedSequence(seed, spawn_key=(1, i, m)) for m in range(members)]
-        result.append(
-            [
-                _build(kind, root, knobs, m, batch, 0.2, m + 1, "A", reading=m == 0)
-                for m, root in enumerate(roots)
-            ]
-        )
+        result.append([_build(kind, root, knobs, m, batch) for m, root in enumerate(roots)])
     return result

@@ -7,18 +7,21 @@ from dataclasses import dataclass
 
 from shm.report import Interval, words
 from shm.store import TestRow, TrendPoint
+from shm.values.force_units import ForceUnit
+from shm_daemon.web.hanger_figures.over_time import tension_unit
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.test_address import test_page
 
 
 @dataclass(frozen=True)
 class TestLine:
-    """One test; `point` is None before it has been through updating."""
+    """One test, its tension in `unit`; `point` is None before it has been through updating."""
 
     __test__ = False  # no test, though named so
 
     row: TestRow
     point: TrendPoint | None
+    unit: ForceUnit
 
     @property
     def id(self) -> int:
@@ -43,7 +46,7 @@ class TestLine:
         """Temperature, model, tension and its interval."""
         if self.point is None:
             return ("", f"on its way: {self.row.stage.value}", "", "")
-        tension = words.kilonewtons(Interval.of_summary(self.point.tension_n))
+        tension = Interval.of_summary(self.point.tension_n).in_unit(self.unit)
         known = math.isfinite(self.point.temperature_c)
         return (
             words.temperature(self.point.temperature_c) if known else "not recorded",
@@ -53,8 +56,15 @@ class TestLine:
         )
 
 
+def headings(view: HangerView) -> tuple[str, ...]:
+    """Of the table of the lines."""
+    unit = tension_unit(view.trend)
+    return ("test", "time", "temperature", "model", *words.tension_headings(unit))
+
+
 def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
     """So many tests, the newest first; `before` is the number of the test to go on after."""
     points = {point.test_id: point for point in view.trend}
     rows = view.store.test_rows(view.hanger.id, limit, before)
-    return [TestLine(row, points.get(row.id)) for row in rows]
+    unit = tension_unit(view.trend)
+    return [TestLine(row, points.get(row.id), unit) for row in rows]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
@@ -10,6 +10,7 @@ from shm.report.content import Interval
 from shm.report.period import Period
 from shm.report.summary import Status, of_nominal
 from shm.values import Drift, Hanger
+from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.neighbours import BridgePattern
 
 
@@ -57,6 +58,11 @@ class HangerLine:
     def is_hardly_known(self) -> bool:
         """Whether the interval of the tension is so wide that a shift could hardly be seen."""
         return self.tension_n is not None and self.tension_n.is_wide
+
+
+def hangers_unit(lines: Iterable[HangerLine]) -> ForceUnit:
+    """The one unit of all their tensions, so that they compare at a glance."""
+    return force_unit(*(line.tension_n.mean for line in lines if line.tension_n))
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from shm.report import words
-from shm.report.bridge.content import BridgeReport, Course, HangerLine
+from shm.report.bridge.content import BridgeReport, Course, HangerLine, hangers_unit
 from shm.report.content import Interval
 from shm.report.origin import lineage, settings
-from shm.report.shifts import shift_cells
+from shm.report.shifts import shift_cells, shift_unit
 from shm.report.table import Table
 from shm.values import Drift
+from shm.values.force_units import ForceUnit
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _BAR = 6
-_NOTHING = 0.05
+_PERCENT_DECIMALS = 1
 
 
 def tables(data: BridgeReport, *, bars: bool = False) -> tuple[Table, ...]:
@@ -40,8 +41,11 @@ def pattern_tables(pattern: BridgePattern, *, bars: bool) -> tuple[Table, Table]
 
 def shift_table(pattern: BridgePattern, *, bars: bool = False) -> Table:
     """Shifts of the tension since each hanger's baseline; those not compared stand last."""
-    headings: tuple[str, ...] = ("shift, kN (90 %)", "shift, % (90 %)", "it has", "test of")
-    rows = [_shift(row) for row in pattern.rows]
+    unit, places = shift_unit(pattern)
+    headings: tuple[str, ...] = (
+        f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of",
+    )  # fmt: skip
+    rows = [_shift(row, unit, places) for row in pattern.rows]
     rows += [
         (str(each.hanger), "not known", "not known", "not compared", _day(each.time))
         for each in pattern.not_compared
@@ -64,13 +68,13 @@ def _shares(pattern: BridgePattern) -> list[float]:
     return [row.shift_fraction / widest for row in pattern.rows]
 
 
-def _shift(row: HangerRow) -> tuple[str, ...]:
+def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
     newtons = Interval(row.shift_n, row.low_n, row.high_n)
     fraction = Interval(row.shift_fraction, row.low_fraction, row.high_fraction)
     return (
         str(row.hanger),
-        _one_decimal(words.kilonewtons(newtons)),
-        _one_decimal(fraction.scaled(100)),
+        _signed(newtons.in_unit(unit), places),
+        _signed(fraction.scaled(100), _PERCENT_DECIMALS),
         f"{row.way} ({words.probability(row.probability)})",
         _day(row.time),
     )
@@ -85,26 +89,31 @@ def bar(share: float) -> str:
     return f"{left.rjust(_BAR, '.')}|{right.ljust(_BAR, '.')}"
 
 
-def _one_decimal(interval: Interval) -> str:
-    if max(abs(interval.low), abs(interval.high)) < _NOTHING:
-        return f"0.0 (within {_NOTHING})"
-    return f"{interval.mean:+z.1f} ({interval.low:+z.1f} to {interval.high:+z.1f})"
+def _signed(interval: Interval, places: int) -> str:
+    nothing = 0.5 * 10**-places
+    if max(abs(interval.low), abs(interval.high)) < nothing:
+        return f"{0:.{places}f} (within {nothing:.{places + 1}f})"
+    mean, low, high = (
+        f"{value:+z.{places}f}" for value in (interval.mean, interval.low, interval.high)
+    )
+    return f"{mean} ({low} to {high})"
 
 
 def _hangers(data: BridgeReport) -> Table:
+    unit = hangers_unit(data.hangers)
     return Table(
         "Hangers",
         (
-            "hanger", "state", "tension, kN (90 %)", "% of nominal (90 %)", "open alerts",
-            "latest test",
+            "hanger", "state", f"tension, {unit.name} (90 %)", "% of nominal (90 %)",
+            "open alerts", "latest test",
         ),
-        tuple(_hanger(line) for line in data.hangers),
+        tuple(_hanger(line, unit) for line in data.hangers),
         note="With 90 % intervals. Alert: beyond a threshold. Watch: a change was called, or a "
         "shift beyond a threshold is likelier than not. More: shm report --hanger N.",
     )  # fmt: skip
 
 
-def _hanger(line: HangerLine) -> tuple[str, ...]:
+def _hanger(line: HangerLine, unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
     opened = str(line.open_alerts or "none")
     if line.tension_n is None or line.status is None:
@@ -113,7 +122,7 @@ def _hanger(line: HangerLine) -> tuple[str, ...]:
     return (
         name,
         line.status.value,
-        words.with_span(words.kilonewtons(line.tension_n)),
+        words.with_span(line.tension_n.in_unit(unit)),
         words.with_span(share) if share else "no nominal",
         opened,
         _day(line.latest),

@@ -13,9 +13,8 @@ from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import consequences, name, verdict
 from shm.report.diagnosis.tables import answers, evidence
-from shm.report.diagnosis.tensions import TensionUnit, tension_unit
+from shm.report.diagnosis.tensions import tension_unit, tension_words
 from shm.report.template import ENVIRONMENT
-from shm.values import TensionEstimate
 
 _STYLES = {
     Answer.EXPLAINED: "first",
@@ -95,13 +94,10 @@ def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
         return None
     unit = tension_unit(sheet.diagnosis)
     if math.isnan(better.mean):
-        return ("Tension", _rounded(plain, unit), f"baseline: {unit.told(plain)}")
-    told = f"{unit.told(better)}; baseline alone {unit.told(plain)}"
-    return ("Tension", _rounded(better, unit), told)
-
-
-def _rounded(estimate: TensionEstimate, unit: TensionUnit) -> str:
-    return f"{unit.of(estimate.mean):.0f} {unit.name}"
+        told = f"baseline: {tension_words(plain, unit)}"
+        return ("Tension", words.rounded_tension(plain.mean, unit), told)
+    told = f"{tension_words(better, unit)}; baseline alone {tension_words(plain, unit)}"
+    return ("Tension", words.rounded_tension(better.mean, unit), told)
 
 
 def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:

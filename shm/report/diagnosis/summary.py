@@ -15,7 +15,7 @@ from shm.report.diagnosis.content import (
     claims,
 )
 from shm.report.diagnosis.phrases import label, phrase
-from shm.report.diagnosis.tensions import AFTER, tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_unit, tension_words
 from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
@@ -243,11 +243,11 @@ def _tension(diagnosis: Diagnosis) -> str:
     if math.isnan(plain.mean):
         return ""
     unit = tension_unit(diagnosis)
-    alone = f"the baseline {diagnosis.baseline} alone gives {unit.told(plain)}"
+    alone = f"the baseline {diagnosis.baseline} alone gives {tension_words(plain, unit)}"
     if math.isnan(better.mean):
         return f"For the tension {alone}{_with_care(diagnosis)}."
     off = 100 * (plain.mean / better.mean - 1)
-    told = f"{AFTER.capitalize()}, the tension is {unit.told(better)}"
+    told = f"{AFTER.capitalize()}, the tension is {tension_words(better, unit)}"
     return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 from shm.report import words
-from shm.report.content import Interval
 from shm.report.diagnosis.content import (
     Answer,
     DiagnosisSheet,
@@ -18,9 +17,10 @@ from shm.report.diagnosis.content import (
 from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
-from shm.report.diagnosis.tensions import AFTER, TensionUnit, tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_of, tension_unit
 from shm.report.table import Table
 from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+from shm.values.force_units import ForceUnit
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _WORST = 16
@@ -160,14 +160,14 @@ def tension(sheet: DiagnosisSheet) -> Table:
 
 
 def _tension_row(
-    what: str, estimate: TensionEstimate, nominal_n: float, unit: TensionUnit
+    what: str, estimate: TensionEstimate, nominal_n: float, unit: ForceUnit
 ) -> tuple[str, ...]:
-    interval = unit.interval(estimate)
+    interval, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
     return (
         what,
-        f"{interval.mean:.1f}",
-        words.number(unit.of(estimate.sd), ".1f"),
-        f"{interval.low:.1f} to {interval.high:.1f}"
+        f"{interval.mean:.{places}f}",
+        words.number(unit.of(estimate.sd), f".{places}f"),
+        f"{interval.low:.{places}f} to {interval.high:.{places}f}"
         if math.isfinite(estimate.q05)
         else "not known",
         _of_nominal(estimate, nominal_n),
@@ -178,7 +178,7 @@ def _of_nominal(estimate: TensionEstimate, nominal_n: float) -> str:
     """In percent with its interval, which comes from the tension alone: nominal is given."""
     if not nominal_n > 0:
         return "no nominal"
-    share = Interval(estimate.mean, estimate.q05, estimate.q95).scaled(100 / nominal_n)
+    share = tension_of(estimate).scaled(100 / nominal_n)
     return words.with_span(share) if math.isfinite(share.width) else f"{share.mean:.1f}"
 
 

@@ -1,46 +1,32 @@
-"""The tensions of a diagnosis in one unit: kN, or N where none of them reaches 1 kN."""
+"""The tensions of a diagnosis, all in one unit."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from shm.report import words
 from shm.report.content import Interval
 from shm.values import Diagnosis, TensionEstimate
+from shm.values.force_units import ForceUnit, force_unit
 
 AFTER = "weighed over all that may be"
 """What the tension after the diagnosis stands for: no gap, every cause and the unknown count by
 their probabilities."""
 
-_KILO = 1e3
 
-
-@dataclass(frozen=True)
-class TensionUnit:
-    """The unit that all tensions of one diagnosis are told in, and how many N it is."""
-
-    name: str
-    newtons: float
-
-    def of(self, tension_n: float) -> float:
-        """A tension in this unit."""
-        return tension_n / self.newtons
-
-    def interval(self, estimate: TensionEstimate) -> Interval:
-        """Mean and 90 % interval in this unit."""
-        return Interval(estimate.mean, estimate.q05, estimate.q95).scaled(1 / self.newtons)
-
-    def told(self, estimate: TensionEstimate) -> str:
-        """`702 kN (90 % interval 690 to 714 kN)`."""
-        interval = self.interval(estimate)
-        if math.isnan(interval.width):
-            return f"{interval.mean:.0f} {self.name}"
-        return words.with_interval(interval, self.name)
-
-
-def tension_unit(diagnosis: Diagnosis) -> TensionUnit:
+def tension_unit(diagnosis: Diagnosis) -> ForceUnit:
     """One unit for both tensions, so that they can be compared at a glance."""
-    both = (diagnosis.tension_before_n, diagnosis.tension_after_n)
-    small = all(not abs(estimate.mean) >= _KILO for estimate in both)
-    return TensionUnit("N", 1.0) if small else TensionUnit("kN", _KILO)
+    return force_unit(diagnosis.tension_before_n.mean, diagnosis.tension_after_n.mean)
+
+
+def tension_of(estimate: TensionEstimate) -> Interval:
+    """Mean and 90 % interval in N."""
+    return Interval(estimate.mean, estimate.q05, estimate.q95)
+
+
+def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
+    """`702 kN (90 % interval 690 to 714 kN)`; the mean alone where nothing else is known."""
+    tension_n = tension_of(estimate)
+    if math.isnan(tension_n.width):
+        return words.rounded_tension(estimate.mean, unit)
+    return words.tension(tension_n, unit)

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from shm.report import words
 from shm.report.figures import style
 from shm.report.figures.member import Illustration, Member, drawn
+from shm.report.shifts import shift_unit
 from shm.values import FloatArray
 from shm.watch.neighbours import BridgePattern, HangerRow
 
@@ -147,15 +148,17 @@ def _with_room(hangers: Sequence[int], places: dict[int, float]) -> list[int]:
 
 def _bars(axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: Normalize) -> None:
     metres = _in_metres(pattern)
-    style.dress(axes, "along the bridge (m)" if metres else "hanger", "lost or gained (kN)")
+    unit, _ = shift_unit(pattern)
+    along = "along the bridge (m)" if metres else "hanger"
+    style.dress(axes, along, f"lost or gained ({unit.name})")
     axes.grid(False, axis="x")
     rows = pattern.rows
     at = np.array([places[row.hanger] for row in rows])
-    kilonewtons = np.array([row.shift_n for row in rows]) / 1e3
-    half = np.array([row.high_n - row.shift_n for row in rows]) / 1e3
-    axes.bar(at, kilonewtons, 0.62 * _step(places), color=_colours(rows, scale), zorder=2)
+    shifts = unit.of(np.array([row.shift_n for row in rows]))
+    half = unit.of(np.array([row.high_n - row.shift_n for row in rows]))
+    axes.bar(at, shifts, 0.62 * _step(places), color=_colours(rows, scale), zorder=2)
     axes.errorbar(
-        at, kilonewtons, half,
+        at, shifts, half,
         fmt="none", ecolor=style.INK, elinewidth=1.1, zorder=3,
         capsize=2.5 if len(rows) <= _MOST_NUMBERS else 0,
     )  # fmt: skip
@@ -176,18 +179,21 @@ def _colour_bar(figure: Figure, panels: Sequence[Axes], scale: Normalize) -> Non
 
 
 def _caption(pattern: BridgePattern) -> str:
+    unit, _ = shift_unit(pattern)
     dotted = " Dotted: not compared, no recent test." if pattern.not_compared else ""
     return (
         "Above: the hangers between deck and arch (not to scale), coloured by the shift of their "
         "tension from the baseline: orange lost, blue gained, grey neither. Only bold numbers "
-        f"have likelier moved than not.{dotted} Below: the same in kN, with 90 % intervals. "
-        f"{pattern.sentence}"
+        f"have likelier moved than not.{dotted} Below: the same in {unit.name}, with 90 % "
+        f"intervals. {pattern.sentence}"
     )
 
 
 def _alt(pattern: BridgePattern) -> str:
+    unit, places = shift_unit(pattern)
     moved = [
-        f"hanger {row.hanger} {row.shift_n / 1e3:+z.0f} kN ({100 * row.shift_fraction:+z.1f} %)"
+        f"hanger {row.hanger} {unit.of(row.shift_n):+z.{places - 1}f} {unit.name} "
+        f"({100 * row.shift_fraction:+z.1f} %)"
         for row in pattern.rows
         if row.way != "unchanged"
     ]

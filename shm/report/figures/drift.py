@@ -13,6 +13,7 @@ from shm.report.figures import style, timeline
 from shm.report.figures.member import Member
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import BoolArray, FloatArray
+from shm.values.force_units import force_unit
 from shm.watch.history import Band
 
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
@@ -51,8 +52,8 @@ def _inches(quantity: QuantityOverTime) -> float:
 
 
 def _panel(axes: Axes, data: StatesOverTime, quantity: QuantityOverTime) -> None:
-    scale = 1e-3 if quantity.is_tension else 1.0
-    style.dress(axes, "", "tension (kN)" if quantity.is_tension else f"log10 of\n{quantity.unit}")
+    scale, unit = _scale(quantity)
+    style.dress(axes, "", f"tension ({unit})" if quantity.is_tension else f"log10 of\n{unit}")
     if not quantity.is_tension:
         axes.set_title(quantity.title, fontsize=9, color=style.INK, loc="left", pad=3)
     times = timeline.positions(data.times)
@@ -61,6 +62,14 @@ def _panel(axes: Axes, data: StatesOverTime, quantity: QuantityOverTime) -> None
     _see(axes, quantity, data.outlier, scale)
     _out_of_view(axes, times, quantity.read.middle * scale)
     _levels(axes, quantity, scale)
+
+
+def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
+    """What turns its values into those of its axis, and their unit: that of a tension fits it."""
+    if not quantity.is_tension:
+        return 1.0, quantity.unit
+    unit = force_unit(quantity.baseline, *quantity.filtered.middle.tolist())
+    return 1 / unit.newtons, unit.name
 
 
 def _states(axes: Axes, times: FloatArray, quantity: QuantityOverTime, scale: float) -> None:
@@ -246,7 +255,8 @@ def _alt(data: StatesOverTime) -> str:
 
 def _last(quantity: QuantityOverTime) -> str:
     band = quantity.filtered
-    scale, unit = (1e-3, " kN") if quantity.is_tension else (1.0, "")
+    scale, name = _scale(quantity)
+    unit = f" {name}" if quantity.is_tension else ""
     low, middle, high = (float(part[-1]) * scale for part in (band.low, band.middle, band.high))
     return (
         f"{quantity.title} {middle:.4g}{unit} (90 % interval {low:.4g} to {high:.4g}{unit}), "

@@ -10,6 +10,7 @@ from shm.report import words
 from shm.report.content import HangerReport
 from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.values.force_units import ForceUnit
 
 _NEAR = 1.5
 """How far from the samples a line may lie to be in view, in widths of the samples' range."""
@@ -18,14 +19,15 @@ _NEAR = 1.5
 def _draw(data: HangerReport) -> Figure:
     figure = style.new_figure()
     axes = figure.subplots()
-    style.dress(axes, "tension (kN)", "probability density (1/kN)")
+    unit = data.tension_unit
+    style.dress(axes, f"tension ({unit.name})", f"probability density (1/{unit.name})")
     _histogram(axes, data)
     _see(axes, data)
-    _line(axes, data.hanger.nominal_tension_n / 1e3, "nominal", style.INK, ":", 0.9)
+    _line(axes, data.hanger.nominal_tension_n, unit, "nominal", style.INK, ":", 0.9)
     if data.baseline_tension_n is not None:
-        baseline = words.kilonewtons(data.baseline_tension_n)
+        baseline = data.baseline_tension_n.in_unit(unit)
         axes.axvspan(baseline.low, baseline.high, color=style.GREEN, alpha=0.15, linewidth=0)
-        _line(axes, baseline.mean, "baseline", style.GREEN, "--", 0.8)
+        _line(axes, data.baseline_tension_n.mean, unit, "baseline", style.GREEN, "--", 0.8)
     style.legend_above(axes)
     return figure
 
@@ -39,19 +41,27 @@ def _see(axes: Axes, data: HangerReport) -> None:
     reach = _NEAR * (high - low)
     seen = [low, high, *(line for line in lines if low - reach <= line <= high + reach)]
     margin = 0.05 * (max(seen) - min(seen))
-    axes.set_xlim((min(seen) - margin) / 1e3, (max(seen) + margin) / 1e3)
+    unit = data.tension_unit
+    axes.set_xlim(unit.of(min(seen) - margin), unit.of(max(seen) + margin))
 
 
 def _line(
-    axes: Axes, tension_kn: float, label: str, colour: str, dashes: str, height: float
+    axes: Axes,
+    tension_n: float,
+    unit: ForceUnit,
+    label: str,
+    colour: str,
+    dashes: str,
+    height: float,
 ) -> None:
     """A tension as a line or, where it lies out of view, in words at the edge it lies beyond."""
     low, high = axes.get_xlim()
-    if low <= tension_kn <= high:
-        axes.axvline(tension_kn, color=colour, linestyle=dashes, label=label)
+    tension = unit.of(tension_n)
+    if low <= tension <= high:
+        axes.axvline(tension, color=colour, linestyle=dashes, label=label)
         return
-    right = tension_kn > high
-    named = f"{label} {tension_kn:.1f} kN"
+    right = tension > high
+    named = f"{label} {tension:.{unit.decimals(tension_n)}f} {unit.name}"
     axes.text(
         0.99 if right else 0.01,
         height,
@@ -64,8 +74,8 @@ def _line(
 
 
 def _histogram(axes: Axes, data: HangerReport) -> None:
-    samples = data.posterior.tension_n / 1e3
-    interval = words.kilonewtons(data.tension_n)
+    samples = data.tension_unit.of(data.posterior.tension_n)
+    interval = data.tension_n.in_unit(data.tension_unit)
     heights, edges = np.histogram(samples, bins=min(40, 10 + len(samples) // 40), density=True)
     centres = (edges[:-1] + edges[1:]) / 2
     inside = (centres >= interval.low) & (centres <= interval.high)
@@ -82,7 +92,7 @@ def _histogram(axes: Axes, data: HangerReport) -> None:
 
 
 def _caption(data: HangerReport) -> str:
-    tension = words.with_interval(words.kilonewtons(data.tension_n), "kN")
+    tension = words.tension(data.tension_n, data.tension_unit)
     baseline = (
         "There is no earlier baseline."
         if data.baseline_tension_n is None
@@ -95,7 +105,7 @@ def _caption(data: HangerReport) -> str:
 
 
 def _alt(data: HangerReport) -> str:
-    tension = words.with_interval(words.kilonewtons(data.tension_n), "kN")
+    tension = words.tension(data.tension_n, data.tension_unit)
     return f"Histogram of {len(data.posterior.samples)} posterior samples of tension, {tension}."
 
 

@@ -9,6 +9,7 @@ from shm.report import words
 from shm.report.content import HangerReport
 from shm.report.figures import style, timeline
 from shm.report.figures.member import Member
+from shm.values.force_units import ForceUnit, force_unit
 
 
 def _draw(data: HangerReport) -> Figure | None:
@@ -17,27 +18,32 @@ def _draw(data: HangerReport) -> Figure | None:
         return None
     figure = style.new_figure()
     axes = figure.subplots()
-    style.dress(axes, "time of the test (UTC)", "tension (kN)")
+    unit = _unit(rows)
+    style.dress(axes, "time of the test (UTC)", f"tension ({unit.name})")
     timeline.band(
         axes,
-        [(row.time, words.kilonewtons(row.row.tension_n)) for row in rows],
+        [(row.time, row.row.tension_n.in_unit(unit)) for row in rows],
         style.BLUE,
         "tension, 90 % band",
     )
-    _levels(axes, data)
-    _alerts(axes, data, rows)
+    _levels(axes, data, unit)
+    _alerts(axes, data, rows, unit)
     timeline.dress_time(axes, [row.time for row in rows])
     style.legend_above(axes, columns=5)
     return figure
 
 
-def _levels(axes: Axes, data: HangerReport) -> None:
-    axes.axhline(
-        data.hanger.nominal_tension_n / 1e3, color=style.INK, linestyle=":", label="nominal"
-    )
+def _unit(rows: list[timeline.Dated]) -> ForceUnit:
+    """The one unit of the figure."""
+    return force_unit(*(row.row.tension_n.mean for row in rows))
+
+
+def _levels(axes: Axes, data: HangerReport, unit: ForceUnit) -> None:
+    nominal = unit.of(data.hanger.nominal_tension_n)
+    axes.axhline(nominal, color=style.INK, linestyle=":", label="nominal")
     if data.baseline is None:
         return
-    baseline = float(data.baseline.tension_n.mean()) / 1e3
+    baseline = unit.of(float(data.baseline.tension_n.mean()))
     fraction = data.hanger.thresholds.tension_shift_fraction
     axes.axhline(baseline, color=style.GREEN, linestyle="--", label="baseline")
     for sign, label in ((1, "threshold"), (-1, "_")):
@@ -50,13 +56,13 @@ def _levels(axes: Axes, data: HangerReport) -> None:
         )
 
 
-def _alerts(axes: Axes, data: HangerReport, rows: list[timeline.Dated]) -> None:
+def _alerts(axes: Axes, data: HangerReport, rows: list[timeline.Dated], unit: ForceUnit) -> None:
     alerted = {alert.test for alert in data.alerts}
     marked = [row for row in rows if row.row.test in alerted]
     if marked:
         axes.plot(
             timeline.positions([row.time for row in marked]),
-            [row.row.tension_n.mean / 1e3 for row in marked],
+            [unit.of(row.row.tension_n.mean) for row in marked],
             linestyle="none",
             marker="v",
             markersize=11,
@@ -80,14 +86,12 @@ def _caption(data: HangerReport) -> str:
 
 def _alt(data: HangerReport) -> str:
     rows = timeline.dated(data)
-    first, last = rows[0], rows[-1]
-    return f"Tension over {len(rows)} tests, {_at(first)} at first, {_at(last)} at last."
+    first, last = (_at(row, _unit(rows)) for row in (rows[0], rows[-1]))
+    return f"Tension over {len(rows)} tests, {first} at first, {last} at last."
 
 
-def _at(row: timeline.Dated) -> str:
-    return (
-        f"{words.with_interval(words.kilonewtons(row.row.tension_n), 'kN')} on {row.time:%Y-%m-%d}"
-    )
+def _at(row: timeline.Dated, unit: ForceUnit) -> str:
+    return f"{words.tension(row.row.tension_n, unit)} on {row.time:%Y-%m-%d}"
 
 
 FIGURE = Member("trend", "Trend of the tension", _draw, _caption, _alt)

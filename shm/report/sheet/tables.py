@@ -11,6 +11,7 @@ from shm.report.quality import quality_table
 from shm.report.sheet.content import TestSheet
 from shm.report.table import Table
 from shm.values import FrequencyResponse, Mode, Recording
+from shm.values.force_units import force_unit
 
 
 def results(sheet: TestSheet) -> tuple[Table, ...]:
@@ -126,7 +127,9 @@ def _hanger(sheet: TestSheet) -> str:
         return "not stated" if number is None else f"{number}, not described"
     hanger = sheet.hanger
     called = words.hanger_name(hanger.id, hanger.name)
-    return f"{called}, {hanger.length_m:g} m, nominal tension {hanger.nominal_tension_n / 1e3:g} kN"
+    unit = force_unit(hanger.nominal_tension_n)
+    nominal = f"{unit.of(hanger.nominal_tension_n):g} {unit.name}"
+    return f"{called}, {hanger.length_m:g} m, nominal tension {nominal}"
 
 
 def _band(sheet: TestSheet) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from shm.report.sheet.thinning import envelope_places
 from shm.store import TrendPoint
 from shm.values import FloatArray, IntArray, Summary
+from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.history import Band
 from shm_daemon.web.plotting import colour
 
@@ -54,8 +55,14 @@ def band_of(summaries: Sequence[Summary | None]) -> Band:
     return Band(*rows.T)
 
 
-def scaled(band: Band, factor: float) -> Band:
-    return Band(band.low * factor, band.middle * factor, band.high * factor)
+def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
+    """The one unit of the tensions of a hanger's tests."""
+    return force_unit(*(point.tension_n.mean for point in points))
+
+
+def in_unit(band: Band, unit: ForceUnit) -> Band:
+    """A band of forces in N in another unit."""
+    return Band(unit.of(band.low), unit.of(band.middle), unit.of(band.high))
 
 
 def band_traces(

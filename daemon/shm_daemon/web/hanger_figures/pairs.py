@@ -9,6 +9,7 @@ import numpy as np
 
 from shm.report import words
 from shm.values import FloatArray, Posterior
+from shm.values.force_units import force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_figures.over_time import Trace
 from shm_daemon.web.hanger_figures.panels import axis, domains, layout_name
@@ -41,7 +42,8 @@ def _columns(posterior: Posterior) -> list[_Column]:
 
 def _column(posterior: Posterior, name: str) -> _Column:
     if name == "theta_F":
-        return _Column("tension (kN)", posterior.tension_n / 1e3)
+        unit = force_unit(float(posterior.tension_n.mean()))
+        return _Column(f"tension ({unit.name})", unit.of(posterior.tension_n))
     if name == "sigma":
         return _Column("sigma (%)", 100 * posterior.parameter(name))
     return _Column(name.replace("log10_", "log10 "), posterior.parameter(name))

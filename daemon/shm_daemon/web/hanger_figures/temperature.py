@@ -9,6 +9,7 @@ import numpy as np
 
 from shm.report import words
 from shm.store import TrendPoint
+from shm.values.force_units import ForceUnit
 from shm_daemon.web.hanger_figures import over_time
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
@@ -36,12 +37,16 @@ def _draw(view: HangerView) -> dict[str, Any]:
         (known[:-1], "earlier tests", "blue", "circle"),
         (known[-1:], "latest", "orange", "diamond"),
     )
-    traces = [_trace(*part) for part in parts]
-    return figure(traces, "temperature (°C)", "tension (kN)", hovermode="closest")
+    unit = over_time.tension_unit(view.trend)
+    traces = [_trace(*part, unit) for part in parts]
+    label = f"tension ({unit.name})"
+    return figure(traces, "temperature (°C)", label, hovermode="closest")
 
 
-def _trace(points: list[TrendPoint], name: str, hue: str, symbol: str) -> over_time.Trace:
-    band = over_time.scaled(over_time.band_of([point.tension_n for point in points]), 1e-3)
+def _trace(
+    points: list[TrendPoint], name: str, hue: str, symbol: str, unit: ForceUnit
+) -> over_time.Trace:
+    band = over_time.in_unit(over_time.band_of([point.tension_n for point in points]), unit)
     labels = [f"{point.test}, {point.time:%Y-%m-%d}" for point in points]
     made = over_time.dots_trace([point.time for point in points], band, labels, name, hue)
     marker = {"color": colour(hue), "size": 8, "symbol": symbol}
@@ -62,10 +67,13 @@ def _caption(view: HangerView) -> str:
 def _alt(view: HangerView) -> str:
     known = _known(view)
     temperatures = [point.temperature_c for point in known]
-    means = [point.tension_n.mean / 1e3 for point in known]
+    means_n, unit = [point.tension_n.mean for point in known], over_time.tension_unit(view.trend)
+    low, high = (
+        f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
+    )
     return (
         f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
-        f"{max(temperatures):.1f} °C: {min(means):.1f} to {max(means):.1f} kN."
+        f"{max(temperatures):.1f} °C: {low} to {high} {unit.name}."
     )
 
 

@@ -14,13 +14,13 @@ from shm.report.figures.timeline import inner
 from shm.report.states import QuantityOverTime, StatesOverTime, called_words
 from shm.store import EventKind, HangerEvent, TrendPoint
 from shm.values import TENSION, FloatArray
+from shm.values.force_units import ForceUnit
 from shm_daemon.web.hanger_figures import over_time
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_figures.over_time import Trace
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.plotting import colour, figure
 
-_KN = 1e-3
 _MARGIN = 0.04
 _LABEL_ROOM = 0.08
 """Over the thresholds, so that none crosses what is written at the top of a called change."""
@@ -34,7 +34,8 @@ _HANDS = {
 
 def _draw(view: HangerView) -> dict[str, Any]:
     times = [point.time for point in view.trend]
-    tension = over_time.scaled(over_time.band_of([p.tension_n for p in view.trend]), _KN)
+    unit = over_time.tension_unit(view.trend)
+    tension = over_time.in_unit(over_time.band_of([p.tension_n for p in view.trend]), unit)
     alerted = {e.at for e in view.events if e.kind is EventKind.ALERT}
     alerts = [place for place, time in enumerate(times) if time in alerted]
     chosen = over_time.places(tension.middle, tension.low, tension.high, always=alerts)
@@ -44,7 +45,7 @@ def _draw(view: HangerView) -> dict[str, Any]:
     band = (
         over_time.band_traces(when, shown, "tests, 90 % band", "blue")[:2]
         if state is None
-        else _state_traces(view.states, state)
+        else _state_traces(view.states, state, unit)
     )
     traces = [
         *band,
@@ -56,7 +57,7 @@ def _draw(view: HangerView) -> dict[str, Any]:
     return figure(
         traces,
         "time of the test (UTC)",
-        "tension (kN)",
+        f"tension ({unit.name})",
         xaxis={"type": "date", "range": _time_range(view)},
         yaxis={"range": _range(view, tension.middle, state)},
         yaxis2={"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
@@ -71,9 +72,11 @@ def _state(states: StatesOverTime | None) -> QuantityOverTime | None:
     return found[0] if found else None
 
 
-def _state_traces(states: StatesOverTime | None, state: QuantityOverTime) -> list[Trace]:
+def _state_traces(
+    states: StatesOverTime | None, state: QuantityOverTime, unit: ForceUnit
+) -> list[Trace]:
     assert states is not None
-    band = over_time.scaled(state.filtered, _KN)
+    band = over_time.in_unit(state.filtered, unit)
     chosen = over_time.places(band.middle, band.low, band.high)
     when = over_time.picked(states.times, chosen)
     return over_time.band_traces(when, over_time.of(band, chosen), "state, 90 % band", "blue")
@@ -82,10 +85,11 @@ def _state_traces(states: StatesOverTime | None, state: QuantityOverTime) -> lis
 def _levels(view: HangerView) -> list[Trace]:
     times = [point.time for point in view.trend]
     ends = (min(times), max(times))
-    nominal = view.hanger.nominal_tension_n * _KN
+    unit = over_time.tension_unit(view.trend)
+    nominal = unit.of(view.hanger.nominal_tension_n)
     levels = [(nominal, "nominal", "ink", "dot")]
     if view.baseline is not None:
-        mean, reach = view.baseline.tension_n.mean * _KN, _reach(view)
+        mean, reach = unit.of(view.baseline.tension_n.mean), _reach(view)
         levels += [
             (mean, "baseline", "green", "dash"),
             (mean * (1 + reach), "threshold", "red", "dashdot"),
@@ -174,16 +178,16 @@ def _time_range(view: HangerView) -> list[str]:
 
 def _range(view: HangerView, means: FloatArray, state: QuantityOverTime | None) -> list[float]:
     """Tests, state, baseline and thresholds; nominal and lone intervals may lie beyond."""
-    shown = [means]
+    shown, unit = [means], over_time.tension_unit(view.trend)
     if view.baseline is not None:
-        mean = view.baseline.tension_n.mean * _KN
+        mean = unit.of(view.baseline.tension_n.mean)
         shown.append(np.array([mean * (1 - _reach(view)), mean * (1 + _reach(view))]))
     if state is not None:
-        shown += [inner(part * _KN) for part in (state.filtered.low, state.filtered.high)]
+        shown += [inner(unit.of(part)) for part in (state.filtered.low, state.filtered.high)]
     else:
         summaries = [point.tension_n for point in view.trend]
-        shown.append(inner(np.array([each.q05 for each in summaries]) * _KN))
-        shown.append(inner(np.array([each.q95 for each in summaries]) * _KN))
+        shown.append(inner(unit.of(np.array([each.q05 for each in summaries]))))
+        shown.append(inner(unit.of(np.array([each.q95 for each in summaries]))))
     low, high = over_time.limits(np.concatenate(shown))
     return [low, high + (_LABEL_ROOM * (high - low) if view.calls else 0.0)]
 
@@ -242,17 +246,18 @@ def _waits(view: HangerView) -> str:
 
 
 def _alt(view: HangerView) -> str:
-    first, last = view.trend[0], view.trend[-1]
+    unit = over_time.tension_unit(view.trend)
+    first, last = (_at(view.trend[place], unit) for place in (0, -1))
     called = [called_words(call.watched.change) for call in view.calls]
     return (
-        f"Tension over {words.counted(len(view.trend), 'test')}, {_at(first)} at first, "
-        f"{_at(last)} at last. Changes called: {'; '.join(called) or 'none'}."
+        f"Tension over {words.counted(len(view.trend), 'test')}, {first} at first, "
+        f"{last} at last. Changes called: {'; '.join(called) or 'none'}."
     )
 
 
-def _at(point: TrendPoint) -> str:
-    interval = words.kilonewtons(Interval.of_summary(point.tension_n))
-    return f"{words.with_interval(interval, 'kN')} on {point.time:%Y-%m-%d}"
+def _at(point: TrendPoint, unit: ForceUnit) -> str:
+    tension = words.tension(Interval.of_summary(point.tension_n), unit)
+    return f"{tension} on {point.time:%Y-%m-%d}"
 
 
 FIGURE = HangerFigure(

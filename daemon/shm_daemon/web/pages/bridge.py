@@ -11,6 +11,8 @@ from fastapi.responses import JSONResponse
 
 from shm.pipeline import utc_now
 from shm.report import Interval, words
+from shm.report.bridge.content import hangers_unit
+from shm.values.force_units import ForceUnit
 from shm_daemon.doctor.contract import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_drawing import CLASSES, elevation, shift_words, triangles
@@ -39,6 +41,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
     now = utc_now()
     bridge = glance(site, now)
     found = compared(request, site) if len(bridge.hangers) <= QUICKLY_COMPARED else None
+    unit = hangers_unit(each.line for each in bridge.hangers)
     return page(
         request,
         "bridge.html.j2",
@@ -47,7 +50,8 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         drawing=elevation(bridge.hangers) if bridge.hangers else None,
         legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
         moved=found.sentence if found else None,
-        rows=[_row(each, now) for each in bridge.hangers],
+        unit=unit.name,
+        rows=[_row(each, unit, now) for each in bridge.hangers],
     )
 
 
@@ -115,7 +119,7 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
     ]
 
 
-def _row(each: HangerGlance, now: datetime) -> dict[str, Any]:
+def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     """A hanger's row of the table."""
     line, hanger = each.line, each.hanger
     tension, latest = line.tension_n, line.latest
@@ -123,7 +127,7 @@ def _row(each: HangerGlance, now: datetime) -> dict[str, Any]:
         "id": hanger.id,
         "name": words.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": words.with_span(words.kilonewtons(tension)) if tension else "no test yet",
+        "tension": words.with_span(tension.in_unit(unit)) if tension else "no test yet",
         "nominal": f"{line.of_nominal.mean:.1f}" if line.of_nominal else "",
         "shift": _shift(each),
         "called": line.called,

@@ -21,7 +21,7 @@ from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
-from shm_daemon.web.hanger_tests import lines_before
+from shm_daemon.web.hanger_tests import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.working_out import workshop_of
@@ -69,6 +69,7 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
         "hanger": one,
         "beside": _beside(site.workspace, one),
         "tests": rows[:_LATEST_TESTS],
+        "test_headings": headings(view),
         "has_more": len(rows) > _LATEST_TESTS,
     }
     if view.report is None:
@@ -94,6 +95,7 @@ def all_tests(
         name=words.hanger_name(one.id, one.name),
         hanger=one,
         tests=rows[:_TESTS_A_PAGE],
+        test_headings=headings(view),
         is_first=before is None,
         older=rows[_TESTS_A_PAGE - 1].id if len(rows) > _TESTS_A_PAGE else None,
     )

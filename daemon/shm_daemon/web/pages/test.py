@@ -17,6 +17,7 @@ from shm.report.sheet.summary import HEADLINES, name
 from shm.report.table import Table
 from shm.report.verdicts import overall
 from shm.values import ResponsePoint, Verdict
+from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.frame import page
 from shm_daemon.web.test_address import test_json, test_page
@@ -149,7 +150,9 @@ def _tension(view: TestView) -> tuple[str, str, str]:
         posterior = view.store.posterior_of(view.stored)
     except NothingThere:
         return "Tension", "not yet", f"the test is {view.stored.stage}"
-    tension = words.kilonewtons(Interval.of_samples(posterior.tension_n))
-    places = words.decimals(tension.width)
-    beside = f"90 % interval {words.span(tension)} kN, {words.model_class(posterior.model)}"
-    return "Tension by this test", f"{tension.mean:.{places}f} kN", beside
+    tension_n = Interval.of_samples(posterior.tension_n)
+    unit = force_unit(tension_n.mean)
+    tension = tension_n.in_unit(unit)
+    span = f"90 % interval {words.span(tension)} {unit.name}"
+    beside = f"{span}, {words.model_class(posterior.model)}"
+    return "Tension by this test", f"{words.mean(tension)} {unit.name}", beside

@@ -8,10 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.tensions import AFTER, TensionUnit, tension_unit
+from shm.report.diagnosis.tensions import AFTER, tension_of, tension_unit, tension_words
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.values import TensionEstimate
+from shm.values.force_units import ForceUnit
 
 _NEAR = 1.0
 """How far the nominal tension may lie to be in view, in widths of what is drawn."""
@@ -47,9 +48,9 @@ def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
 
 
 def _interval(
-    axes: Axes, row: int, estimate: TensionEstimate, unit: TensionUnit, colour: str
+    axes: Axes, row: int, estimate: TensionEstimate, unit: ForceUnit, colour: str
 ) -> None:
-    interval = unit.interval(estimate)
+    interval = tension_of(estimate).in_unit(unit)
     if math.isfinite(interval.width):
         axes.plot(
             [interval.low, interval.high], [row, row], color=colour, linewidth=7, alpha=0.35,
@@ -57,7 +58,7 @@ def _interval(
         )  # fmt: skip
     axes.plot([interval.mean], [row], marker="o", markersize=6, color=colour)
     axes.annotate(
-        unit.told(estimate),
+        tension_words(estimate, unit),
         (interval.mean, row),
         xytext=(0, 9),
         textcoords="offset points",
@@ -89,7 +90,7 @@ def _caption(sheet: DiagnosisSheet) -> str:
 
 def _alt(sheet: DiagnosisSheet) -> str:
     unit = tension_unit(sheet.diagnosis)
-    told = [f"{what} {unit.told(estimate)}" for what, estimate, _ in _rows(sheet)]
+    told = [f"{what} {tension_words(estimate, unit)}" for what, estimate, _ in _rows(sheet)]
     return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
 
 

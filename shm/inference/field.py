@@ -1,0 +1,248 @@
+"""The noise of the field: what a measured frequency of a real hanger is off by, in three parts.
+
+- The identification's error, with the standard deviation s that was stated, which is itself an
+  estimate: the true one is phi s, phi log-normal with a spread of 20 % and heavier tails (a
+  jackknife over five hits is no better). Tests of one mode that repeat teach phi.
+- An error of each mode that repeats in all tests, of unknown size tau: sensors' mass, the section
+  along the bar, what no model has. Log-uniform from 1e-5 to 3e-3 with probability 0.95 (sound
+  hangers that others measured had up to 5e-4), and up to 0.3 with the rest: a class that does not
+  fit gets a wide posterior, not a sharp one at a wrong place.
+- A measured tension errs by its own standard deviation and by what frequencies do not see of the
+  bar's mass and length.
+
+So ln f_hat ~ N(ln f, phi^2 s^2 + tau^2). Both unknowns are integrated out on a grid: tau in steps
+of 1.2 standard deviations of what the data can tell, phi at equally probable values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.errors import BadInput
+from shm.models import Model
+from shm.models.conditions import Conditions
+from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
+
+TAU_LOWER, TAU_USUAL, TAU_UPPER = 1e-5, 3e-3, 0.3
+_USUAL_SHARE = 0.95
+_STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.2, 0.3
+_SD_SPREAD, _SD_FREEDOM = 0.2, 4.0
+_PHI_NODES = 5
+_UNSTATED_SD = 1e-4
+"""Of a frequency whose error nobody states and no second test shows, as a fraction of it: what a
+hammer test reaches (docs/identification_benchmarks.md)."""
+
+
+class FieldLikelihood:
+    """Measured frequencies, one mode in all tests of like conditions together, and their likelihood.
+
+    `frequency_hz` (data,) are weighted means over tests; `identification_error` (data,) their
+    fractional standard deviations as stated. With a `reading` (tension in N, its fractional sd) the
+    last datum is that tension. Raises BadInput where the tests hold no mode.
+    """
+
+    repeat = 1
+
+    def __init__(
+        self,
+        tests: Sequence[ModalTest],
+        model: Model,
+        reading: tuple[float, float] | None = None,
+    ):
+        self.tests = tuple(tests)
+        self.modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]
+        if not self.modes:
+            raise BadInput(
+                "no measured frequency to update with.", remedy="Give a test with modes."
+            )
+        conditions = [model.conditions(test) for test in tests for _ in test.regular_modes]
+        keys = [(m.plane, m.order, c) for m, c in zip(self.modes, conditions, strict=True)]
+        distinct = list(dict.fromkeys(keys))
+        self.of_mode: IntArray = np.array([distinct.index(key) for key in keys])
+        self._plane = np.array([PLANES.index(plane) for plane, _, _ in distinct])
+        self._order = np.array([order - 1 for _, order, _ in distinct])
+        self._conditions = [each for _, _, each in distinct]
+        value, sd = _values(self.modes, self.of_mode)
+        weight = 1 / sd**2
+        total = np.bincount(self.of_mode, weight)
+        mean = np.bincount(self.of_mode, weight * value) / total
+        scatter = float((weight * (value - mean[self.of_mode]) ** 2).sum())
+        self.frequencies = len(distinct)
+        self.has_reading = reading is not None
+        tension, tension_sd = reading or (NAN, NAN)
+        self.frequency_hz: FloatArray = np.append(np.exp(mean), [tension] * self.has_reading)
+        self.identification_error: FloatArray = np.append(
+            total**-0.5, [tension_sd] * self.has_reading
+        )
+        self._phi, self._log_phi = _sd_factors(scatter, len(keys) - len(distinct))
+        jacobian = -float(value.sum()) - len(keys) / 2 * np.log(2 * np.pi)
+        of_means = np.log(total**-0.5).sum() - np.log(sd).sum()
+        self._constant = jacobian + float(of_means)
+        if reading is not None:
+            self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
+        self._same = self._same_modes()
+        self._tau, self._log_tau = self._grid(_STEP_IN_SD)
+
+    @property
+    def highest_order(self) -> int:
+        """The highest order of a measured mode, which a model has to reach in each plane."""
+        return int(self._order.max()) + 1
+
+    def predict(self, model: Model, theta: FloatArray) -> FloatArray:
+        """The model's frequency for each datum (n, frequencies), in Hz."""
+        predicted = np.empty((self.frequencies, len(theta))).T
+        for conditions, rows in self._by_conditions().items():
+            found = model.frequencies_at(theta, self.highest_order, conditions)
+            predicted[:, rows] = found[:, self._plane[rows], self._order[rows]]
+        return predicted
+
+    def _by_conditions(self) -> dict[Conditions, list[int]]:
+        rows: dict[Conditions, list[int]] = {}
+        for index, each in enumerate(self._conditions):
+            rows.setdefault(each, []).append(index)
+        return rows
+
+    def misfit(self, predicted: FloatArray) -> FloatArray:
+        """Logarithms of predictions over measurements (n, data)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.log(predicted / self.frequency_hz)
+
+    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+        """Log likelihood (n,) of predictions (n, data), tau and phi integrated out."""
+        joint = self._nodes(predicted, self._tau, floor) + self._log_tau
+        return _log_sum(joint.reshape(len(predicted), -1))
+
+    def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
+        """Log likelihood (n,) of predictions (n, data), each with its tau (n,)."""
+        rest = self.misfit(predicted)[:, : self.frequencies]
+        tau = np.clip(sigma, TAU_LOWER, None)
+        found = np.empty((len(predicted), len(self._phi)))
+        for column, phi in enumerate(self._phi):
+            variance = (phi * self.identification_error[: self.frequencies]) ** 2
+            found[:, column] = self._of_variance(rest, variance, tau)
+        found += self._log_phi + self._constant
+        return np.asarray(logsumexp(found, axis=1) + self._of_reading(predicted, 0.0))
+
+    def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """tau (n,) from its posterior given each prediction (n, data)."""
+        tau, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
+        joint = _log_sum(self._nodes(predicted, tau, 0.0), axis=2) + log_share[:, 0]
+        share = np.exp(joint - logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
+        node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(tau) - 1)
+        jitter = np.log(tau[1] / tau[0]) * (rng.random(len(node)) - 0.5)
+        return np.asarray((tau[node] * np.exp(jitter)).clip(TAU_LOWER, TAU_UPPER))
+
+    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
+        """The node of the grid with the largest joint likelihood, shape (n,)."""
+        found = _log_sum(self._nodes(predicted, self._tau, 0.0), axis=2)
+        return np.asarray(self._tau[found.argmax(axis=1)])
+
+    def model_error(self, predicted: FloatArray) -> FloatArray:
+        """The misfit's mean square beyond the identification's own, as a tau (n,)."""
+        beyond = self.misfit(predicted) ** 2 - self.identification_error**2
+        beyond = beyond[:, : self.frequencies]
+        return np.asarray(np.sqrt(beyond.mean(axis=1).clip(TAU_LOWER**2)))
+
+    def by_mode(self, predicted: FloatArray) -> FloatArray:
+        """Predictions (n, modes) of every mode of every test from those of the data."""
+        return predicted[:, self.of_mode]
+
+    def _nodes(self, predicted: FloatArray, tau: FloatArray, floor: float) -> FloatArray:
+        """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""
+        rest = self.misfit(predicted)[:, : self.frequencies]
+        own = self.identification_error[: self.frequencies, None] ** 2
+        variance = own * np.tile(self._phi**2, len(tau)) + floor**2
+        common = np.repeat(tau, len(self._phi))
+        if self._same is None:
+            total = variance + common**2
+            found = -0.5 * (rest**2 @ (1 / total) + np.log(total).sum(axis=0))
+        else:
+            found = np.stack(
+                [
+                    self._of_variance(rest, each, np.full(len(rest), one))
+                    for each, one in zip(variance.T, common, strict=True)
+                ],
+                axis=1,
+            )
+        found = found.reshape(len(rest), len(tau), len(self._phi)) + self._log_phi
+        reading = self._of_reading(predicted, floor)[:, None, None]
+        return np.asarray(found + self._constant + reading)
+
+    def _of_variance(self, rest: FloatArray, own: FloatArray, tau: FloatArray) -> FloatArray:
+        """-(quadratic + log volume)/2 (n,) of misfits (n, F): own variances (F,), tau (n,) shared.
+
+        Data of one mode under several conditions share its error (Sherman and Morrison).
+        """
+        groups = np.arange(self.frequencies) if self._same is None else self._same
+        precision = 1 / own
+        weight = np.bincount(groups, precision)
+        pull = np.stack([np.bincount(groups, row * precision) for row in rest]) if len(rest) else 0
+        shared = tau[:, None] ** 2
+        grown = 1 + shared * weight
+        quadratic = rest**2 @ precision - (shared * pull**2 / grown).sum(axis=1)
+        return np.asarray(-0.5 * (quadratic + np.log(own).sum() + np.log(grown).sum(axis=1)))
+
+    def _of_reading(self, predicted: FloatArray, floor: float) -> FloatArray:
+        if not self.has_reading:
+            return np.zeros(len(predicted))
+        variance = self.identification_error[-1] ** 2 + floor**2
+        off = self.misfit(predicted)[:, -1]
+        return np.asarray(-0.5 * (off**2 / variance + np.log(variance)))
+
+    def _same_modes(self) -> IntArray | None:
+        """Which of the modes each datum is of; None where each is another."""
+        mode = self._plane * (self._order.max() + 1) + self._order
+        distinct, index = np.unique(mode, return_inverse=True)
+        return None if len(distinct) == len(mode) else np.asarray(index)
+
+    def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
+        """Nodes (k,) of tau, and the log of each one's share of the prior (k, 1)."""
+        step = step_in_sd / np.sqrt(2 * self.frequencies)
+        span = np.log(TAU_UPPER / TAU_LOWER)
+        nodes = np.linspace(np.log(TAU_LOWER), np.log(TAU_UPPER), int(span / step) + 2)
+        usual = nodes <= np.log(TAU_USUAL)
+        share = np.where(usual, _USUAL_SHARE / usual.sum(), (1 - _USUAL_SHARE) / (~usual).sum())
+        return np.exp(nodes), np.log(share)[:, None]
+
+
+def _values(modes: Sequence[Mode], of_mode: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Logarithms of frequencies (modes,) and their fractional standard deviations.
+
+    Where none is stated, the scatter between tests of one mode stands in, if there are several.
+    """
+    value = np.log([mode.frequency_hz for mode in modes])
+    sd = np.array([mode.frequency_sd_hz / mode.frequency_hz for mode in modes])
+    known = np.isfinite(sd) & (sd > 0)
+    if known.all():
+        return value, sd
+    count = np.bincount(of_mode)
+    mean = np.bincount(of_mode, value) / count
+    free = len(modes) - len(count)
+    scatter = np.sqrt(((value - mean[of_mode]) ** 2).sum() / free) if free > 1 else _UNSTATED_SD
+    return value, np.where(known, sd, max(float(scatter), TAU_LOWER))
+
+
+def _sd_factors(scatter: float, freedom: int) -> tuple[FloatArray, FloatArray]:
+    """Equally probable values of phi (k,), and log weights (k,) that hold what the tests' scatter
+    about their means, `scatter` in stated variances with its degrees of `freedom`, says of them.
+    """
+    grid = np.linspace(-1.5, 2.5, 401)
+    log = -(_SD_FREEDOM + 1) / 2 * np.log1p((grid / _SD_SPREAD) ** 2 / _SD_FREEDOM)
+    prior = log - logsumexp(log)
+    joint = prior - freedom * grid - 0.5 * scatter * np.exp(-2 * grid)
+    total = float(logsumexp(joint))
+    share = np.exp(joint - total).cumsum()
+    middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
+    nodes = np.interp(middle, share, grid)
+    return np.exp(nodes), np.full(_PHI_NODES, total - np.log(_PHI_NODES))
+
+
+def _log_sum(values: FloatArray, axis: int = 1) -> FloatArray:
+    highest = values.max(axis=axis, keepdims=True)
+    highest = np.where(np.isfinite(highest), highest, 0.0)
+    total = np.exp(values - highest).sum(axis=axis)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.squeeze(highest, axis) + np.log(total))

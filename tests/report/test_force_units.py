@@ -1,0 +1,210 @@
+"""Tensions are told in the unit that fits their size: a string's, a tie rod's, a main cable's."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+from math import nan
+
+import numpy as np
+import pytest
+
+from shm import notebook
+from shm.report import (
+    BridgeReport,
+    DiagnosisSheet,
+    HangerReport,
+    Interval,
+    bridge_text,
+    diagnosis_text,
+    html,
+    illustrations,
+    json,
+    text,
+)
+from shm.report.bridge.content import HangerLine
+from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
+from shm.report.figures.bridge_shift import bridge_illustration
+from shm.report.figures.drift import STATES
+from shm.report.shifts import shift_unit
+from shm.report.states import QuantityOverTime, StatesOverTime
+from shm.report.summary import Status
+from shm.report.tables import history, models, tension
+from shm.values import Hanger, Posterior, Selection, TensionEstimate
+from shm.values.force_units import force_unit
+from shm.watch.history import Band
+from shm.watch.neighbours import HangerShift, bridge_pattern
+from tests.report.diagnoses import HANGER, sheet
+
+NOW = datetime(2026, 5, 1, tzinfo=UTC)
+SIZES = [(5.4, "N"), (20e3, "kN"), (12e6, "MN")]
+NAMES = ["string", "tie rod", "cable"]
+WITH_UNIT = re.compile(r"(-?\d[\d.]*) (N|kN|MN)(?![\w/ ])|(-?\d[\d.]*) (N|kN|MN) (?!m)")
+NOTHING = re.compile(r"(?<![\d.])0\.0*(?!\d)")
+
+
+@pytest.mark.parametrize(
+    ("force_n", "unit", "told", "decimals"),
+    [
+        (5.4321, "N", "5.432 N", 3),
+        (999.9, "N", "999.9 N", 1),
+        (1000.0, "kN", "1 kN", 3),
+        (20_040.0, "kN", "20.04 kN", 2),
+        (-654_080.0, "kN", "-654.1 kN", 1),
+        (711e3, "kN", "711 kN", 1),
+        (1.2e6, "kN", "1200 kN", 1),
+        (9_999_600.0, "kN", "10000 kN", 1),
+        (1e7, "MN", "10 MN", 2),
+        (0.0, "N", "0 N", 1),
+    ],
+)
+def test_a_force_has_the_unit_of_its_size(
+    force_n: float, unit: str, told: str, decimals: int
+) -> None:
+    found = force_unit(force_n)
+    assert found.name == unit
+    assert found.told(force_n) == told
+    assert found.decimals(force_n) == decimals
+    assert found.of(np.array([force_n])) == pytest.approx([force_n / found.newtons])
+
+
+def test_several_forces_have_one_unit_by_the_largest() -> None:
+    assert force_unit(5.0, 1200.0, nan).name == "kN"
+    assert force_unit(300e3, 12e6).name == "MN"
+    assert force_unit().name == force_unit(nan).name == "kN"
+
+
+def of_size(season: HangerReport, tension_n: float) -> HangerReport:
+    """The season of a hanger that carries `tension_n` at its latest test."""
+    factor = tension_n / season.tension_n.mean
+
+    def scaled(posterior: Posterior) -> Posterior:
+        return replace(posterior, nominal_tension_n=factor * posterior.nominal_tension_n)
+
+    assert season.baseline is not None
+    assert season.selection is not None
+    hanger = replace(season.hanger, nominal_tension_n=factor * season.hanger.nominal_tension_n)
+    selection = season.selection
+    return replace(
+        season,
+        hanger=hanger,
+        posterior=scaled(season.posterior),
+        baseline=scaled(season.baseline),
+        selection=Selection(tuple(map(scaled, selection.posteriors)), selection.probabilities),
+        trend=tuple(replace(row, tension_n=row.tension_n.scaled(factor)) for row in season.trend),
+    )
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_a_report_tells_every_tension_in_that_unit(
+    season: HangerReport, tension_n: float, unit: str
+) -> None:
+    data = of_size(season, tension_n)
+    for told in (" ".join(text(data).split()), html(data).split("<svg")[0]):
+        found = [(a or c, b or d) for a, b, c, d in WITH_UNIT.findall(told)]
+        assert {each for _, each in found} == {unit}
+        assert not [value for value, _ in found if NOTHING.fullmatch(value)]
+        assert f"tension, {unit}" in told
+    for table, columns in ((history(data), (4, 5)), (models(data), (4, 5)), (tension(data), (1,))):
+        cells = [row[column] for row in table.rows for column in columns]
+        assert not [cell for cell in cells if NOTHING.search(cell)], cells
+    assert json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_figures_are_labelled_in_that_unit(
+    season: HangerReport, tension_n: float, unit: str
+) -> None:
+    drawn = {each.name: each for each in illustrations(of_size(season, tension_n))}
+    (trend,), (posterior,) = drawn["trend"].figure.axes, drawn["tension"].figure.axes
+    assert trend.get_ylabel() == posterior.get_xlabel() == f"tension ({unit})"
+    assert posterior.get_ylabel() == f"probability density (1/{unit})"
+    latest = tension_n / force_unit(tension_n).newtons
+    low, high = posterior.get_xlim()
+    assert low < latest < high
+    marks = next(line for line in trend.lines if line.get_label() == "alert")
+    assert marks.get_ydata() == pytest.approx([latest])
+    for said in (drawn["trend"].alt, drawn["tension"].alt, drawn["tension"].caption):
+        assert f" {unit} (90 % interval" in said
+        assert not NOTHING.search(said)
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_states_over_time_are_drawn_in_that_unit(tension_n: float, unit: str) -> None:
+    middle = np.full(3, tension_n)
+    band = Band(0.98 * middle, middle, 1.02 * middle)
+    quantity = QuantityOverTime(
+        "tension", "tension", band, band, band, tension_n, 0.9 * tension_n, 1.1 * tension_n
+    )
+    times = (NOW, NOW.replace(day=2), NOW.replace(day=3))
+    data = StatesOverTime(times, np.full(3, nan), nan, np.zeros(3, bool), (quantity,))
+    figure = STATES.draw(data)
+    assert figure is not None
+    assert figure.axes[0].get_ylabel() == f"tension ({unit})"
+    assert f" {unit}), baseline " in STATES.alt(data)
+    assert not NOTHING.search(STATES.alt(data))
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
+    hanger: Hanger, tension_n: float, unit: str
+) -> None:
+    moved = {3: -0.05, 4: 0.03}
+    shifts = [
+        HangerShift(i, i - 1, NOW, tension_n, moved.get(i, 0.0) * tension_n, 0.002 * tension_n)
+        for i in range(1, 7)
+    ]
+    pattern = bridge_pattern(shifts, range(1, 7))
+    carried = Interval(0.95 * tension_n, 0.94 * tension_n, 0.96 * tension_n)
+    lines = tuple(
+        HangerLine(replace(hanger, id=number), Status.STEADY, NOW, carried)
+        for number in range(1, 7)
+    )
+    told = bridge_text(BridgeReport("Arch", lines, pattern, "", NOW, "0.1.0"))
+    assert f"tension, {unit} (90 %)" in told
+    found, places = shift_unit(pattern)
+    assert f"{-0.05 * found.of(tension_n):+.{places}f} (" in told
+    shown = bridge_illustration(pattern)
+    assert shown.figure.axes[1].get_ylabel() == f"lost or gained ({unit})"
+    assert re.search(rf"hanger 3 -[\d.]*[1-9][\d.]* {unit} \(-5\.0 %\)", shown.alt)
+
+
+def test_the_largest_tension_of_a_bridge_decides_for_all(hanger: Hanger) -> None:
+    lines = tuple(
+        HangerLine(replace(hanger, id=number), Status.STEADY, NOW, Interval(t, 0.9 * t, 1.1 * t))
+        for number, t in ((1, 900.0), (2, 30e3))
+    )
+    told = bridge_text(BridgeReport("Arch", lines, None, "too few", NOW, "0.1.0"))
+    assert "tension, kN (90 %)" in told
+    assert "0.900 (0.810 to 0.990)" in told
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_a_diagnosis_tells_both_tensions_in_that_unit(tension_n: float, unit: str) -> None:
+    before, after = (
+        TensionEstimate(t, 0.01 * t, 0.984 * t, 1.016 * t) for t in (1.04 * tension_n, tension_n)
+    )
+    diagnosis = replace(sheet("led").diagnosis, tension_before_n=before, tension_after_n=after)
+    data = DiagnosisSheet(diagnosis, replace(HANGER, nominal_tension_n=tension_n))
+    told = diagnosis_text(data)
+    table = told[told.index("TENSION BEFORE AND AFTER") : told.index("WHAT WOULD TELL")]
+    assert f"mean, {unit}" in table
+    assert not NOTHING.search(table)
+    figure = GAP_TENSION.draw(data)
+    assert figure is not None
+    assert figure.axes[0].get_xlabel() == f"tension ({unit})"
+
+
+@pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
+def test_a_notebook_shows_that_unit(season: HangerReport, tension_n: float, unit: str) -> None:
+    data = of_size(season, tension_n)
+    assert data.selection is not None
+    shown = notebook.posterior_html(data.posterior)
+    (row,) = re.findall(r"<tr><td>tension</td>.*?</tr>", shown)
+    assert f"tension in {unit}" in row
+    assert not NOTHING.search(row)
+    assert f"<th>tension, {unit}</th>" in notebook.selection_html(data.selection)
+    (nominal,) = re.findall(r"nominal tension</td><td>([^<]*)", notebook.hanger_html(data.hanger))
+    assert nominal.endswith(f" {unit}")
+    assert not NOTHING.search(nominal)
