@@ -11,6 +11,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.rebaselining import Order
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.store import Baseline
+from shm.values.force_units import force_unit
 from shm_cli.common import hanger_option, json_option, opened_store, progress_bar, show
 from shm_cli.record import Words
 
@@ -52,12 +53,14 @@ def rebaseline(
     if as_json:
         show(_document(made))
         return
-    tension = made.posterior.tension_n / 1e3
+    tension_n = made.posterior.tension_n
+    unit = force_unit(float(tension_n.mean()))
+    tension = unit.of(tension_n)
     count = len(made.posterior.tests)
     tests = "one test" if count == 1 else f"{count} tests"
     click.echo(
         f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
-        f"{tension.mean():.4g} kN (sd {tension.std(ddof=1):.2g} kN)."
+        f"{tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
     )
     if alerts:
         numbers = ", ".join(str(each) for each in alerts)

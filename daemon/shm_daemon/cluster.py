@@ -1,7 +1,8 @@
 """Steps on other machines: a Dask cluster behind the interface of `concurrent.futures`.
 
 Dask holds nothing that matters: what is lost with it is done again, because the store says that it
-still waits. Workers must give the same results to the bit, so they are asked for their versions.
+still waits. Workers must give the same results to the bit, so they are asked for their versions;
+equal versions give equal bits on processors of one kind, for which they are not asked.
 """
 
 from __future__ import annotations

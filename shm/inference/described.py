@@ -16,16 +16,44 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.special import ndtr, ndtri
 
 
 from shm.inference.coordinates import Coordinates, log_normal
-from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION, TENSION, AsMade
+from shm.models.as_made import (
+    BENDING,
+    BENDING_FACTOR,
+    DENSITY,
+    LENGTH,
+    MODULUS,
+    SECTION,
+    SHEAR,
+    TENSION,
+    AsMade,
+)
 from shm.models.beam import Beam, Beam3
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 
 _DEVIATIONS = (SECTION, DENSITY, MODULUS)
+_C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
+_MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
+"""ln c and ln(mu l^2) by the deviations."""
+
+_FITTINGS = ((0.5, 0.0, 0.0), (0.5, -0.01, 0.015))
+"""Shares, means and standard deviations of ln of effective over taped length: a bar that ends where
+the tape did, or one whose forks, sockets or nuts are stiffer than it over one to three per cent of
+its length at each end, or whose supports give way. Which it is the frequencies say where they can."""
+
+_EFFECTIVE_FACTOR = (0.27, 1.15)
+"""Of a strand: the range of the factor, widened by what tolerances and length do to c."""
+
+_MOST_REDRAWN = 20
+_FARTHEST = 8.0
+"""Standard deviations to which c's distribution is tabulated."""
 _SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
 
 
@@ -110,6 +138,10 @@ class Deviations:
         """How a combination of the deviations goes with n (k,)."""
         return np.asarray(np.array([shares.get(name, 0.0) for name in self.names]) @ self.factor)
 
+    def mean_of(self, name: str) -> float:
+        """The mean of one of them; 0 where it is none."""
+        return float(self.mean[self.names.index(name)]) if name in self.names else 0.0
+
     def column(self, deviations: FloatArray, name: str) -> FloatArray:
         """One of them (n,) of (n, k); 0 where it is none."""
         if name not in self.names:
@@ -123,12 +155,38 @@ def _root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vectors * np.sqrt(values.clip(0)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """Normal distributions of x = (n, ln lambda): how the effective length may differ from the tape.
+
+    `shares` (w,), `mean` and `sd` (w,) of ln lambda; n is standard normal in each.
+    """
+
+    shares: FloatArray
+    mean: FloatArray
+    sd: FloatArray
+
+    @classmethod
+    def of(cls, hanger: Hanger, one: bool) -> _Ways:
+        """As taped, or as end fittings leave it; with `one` a single distribution as wide as both."""
+        stated = hanger.scatter.effective_length
+        if math.isfinite(stated):
+            return cls(np.ones(1), np.zeros(1), np.array([stated]))
+        shares, mean, sd = np.array(_FITTINGS).T
+        if not one:
+            return cls(shares, mean, sd)
+        centre = float(shares @ mean)
+        spread = math.sqrt(float(shares @ (sd**2 + (mean - centre) ** 2)))
+        return cls(np.ones(1), np.array([centre]), np.array([spread]))
+
+
 class DescribedCoordinates:
     """Places z (n, d) of parameters theta (n, parameters) of a bar as made.
 
-    First those of a box (`shm.inference.coordinates`): log tension, a length that is open, springs
-    of the planes measured, a strand's bending factor; then the deviations as far as they are seen.
-    `wave_stiffness_n_m_rad` is EI p of a mode in the middle of those measured.
+    First those of a box (`shm.inference.coordinates`): log tension, a length that plates leave
+    open, springs of the planes measured, a strand's bending factor and shear; then the deviations
+    as far as they are seen, the last of them ln c. `wave_stiffness_n_m_rad` is EI p of a mode in
+    the middle of those measured. Of a strand whose factor is open, the factor takes all of c.
     """
 
     def __init__(
@@ -140,140 +198,217 @@ class DescribedCoordinates:
     ):
         self.model, self._hanger = model, model.hanger
         self.names = model.parameter_names
-        self.deviations = Deviations(model, calibration)
-        self._slips = model.is_strand and BENDING not in self.deviations.names
+        self.deviations = own = Deviations(model, calibration)
+        self._slips = model.is_strand and BENDING not in own.names
+        self._open = model.length_is_open
         planes = {mode.plane for test in tests for mode in test.regular_modes}
         self._felt = tuple(n for n in model.springs if _is_felt(model, n, planes))
         self.box = self._box()
         swaps = [pair for pair in model.swaps if set(pair) <= set(self._felt)]
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
-        # A factor that may be anything from 0.3 to 1 takes the part of c that frequencies see.
-        seen = [] if self._slips else [self._row_c()]
-        if isinstance(model.model, Beam3):
-            seen.append(self.deviations.row(section=1.0))
-        if any(test.added_mass is not None for test in tests):
-            seen.append(self.deviations.row(section=1.0, density=1.0))
-        self._seen = _basis(np.array(seen).reshape(len(seen), len(self.deviations.names)))
         self._reading = reading_of(tests)
-        self.dimension = len(self.box.names) + self._seen.shape[1]
+        taught = calibration is not None and LENGTH in calibration.names
+        fixed = _Ways(np.ones(1), np.zeros(1), np.zeros(1))
+        known = self._open or taught
+        self._ways = fixed if known else _Ways.of(self._hanger, self._reading is not None)
+        self._middle_way = fixed if known else _Ways.of(self._hanger, True)
+        others = []
+        if isinstance(model.model, Beam3) and not model.is_strand:
+            others.append(own.row(section=1.0))
+        if any(test.added_mass is not None for test in tests):
+            others.append(own.row(section=1.0, density=1.0))
+        self._others = _basis(np.array(others).reshape(len(others), len(own.names)))
+        self._row_c = own.row(**_C)
+        self._mean_c = float(sum(own.mean_of(name) * share for name, share in _C.items()))
+        rest = self._row_c - self._others @ (self._others.T @ self._row_c)
+        self._size_c = float(np.linalg.norm(rest))
+        self._sees_c = not self._slips
+        seen = self._others.shape[1]
+        self.dimension = len(self.box.names) + seen + self._sees_c
+        self._spread_c = np.hypot(self._size_c, 2 * self._ways.sd)
 
     def _box(self) -> Prior:
         bounds = {TENSION: tuple(np.log(self.model.bounds[TENSION]))}
-        if self.model.length_is_open:
+        if self._open:
             bounds[LENGTH] = self.model.bounds[LENGTH]
         bounds |= {name: self.model.bounds[name] for name in self._felt}
         if self._slips:
-            bounds[BENDING] = self.model.bounds[BENDING]
+            bounds[BENDING] = _EFFECTIVE_FACTOR
+        if SHEAR in self.names:
+            bounds[SHEAR] = self.model.bounds[SHEAR]
         lower, upper = np.array(list(bounds.values()), dtype=float).T
         return Prior(tuple(bounds), lower, upper)
 
-    def _row_c(self) -> FloatArray:
-        return self.deviations.row(
-            section=0.5, density=-0.5, modulus=0.5, theta_L=-2.0, bending_factor=0.5
-        )
+    # ------------------------------------------------ what is seen, and what is not
 
-    def _log_c(self, deviations: FloatArray) -> FloatArray:
-        """ln c (n,) of deviations (n, k), but for the bending factor's part."""
-        section, density, modulus, length = (
-            self.deviations.column(deviations, name) for name in (*_DEVIATIONS, LENGTH)
-        )
-        return np.asarray((section - density + modulus) / 2 - 2 * length)
+    def _observed(self, with_reading: bool) -> tuple[FloatArray, FloatArray]:
+        """Rows A (r, k + 1) by which x = (n, ln lambda) is seen, and their noise's sd (r,)."""
+        rows = [np.append(row, 0.0) for row in self._others.T]
+        if self._sees_c:
+            rest = self._row_c - self._others @ (self._others.T @ self._row_c)
+            rows.append(np.append(rest, -2.0))
+        noise = [0.0] * len(rows)
+        if with_reading and self._reading is not None:
+            rows.append(self._row_mass)
+            noise.append(self._reading.sd)
+        return np.array(rows).reshape(len(rows), len(self._row_mass)), np.array(noise)
 
     @property
     def _row_mass(self) -> FloatArray:
-        """ln(mu l^2): what stands between the tension and the apparent one."""
-        return self.deviations.row(section=1.0, density=1.0, theta_L=2.0)
+        """ln(mu l^2 lambda^2) by x: what stands between the tension and the apparent one."""
+        return np.append(self.deviations.row(**_MASS), 2.0)
 
     @property
-    def reading_sd(self) -> float:
-        """Of a measured tension about one predicted without what frequencies do not see."""
-        reading, unseen = self._reading, self._unseen_mass
-        return math.hypot(reading.sd, float(np.linalg.norm(unseen))) if reading else math.nan
+    def _mean_mass(self) -> float:
+        return float(sum(self.deviations.mean_of(name) * share for name, share in _MASS.items()))
+
+    def _gain(self, rows: FloatArray, noise: FloatArray, sd: float) -> FloatArray:
+        """How x follows what is seen (k + 1, r), by the normal's own regression."""
+        spread = np.append(np.ones(len(self._row_c)), sd**2)
+        inner = (rows * spread) @ rows.T + np.diag(noise**2)
+        return np.asarray((spread[:, None] * rows.T) @ np.linalg.pinv(inner, hermitian=True))
 
     @property
     def reading(self) -> TensionReading | None:
         return self._reading
 
     @property
-    def _unseen_mass(self) -> FloatArray:
-        row = self._row_mass
-        return np.asarray(row - self._seen @ (self._seen.T @ row))
+    def reading_sd(self) -> float:
+        """Of a measured tension about the one predicted at the middle of what is not seen."""
+        if self._reading is None:
+            return math.nan
+        sd = float(self._middle_way.sd[0])
+        rows, noise = self._observed(with_reading=False)
+        mass, spread = self._row_mass, np.append(np.ones(len(self._row_c)), sd**2)
+        left = mass - mass @ self._gain(rows, noise, sd) @ rows if len(rows) else mass
+        return math.hypot(self._reading.sd, math.sqrt(float(mass @ (spread * left))))
+
+    def _middle(self, seen: FloatArray) -> FloatArray:
+        """The mean of x (n, k + 1) given what is seen (n, r)."""
+        mean, sd = float(self._middle_way.mean[0]), float(self._middle_way.sd[0])
+        rows, noise = self._observed(with_reading=False)
+        centre = np.append(np.zeros(len(self._row_c)), mean)
+        return np.asarray(
+            centre + (seen - rows @ centre) @ self._gain(rows, noise, sd).T
+            if len(rows)
+            else np.tile(centre, (len(seen), 1))
+        )
+
+    def _drawn(self, inner: FloatArray, seen: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """x (n, k + 1) given what is seen (n, r), and the reading: by Matheron's rule."""
+        count = len(inner)
+        rows, noise = self._observed(with_reading=True)
+        if self._reading is not None:
+            nominal = math.log(self._hanger.nominal_tension_n)
+            off = math.log(self._reading.tension_n) - nominal - inner[:, 0] - self._mean_mass
+            seen = np.column_stack([seen, off])
+        way = self._way_of(seen, rng)
+        x = rng.standard_normal((count, len(self._row_mass)))
+        x[:, -1] = self._ways.mean[way] + self._ways.sd[way] * x[:, -1]
+        noisy = seen - x @ rows.T - noise * rng.standard_normal((count, len(noise)))
+        for index, sd in enumerate(self._ways.sd):
+            mine = way == index
+            x[mine] += noisy[mine] @ self._gain(rows, noise, float(sd)).T
+        return x
+
+    def _way_of(self, seen: FloatArray, rng: np.random.Generator) -> IntArray:
+        """Which of the ways of the effective length each draw (n,) goes, by what is seen of c."""
+        log = np.tile(np.log(self._ways.shares), (len(seen), 1))
+        if self._sees_c:
+            away = seen[:, [self._others.shape[1]]] + 2 * self._ways.mean
+            log = log - 0.5 * (away / self._spread_c) ** 2 - np.log(self._spread_c)
+        share = np.exp(log - log.max(axis=1, keepdims=True)).cumsum(axis=1)
+        return (share < rng.random((len(seen), 1)) * share[:, -1:]).sum(axis=1)
+
+    def _seen_of(self, z: FloatArray) -> FloatArray:
+        """What is seen (n, r) at deviates (n, r): c's own part by the quantiles of its mixture."""
+        if not self._sees_c:
+            return z
+        own = self._quantile_c(z[:, -1])
+        return np.column_stack([z[:, :-1], own])
+
+    def _table_c(self) -> tuple[FloatArray, FloatArray]:
+        """Places y of c's part beyond the others, and their normal quantiles."""
+        centre = -2 * self._ways.mean
+        reach = 9 * self._spread_c.max() + np.abs(centre).max()
+        y = np.linspace(-reach, reach, 4001)
+        below = ndtr((y[:, None] - centre) / self._spread_c) @ self._ways.shares
+        above = ndtr((centre - y[:, None]) / self._spread_c) @ self._ways.shares
+        z = np.where(below < 0.5, ndtri(below.clip(1e-300)), -ndtri(above.clip(1e-300)))
+        kept = np.abs(z) < _FARTHEST + 0.5
+        return y[kept], z[kept]
+
+    def _quantile_c(self, z: FloatArray) -> FloatArray:
+        if len(self._ways.shares) == 1:
+            return np.asarray(-2 * self._ways.mean[0] + self._spread_c[0] * z)
+        return np.asarray(self._curves[0](z.clip(-_FARTHEST, _FARTHEST)))
+
+    def _place_c(self, y: FloatArray) -> FloatArray:
+        if len(self._ways.shares) == 1:
+            return np.asarray((y + 2 * self._ways.mean[0]) / self._spread_c[0])
+        low, high = self._curves[0]([-_FARTHEST, _FARTHEST])
+        return np.asarray(self._curves[1](y.clip(low, high)))
+
+    @cached_property
+    def _curves(self) -> tuple[PchipInterpolator, PchipInterpolator]:
+        y, z = self._table_c()
+        return PchipInterpolator(z, y), PchipInterpolator(y, z)
+
+    # ------------------------------------------------ places and parameters
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Parameters (n, parameters), what is not seen at its middle."""
-        inner, seen = self._split(z)
-        return self._assembled(inner, seen @ self._seen.T, None)
+        inner, deviates = self._split(z)
+        return self._assembled(inner, self._middle(self._seen_of(deviates)), None)
 
     def finished(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Draws of all parameters (n, parameters): what is not seen is drawn."""
-        inner, seen = self._split(z)
-        inner = self._inner.unfold(inner, rng)
-        n = seen @ self._seen.T
-        rest = rng.standard_normal(n.shape)
-        n = n + self._given_reading(inner, n, rest - rest @ self._seen @ self._seen.T, rng)
-        return self._assembled(inner, n, rng)
-
-    def _given_reading(
-        self, inner: FloatArray, n: FloatArray, rest: FloatArray, rng: np.random.Generator
-    ) -> FloatArray:
-        """Unseen deviates (n, k) with their part along the mass as a measured tension has it."""
-        reading, along = self._reading, self._unseen_mass
-        size = float(np.linalg.norm(along))
-        if reading is None or size == 0:
-            return rest
-        along = along / size
-        predicted = self._log_tension(inner, n)
-        off = math.log(reading.tension_n) - predicted
-        variance = size**2 + reading.sd**2
-        mean, sd = size * off / variance, reading.sd / math.sqrt(variance)
-        drawn = mean + sd * rng.standard_normal(len(rest))
-        return np.asarray(rest + (drawn - rest @ along)[:, None] * along)
-
-    def _log_tension(self, inner: FloatArray, n: FloatArray) -> FloatArray:
-        mass = self._row_mass
-        mean = self.deviations.mean
-        fixed = sum(
-            share * mean[self.deviations.names.index(name)]
-            for name, share in ((SECTION, 1.0), (DENSITY, 1.0), (LENGTH, 2.0))
-            if name in self.deviations.names
-        )
-        nominal = math.log(self._hanger.nominal_tension_n)
-        return np.asarray(nominal + inner[:, 0] + fixed + n @ mass)
+        inner, deviates = self._split(z)
+        inner, seen = self._inner.unfold(inner, rng), self._seen_of(deviates)
+        theta = self._assembled(inner, self._drawn(inner, seen, rng), rng)
+        if self._slips:
+            column, (low, high) = self.names.index(BENDING), BENDING_FACTOR
+            for _ in range(_MOST_REDRAWN):
+                out = np.flatnonzero((theta[:, column] < low) | (theta[:, column] > high))
+                if not len(out):
+                    break
+                again = self._drawn(inner[out], seen[out], rng)
+                theta[out] = self._assembled(inner[out], again, rng)
+        return theta
 
     def tension_n(self, z: FloatArray) -> FloatArray:
         """The tension (n,) with what is not seen at its middle."""
-        inner, seen = self._split(z)
-        return np.asarray(np.exp(self._log_tension(inner, seen @ self._seen.T)))
+        return self.theta(z)[:, 0] * self._hanger.nominal_tension_n
 
     def _assembled(
-        self, inner: FloatArray, n: FloatArray, rng: np.random.Generator | None
+        self, inner: FloatArray, x: FloatArray, rng: np.random.Generator | None
     ) -> FloatArray:
-        """Parameters (n, parameters) of the box's and of deviates n (n, k)."""
-        own = self.deviations
-        deviations = own.mean + n @ own.factor.T
+        """Parameters (n, parameters) of the box's and of x = (n, ln lambda) (n, k + 1)."""
+        own, stated = self.deviations, self._hanger.bending_stiffness_factor
+        deviations = own.mean + x[:, :-1] @ own.factor.T
         section, density, modulus = (own.column(deviations, name) for name in _DEVIATIONS)
+        taped = np.exp(own.column(deviations, LENGTH) + x[:, -1])
         box = dict(zip(self.box.names, inner.T, strict=True))
-        length = box.get(LENGTH, np.exp(own.column(deviations, LENGTH)))
-        stated = self._hanger.bending_stiffness_factor
         if self._slips:
-            slip = box[BENDING] * np.exp(-2 * self._log_c(deviations))
+            log_c = (section - density + modulus) / 2 - 2 * np.log(taped)
+            slip = box[BENDING] * np.exp(-2 * log_c)
         else:
             slip = stated * np.exp(own.column(deviations, BENDING))
         stiffness = np.exp(2 * section + modulus) * slip / stated
-        taped = np.ones(len(n)) if self.model.length_is_open else length
         columns = {
-            TENSION: np.exp(self._log_tension(inner, n)) / self._hanger.nominal_tension_n,
-            LENGTH: length,
+            TENSION: np.exp(inner[:, 0] + section + density) * taped**2,
+            LENGTH: box.get(LENGTH, taped),
             SECTION: section,
             DENSITY: density,
             MODULUS: modulus,
             BENDING: slip,
+            SHEAR: box.get(SHEAR, slip),
         }
         for name in self.model.springs:
             low, high = self.model.bounds[name]
             known = box.get(name)
             if known is None:
-                known = np.full(len(n), high) if rng is None else rng.uniform(low, high, len(n))
+                known = np.full(len(x), high) if rng is None else rng.uniform(low, high, len(x))
             columns[name] = known + np.log10(stiffness / taped)
         return np.column_stack([columns[name] for name in self.names])
 
@@ -281,42 +416,39 @@ class DescribedCoordinates:
         """Places (n, d), inside the fold, of parameters (n, parameters)."""
         values = dict(zip(self.names, theta.T, strict=True))
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
-        length, slip = values[LENGTH], values.get(BENDING, np.full(len(theta), stated))
-        logs = {
-            SECTION: values[SECTION],
-            DENSITY: values[DENSITY],
-            MODULUS: values[MODULUS],
-            LENGTH: np.log(length),
-            BENDING: np.log(slip / stated),
-        }
-        deviations = np.column_stack([logs[name] for name in own.names])
-        n = (deviations - own.mean) @ np.linalg.pinv(own.factor).T
-        taped = np.ones(len(theta)) if self.model.length_is_open else length
+        taped = np.ones(len(theta)) if self._open else values[LENGTH]
+        slip = values.get(BENDING, np.full(len(theta), stated))
+        logs = {name: values[name] for name in _DEVIATIONS} | {BENDING: np.log(slip / stated)}
+        deviations = np.column_stack(
+            [logs.get(name, np.full(len(theta), own.mean_of(name))) for name in own.names]
+        )
+        others = (deviations - own.mean) @ np.linalg.pinv(own.factor).T @ self._others
         stiffness = np.exp(2 * values[SECTION] + values[MODULUS]) * slip / stated
         mass = np.exp(values[SECTION] + values[DENSITY])
-        box = {TENSION: np.log(values[TENSION] / (mass * taped**2)), LENGTH: length}
-        box[BENDING] = slip * np.exp(2 * self._log_c(deviations))
+        log_c = np.log(stiffness / mass) / 2 - 2 * np.log(taped)
+        box = {TENSION: np.log(values[TENSION] / (mass * taped**2)), LENGTH: values[LENGTH]}
+        box |= {BENDING: stated * np.exp(2 * log_c), SHEAR: values.get(SHEAR, slip)}
         box |= {name: values[name] - np.log10(stiffness / taped) for name in self._felt}
         inner = np.column_stack([box[name] for name in self.box.names])
         inner = inner.clip(self.box.lower, self.box.upper)
-        return np.hstack([self._inner.places(inner), n @ self._seen])
+        parts = [self._inner.places(inner), others]
+        if self._sees_c:
+            seen = others @ (self._others.T @ self._row_c)
+            parts.append(self._place_c(log_c - self._mean_c - seen)[:, None])
+        return np.hstack(parts)
 
     def shared(self, names: Sequence[str], samples: FloatArray) -> tuple[IntArray, FloatArray]:
         """The columns of z that draws (n, parameters) of any class know, and their places there:
         the apparent tension's, and those of the deviations.
         """
         known = dict(zip(names, samples.T, strict=True))
-        middle = [sum(self.model.bounds[name]) / 2 for name in self.names]
-        theta = np.column_stack(
-            [
-                known[name] if name in known and name not in self.model.springs else
-                np.full(len(samples), usual)
-                for name, usual in zip(self.names, middle, strict=True)
-            ]
-        )
-        z = self.places(theta)
-        columns = np.append(0, np.arange(len(self.box.names), self.dimension))
-        return columns, z[:, columns]
+        columns = []
+        for name in self.names:
+            usual = np.full(len(samples), sum(self.model.bounds[name]) / 2)
+            columns.append(usual if name in self.model.springs else known.get(name, usual))
+        z = self.places(np.column_stack(columns))
+        kept = np.append(0, np.arange(len(self.box.names), self.dimension))
+        return kept, z[:, kept]
 
     def fold(self, z: FloatArray) -> FloatArray:
         """`z` (n, d) with each point replaced by its copy inside the fold."""
@@ -330,24 +462,24 @@ class DescribedCoordinates:
 
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Places (n, d) from the folded prior."""
-        return np.hstack([self._inner.draw_prior(n, rng), self._draw_seen(n, rng)])
+        return np.hstack([self._inner.draw_prior(n, rng), self._deviates(n, rng)])
 
     def draw_felt(self, n: int, rng: np.random.Generator) -> FloatArray:
         """The same with springs as stiff as the bar, within a few times."""
-        return np.hstack([self._inner.draw_felt(n, rng), self._draw_seen(n, rng)])
+        return np.hstack([self._inner.draw_felt(n, rng), self._deviates(n, rng)])
 
     def smooth(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shares of the box's ranges (n, b), in which the prior is flat, and deviates (n, s)."""
-        inner, seen = self._split(z)
-        return (inner - self.box.lower) / (self.box.upper - self.box.lower), seen
+        inner, deviates = self._split(z)
+        return (inner - self.box.lower) / (self.box.upper - self.box.lower), deviates
 
-    def of_smooth(self, shares: FloatArray, seen: FloatArray) -> FloatArray:
+    def of_smooth(self, shares: FloatArray, deviates: FloatArray) -> FloatArray:
         """Parameters (n, parameters) of these, what is not seen at its middle."""
         inner = self.box.lower + (self.box.upper - self.box.lower) * shares
-        return self._assembled(inner, seen @ self._seen.T, None)
+        return self._assembled(inner, self._middle(self._seen_of(deviates)), None)
 
-    def _draw_seen(self, n: int, rng: np.random.Generator) -> FloatArray:
-        return rng.standard_normal((n, self._seen.shape[1]))
+    def _deviates(self, n: int, rng: np.random.Generator) -> FloatArray:
+        return rng.standard_normal((n, self.dimension - len(self.box.names)))
 
     def _split(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         count = len(self.box.names)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models import Model
+from shm.models import AsMade, Model
+from shm.models.as_made import RESTRAINT
 from shm.inference.hint import hinted
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
@@ -78,8 +79,10 @@ def select(
     options: UpdateOptions | None = None,
     progress: Progress = silent,
 ) -> Selection:
-    """The posteriors of all `models`, most probable first, the models equally probable before.
+    """The posteriors of all `models`, most probable first.
 
+    Before any data they are equally probable; with the priors of a description, a class that holds
+    its ends fast is as probable as all ends being stiffer than the springs of other classes reach.
     Expensive classes come last and start from the likeliest of the cheap ones. Thesis (4.15) to
     (4.17). Raises UsageError where no model is given, BadInput as `update` does.
     """
@@ -88,6 +91,22 @@ def select(
     cheap = [update(tests, m, options, progress) for m in models if not m.expensive]
     best = max(cheap, key=lambda posterior: posterior.log_evidence, default=None)
     costly = [update(tests, m, options, progress, best) for m in models if m.expensive]
-    posteriors = sorted([*cheap, *costly], key=lambda posterior: -posterior.log_evidence)
-    weights = normalised(np.array([posterior.log_evidence for posterior in posteriors]))
-    return Selection(tuple(posteriors), tuple(float(weight) for weight in weights))
+    prior = {model.name: log_prior(model, tests) for model in models}
+    found = [*cheap, *costly]
+    log = np.array([each.log_evidence + prior[each.model] for each in found])
+    order = np.argsort(-log, kind="stable")
+    weights = normalised(log[order])
+    return Selection(tuple(found[k] for k in order), tuple(float(weight) for weight in weights))
+
+
+def log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
+    """Log of how probable a class is before any data, beside one of springs.
+
+    No end is perfectly clamped: a rigid end stands for springs in the decade beyond `RESTRAINT`, as
+    probable as any decade within it.
+    """
+    if not isinstance(model, AsMade) or model.springs:
+        return 0.0
+    planes = {mode.plane for test in tests for mode in test.regular_modes}
+    decades = np.log10(RESTRAINT[1] / RESTRAINT[0])
+    return float(-2 * len(planes) * np.log(1 + decades))

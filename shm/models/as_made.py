@@ -29,7 +29,8 @@ from shm.models.conditions import Conditions
 from shm.values import AddedMass, FloatArray, Hanger, ModalTest, Plane
 
 TENSION, LENGTH = "theta_F", "theta_L"
-SECTION, DENSITY, MODULUS, BENDING = "section", "density", "modulus", "bending_factor"
+SECTION, DENSITY, MODULUS = "section", "density", "modulus"
+BENDING, SHEAR = "bending_factor", "shear_share"
 
 TENSION_RATIO = (0.02, 5.0)
 """Of the nominal tension: from slack to what no hanger was designed for."""
@@ -41,6 +42,9 @@ the pinned bar's; above 1000 within 0.2 % of the clamped one's."""
 BENDING_FACTOR = (0.3, 1.0)
 """Of a strand at the small amplitudes of a test (Papailiou 1997, IEEE Trans. Power Delivery 12)."""
 
+SHEAR_SHARE = (0.0, 1.5)
+"""Of a strand, over a solid bar's shear: none, as of wires that each bend alone, to more."""
+
 _MOST_SD = 6.0
 
 
@@ -50,7 +54,7 @@ class AsMade(Model):
     They stand behind its own: `theta_F` (true over nominal tension), `theta_L` (true over described
     length; where end plates leave the effective length open, effective over described), springs in
     N m/rad, then `section`, `density` and `modulus` (logarithms of true over described area, density
-    and elastic modulus) and of a strand its `bending_factor`.
+    and elastic modulus) and of a strand its `bending_factor` and, in beam3, its `shear_share`.
     """
 
     priors = DESCRIPTION
@@ -74,6 +78,8 @@ class AsMade(Model):
         bounds |= {name: (-_MOST_SD * sd, _MOST_SD * sd) for name, sd in deviations.items()}
         if self.is_strand:
             bounds[BENDING] = BENDING_FACTOR
+            if isinstance(model, Beam3):
+                bounds[SHEAR] = SHEAR_SHARE
         self.bounds = bounds
 
     @property
@@ -138,7 +144,8 @@ class AsMade(Model):
             conditions = replace(conditions, added_mass=AddedMass(kg, mass.x_m))
         if isinstance(self.model, Beam3) and mass is None:
             section = np.exp(self._column(theta, SECTION))
-            found = self.model.frequencies_of_section(own, section, modes)
+            shear = self._column(theta, SHEAR) if self.is_strand else np.ones(len(theta))
+            found = self.model.frequencies_of_section(own, section, shear, modes)
         else:
             found = self.model.frequencies_at(own, modes, conditions)
         return found * factor[:, None, None]

@@ -8,6 +8,9 @@ from shm.models import stepped, tensioned_beam, timoshenko_beam
 from shm.models.base import Model
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
+_NO_SHEAR = 1e-9
+"""A share of shear that changes no frequency by its rounding."""
+
 
 class Beam(Model):
     """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends.
@@ -130,18 +133,18 @@ class Beam3(Beam2):
 
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
-        if hanger.kind == "strand":
-            return "its section shears as a solid bar's, not as wires that slip."
         return "it does not model turnbuckles." if hanger.turnbuckles else super().unfit(hanger)
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        return self.frequencies_of_section(theta, np.ones(len(theta)), modes)
+        one = np.ones(len(theta))
+        return self.frequencies_of_section(theta, one, one, modes)
 
     def frequencies_of_section(
-        self, theta: FloatArray, section: FloatArray, modes: int
+        self, theta: FloatArray, section: FloatArray, shear: FloatArray, modes: int
     ) -> FloatArray:
         """Frequencies (n, 2, modes) of bars of the described bending stiffness and mass whose area
-        is `section` (n,) times the described one: it changes shear and rotary inertia alone.
+        is `section` (n,) times the described one, which changes shear and rotary inertia alone, and
+        whose shear is `shear` (n,) times the theory's.
         """
         hanger, nu = self.hanger, self.hanger.poissons_ratio
         shear_modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
@@ -152,7 +155,7 @@ class Beam3(Beam2):
             self._tension_n(theta)[:, None],
             np.asarray(hanger.bending_stiffness_n_m2),
             np.asarray(hanger.mass_per_length_kg_m),
-            coefficient * shear_modulus_pa * hanger.area_m2 / section[:, None],
+            coefficient * shear_modulus_pa * hanger.area_m2 / (section * shear + _NO_SHEAR)[:, None],
             np.sqrt(hanger.second_moment_m4 / hanger.area_m2 * section)[:, None],
             deck,
             arch,

@@ -63,6 +63,8 @@ class Scatter:
     `tension` is how far the tension may be from the nominal one where that was weighed or measured;
     infinite where the nominal one says next to nothing. `bending_factor` is that of a strand's
     stated `bending_stiffness_factor`; NaN: anything from 0.3 to 1 (Papailiou 1997).
+    `effective_length` is by which the length that swings may differ from the taped one, as forks,
+    sockets or supports leave it open; NaN: as `shm.inference.described` has it.
     """
 
     section: float = 0.01
@@ -72,6 +74,7 @@ class Scatter:
     along: float = 0.001
     tension: float = math.inf
     bending_factor: float = NAN
+    effective_length: float = NAN
 
 
 @dataclass(frozen=True)

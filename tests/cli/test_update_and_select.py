@@ -101,7 +101,7 @@ def _clamped_string(
 
 @pytest.mark.parametrize(
     ("unit", "diameter_m", "length_m", "tension_n"),
-    [("N", 0.3e-3, 0.65, 5.4), ("kN", 0.012, 6.0, 20e3), ("MN", 0.2, 100.0, 12e6)],
+    [("N", 0.5e-3, 0.65, 5.4), ("kN", 0.012, 6.0, 20e3), ("MN", 0.2, 100.0, 12e6)],
     ids=["string", "tie rod", "cable"],
 )
 def test_tensions_are_told_in_the_unit_that_fits_them(

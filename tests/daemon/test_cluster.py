@@ -1,4 +1,4 @@
-"""Steps on a Dask cluster: the same to the bit, whatever dies meanwhile."""
+"""Steps on a Dask cluster: on one machine the same to the bit, whatever dies meanwhile."""
 
 from __future__ import annotations
 

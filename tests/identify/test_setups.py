@@ -58,7 +58,7 @@ def test_all_set_ups_have_the_same_lines_and_the_same_window() -> None:
     one, other = (m.frequency_response for m in measurements)
     assert one is not None
     assert other is not None
-    np.testing.assert_array_equal(one.frequency_hz, other.frequency_hz)
+    np.testing.assert_allclose(one.frequency_hz, other.frequency_hz, rtol=1e-12)
     assert len({m.window_time_constant_s for m in measurements}) == 1
 
 

@@ -75,9 +75,8 @@ def test_a_string_whose_end_moves_with_a_mass() -> None:
     assert abs(roots[own] - support_hz) < 0.1
     hanger = supported(string(), 0, 1 / n_m, mass_kg)
     np.testing.assert_allclose(frequencies_hz(hanger, 5)[0, 0], expected, rtol=1e-3)
-    np.testing.assert_array_equal(
-        solve(hanger, 5, np.array([6.0])).frequency_hz, frequencies_hz(hanger, 5)
-    )
+    with_shapes = solve(hanger, 5, np.array([6.0])).frequency_hz
+    np.testing.assert_allclose(with_shapes, frequencies_hz(hanger, 5), rtol=1e-10)
 
 
 def test_a_support_that_does_not_give_way_holds_whatever_its_mass() -> None:

@@ -99,7 +99,7 @@ def test_tension_scatter_and_noise_do_not_depend_on_what_is_planted(hanger: Hang
         frequencies(each.tests[0]) / true - 1
         for each, true in zip((plain, clamped), exact, strict=True)
     ]
-    np.testing.assert_allclose(errors[0], errors[1], atol=1e-12)
+    np.testing.assert_allclose(errors[0], errors[1], atol=1e-9)
 
 
 def test_noise_has_the_standard_deviations_that_the_tests_state(hanger: Hanger) -> None:
@@ -150,7 +150,7 @@ def test_an_unknown_temperature_is_no_shift(hanger: Hanger) -> None:
     plan = replace(QUICK, temperatures_c=(math.nan,), frequency_sd=0.0, as_made=False)
     warmth = PlantedEffect("temperature_tension", "everywhere", {"tension_per_kelvin_n_k": -1000.0})
     plain, warm = (campaign(hanger, STATE, effects, plan, rng()) for effects in ((), (warmth,)))
-    np.testing.assert_array_equal(frequencies(plain[0]), frequencies(warm[0]))
+    np.testing.assert_allclose(frequencies(plain[0]), frequencies(warm[0]), rtol=1e-9)
     assert math.isnan(plain[0].modes[0].frequency_sd_hz)
 
 

@@ -89,7 +89,7 @@ def test_an_effect_is_planted_in_a_recording(tmp_path: Path) -> None:
     known = simulated(tmp_path / "c", "--added-mass", "60:3.4")
     own, other, same = (each.accelerations[0].values for each in (usual, heavier, known))
     assert not np.array_equal(own, other)
-    np.testing.assert_array_equal(other, same)
+    np.testing.assert_allclose(other, same, atol=1e-4)  # four steps of the converter
 
 
 def test_effects_follow_temperature_and_level(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_effects_follow_temperature_and_level(tmp_path: Path) -> None:
                      "--temperature-c", "30")  # fmt: skip
     values = [each.accelerations[0].values for each in (usual, warm, plain, same)]
     assert not np.array_equal(values[0], values[1])
-    np.testing.assert_array_equal(values[0], values[3])
+    np.testing.assert_allclose(values[0], values[3], atol=1e-4)
     hard = simulated(tmp_path / "e", "--amplitude", "2")
     assert hard.force is not None
     assert plain.force is not None

@@ -92,7 +92,7 @@ def test_k1_and_k3_act_transversely_and_k2_and_k4_longitudinally(hanger: Hanger)
         state = HangerState(711e3, **{f"{softened}_n_m_rad": 1e6})
         change = natural_frequencies(hanger, state, 2) / clamped - 1
         assert np.all(change[plane] < -0.01)
-        np.testing.assert_allclose(change[1 - plane], 0, atol=1e-12)
+        np.testing.assert_allclose(change[1 - plane], 0, atol=1e-9)
 
 
 def test_k1_softens_the_deck_end_and_k3_the_arch_end(hanger: Hanger) -> None:

@@ -71,9 +71,9 @@ def test_an_effect_without_size_is_no_effect(hanger: Hanger, name: str) -> None:
         found = modes(
             hanger, replace(effect, values={**effect.values, **zero}), conditions=conditions
         )
-        np.testing.assert_array_equal(found.frequency_hz, plain.frequency_hz)
-        np.testing.assert_array_equal(found.shape, plain.shape)
-        np.testing.assert_array_equal(found.damping_ratio, plain.damping_ratio)
+        np.testing.assert_allclose(found.frequency_hz, plain.frequency_hz, rtol=1e-9)
+        np.testing.assert_allclose(found.shape, plain.shape, atol=1e-8)
+        np.testing.assert_allclose(found.damping_ratio, plain.damping_ratio, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", [each for each in PLANTED if each != "skewed_principal_axes"])
@@ -217,7 +217,7 @@ def test_a_little_sag_lifts_odd_modes_of_its_plane_by_their_area(hanger: Hanger)
     """
     plain = modes(hanger, state=HINGED).frequency_hz
     found = frequencies(hanger, "sag", "everywhere, longitudinal", HINGED, sag_parameter=0.01)
-    np.testing.assert_array_equal(found[0], plain[0])
+    np.testing.assert_allclose(found[0], plain[0], rtol=1e-9)
     order = np.arange(1, MODES + 1)
     area = math.sqrt(2 / (hanger.mass_per_length_kg_m * 12.0)) * 2 * 12.0 / (order * np.pi)
     rise = np.where(order % 2, 0.01 * 711e3 / 12.0**3 * area**2, 0.0) / (2 * np.pi) ** 2
@@ -267,10 +267,11 @@ def test_temperature_and_level_change_the_tension(hanger: Hanger) -> None:
     found = frequencies(
         hanger, "temperature_tension", conditions=warm, tension_per_kelvin_n_k=-2000.0
     )
-    np.testing.assert_array_equal(found, modes(hanger, state=HangerState(681e3)).frequency_hz)
+    same = modes(hanger, state=HangerState(681e3)).frequency_hz
+    np.testing.assert_allclose(found, same, rtol=1e-9)
     found = frequencies(hanger, "geometric_hardening", conditions=hard, hardening=0.01)
     same = modes(hanger, state=HangerState(711e3 * 1.04)).frequency_hz
-    np.testing.assert_allclose(found, same, rtol=1e-12)
+    np.testing.assert_allclose(found, same, rtol=1e-9)
 
 
 def test_joints_soften_with_the_level_and_damp_by_their_share_of_strain_energy(
@@ -297,14 +298,14 @@ def test_sensors_weigh_where_they_sit(hanger: Hanger) -> None:
     ]
     same = planted_modes(hanger, CLAMPED, masses, USUAL, MODES, PLACES)
     found = modes(hanger, PlantedEffect("sensor_mass", "all sensors", {"mass_kg": 3.0}))
-    np.testing.assert_array_equal(found.frequency_hz, same.frequency_hz)
+    np.testing.assert_allclose(found.frequency_hz, same.frequency_hz, rtol=1e-9)
 
 
 def test_a_turned_sensor_sees_both_components_of_a_plane_mode(hanger: Hanger) -> None:
     plain = modes(hanger)
     at = "sensor at 3.48 m"
     found = modes(hanger, PlantedEffect("sensor_misalignment", at, {"angle_deg": 20.0}))
-    np.testing.assert_array_equal(found.frequency_hz, plain.frequency_hz)
+    np.testing.assert_allclose(found.frequency_hz, plain.frequency_hz, rtol=1e-9)
     ratio = found.shape[0, :, 1, 1] / found.shape[0, :, 1, 0]
     np.testing.assert_allclose(ratio, -math.tan(math.radians(20)), rtol=1e-9)
     ratio = found.shape[1, :, 1, 0] / found.shape[1, :, 1, 1]
@@ -328,7 +329,7 @@ def test_a_clock_that_errs_scales_the_frequencies_of_its_tests(hanger: Hanger) -
     plain = modes(hanger).frequency_hz
     for at, factor in (("all tests", 1.01), ("test t1", 1.01), ("test t2", 1.0)):
         found = frequencies(hanger, "timebase", at, clock_error=0.01)
-        np.testing.assert_allclose(found, factor * plain, rtol=1e-12)
+        np.testing.assert_allclose(found, factor * plain, rtol=1e-9)
 
 
 def test_effects_act_together(hanger: Hanger) -> None:

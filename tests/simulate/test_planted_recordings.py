@@ -120,7 +120,8 @@ def test_a_known_mass_is_clamped_on(hanger: Hanger) -> None:
     conditions = TestConditions(added_mass=AddedMass(60.0, 3.4))
     found = hammer_test(hanger, STATE, PLAN, np.random.default_rng(1), conditions=conditions)
     same = rung(hanger, EFFECTS[0])
-    np.testing.assert_array_equal(found.accelerations[0].values, same.accelerations[0].values)
+    values = (made.accelerations[0].values for made in (found, same))
+    np.testing.assert_allclose(*values, atol=1e-4)  # four steps of the converter
 
 
 def test_a_hammer_beyond_the_end_is_refused(hanger: Hanger) -> None:

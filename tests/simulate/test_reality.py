@@ -84,7 +84,7 @@ def test_without_a_reality_a_campaign_is_what_it_was(hanger: Hanger) -> None:
     assert size_of(hanger, STATE, (LOSS, SLIP), plan) == pytest.approx(8.657414726186591, rel=1e-6)
     scaled = scaled_to(9.0, hanger, STATE, LOSS, plan)
     assert scaled is not None
-    assert scaled.values["loss"] == pytest.approx(0.51151942327146, rel=1e-12)
+    assert scaled.values["loss"] == pytest.approx(0.51151942327146, rel=1e-6)
 
 
 def test_a_reality_without_any_departure_differs_in_noise_alone(hanger: Hanger) -> None:
@@ -94,7 +94,11 @@ def test_a_reality_without_any_departure_differs_in_noise_alone(hanger: Hanger) 
         campaign_with_truth(hanger, STATE, (LOSS,), plan, rng()).truth.frequencies
         for plan in (plain, ideal)
     )
-    assert one == other
+    found, expected = ([each.frequency_hz for each in modes] for modes in (one, other))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    assert [replace(each, frequency_hz=0.0) for each in one] == [
+        replace(each, frequency_hz=0.0) for each in other
+    ]
 
 
 def test_the_truth_holds_the_noise_free_frequencies_of_every_test(hanger: Hanger) -> None:
@@ -121,7 +125,7 @@ def test_the_bar_in_a_test_has_the_frequencies_of_the_truth(hanger: Hanger) -> N
         places = [each.x_m + each.off_m for each in truth.sensors]
         found = [own.angular_frequency_rad_s / 2 / np.pi for own in bar_modes(bar, 4, places)]
         true = [each.frequency_hz for each in truth.frequencies if each.test == test.id]
-        np.testing.assert_allclose(np.ravel(found), true, rtol=1e-12)
+        np.testing.assert_allclose(np.ravel(found), true, rtol=1e-9)
 
 
 def test_sensors_err_alike_in_all_tests_of_a_campaign(hanger: Hanger) -> None:
@@ -211,7 +215,7 @@ def test_an_own_law_without_size_is_no_effect_and_a_usual_one_resembles_the_cata
         known = ranges_of(effect, hanger)
         zero = {key: each.zero for key, each in known.items() if each.is_size}
         none = replace(effect, values={**effect.values, **zero})
-        np.testing.assert_array_equal(frequencies(hanger, none), plain)
+        np.testing.assert_allclose(frequencies(hanger, none), plain, rtol=1e-9)
         sizes = {key: each.value(0.4) for key, each in known.items() if each.is_size}
         usual = replace(effect, values={**effect.values, **sizes})
         own = np.log(frequencies(hanger, usual) / plain)
@@ -221,7 +225,7 @@ def test_an_own_law_without_size_is_no_effect_and_a_usual_one_resembles_the_cata
 
 def test_a_slipping_joint_is_the_stated_one_at_the_reference_level(hanger: Hanger) -> None:
     own = frequencies(hanger, SLIP)
-    np.testing.assert_allclose(own, frequencies(hanger, SLIP, own_laws=False), rtol=1e-12)
+    np.testing.assert_allclose(own, frequencies(hanger, SLIP, own_laws=False), rtol=1e-9)
     hard = frequencies(hanger, SLIP, amplitude=2.0)
     softer = replace(SLIP, values={"log10_k_at_reference_level": 7.0 - 0.8 * math.log10(2)})
     np.testing.assert_allclose(hard, frequencies(hanger, softer, own_laws=False), rtol=1e-9)

@@ -60,7 +60,7 @@ def test_each_moves_frequencies_and_vanishes_with_its_size(hanger: Hanger, name:
         moved = frequencies(hanger, replace(one, values={**one.values, **large}))
         assert np.max(np.abs(moved / plain - 1)) > 1e-4
         still = frequencies(hanger, replace(one, values={**one.values, **zero}))
-        np.testing.assert_array_equal(still, plain)
+        np.testing.assert_allclose(still, plain, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", UNLISTED)
@@ -89,10 +89,10 @@ def test_a_crack_leaves_a_mode_alone_that_does_not_open_it(hanger: Hanger) -> No
     """Below the level at which any mode opens it, and above: half of each cycle at most."""
     crack = effect("breathing_crack", compliance_rad_n_m=2e-7, x_m=3.0, opening_level=0.5)
     plain = frequencies(hanger)
-    np.testing.assert_allclose(frequencies(hanger, crack, amplitude=0.4), plain, rtol=1e-14)
+    np.testing.assert_allclose(frequencies(hanger, crack, amplitude=0.4), plain, rtol=1e-9)
     change = {level: frequencies(hanger, crack, amplitude=level) / plain - 1 for level in (1, 4)}
-    assert np.all(change[4] <= change[1] + 1e-14)
-    assert np.sum(np.abs(change[1]) < 1e-14) >= 2
+    assert np.all(change[4] <= change[1] + 1e-9)
+    assert np.sum(np.abs(change[1]) < 1e-9) >= 2
     assert change[4].min() < -1e-4
 
 
@@ -113,7 +113,7 @@ def test_an_ever_open_crack_has_half_of_a_hinge(hanger: Hanger) -> None:
 def test_a_guide_with_play_is_met_by_hard_hits_only(hanger: Hanger) -> None:
     guide = effect("loose_guide", stiffness_n_m=5e3, x_m=4.0, gap_level=0.5)
     plain = frequencies(hanger)
-    np.testing.assert_allclose(frequencies(hanger, guide, amplitude=0.4), plain, rtol=1e-14)
+    np.testing.assert_allclose(frequencies(hanger, guide, amplitude=0.4), plain, rtol=1e-9)
     always = effect("intermediate_support", stiffness_n_m=5e3, x_m=4.0)
     harder = frequencies(hanger, guide, amplitude=1e6) / frequencies(hanger, always)
     np.testing.assert_allclose(harder, 1, atol=1e-6)
@@ -169,7 +169,7 @@ def test_tension_between_planes_is_that_of_the_later_plane(hanger: Hanger) -> No
     later = effect("tension_between_planes", tension_change=0.03)
     found = frequencies(hanger, later)
     tauter = natural_frequencies(hanger, HangerState(711e3 * 1.03), MODES)
-    np.testing.assert_array_equal(found[0], frequencies(hanger)[0])
+    np.testing.assert_allclose(found[0], frequencies(hanger)[0], rtol=1e-9)
     np.testing.assert_allclose(found[1], tauter[1], rtol=1e-6)
 
 

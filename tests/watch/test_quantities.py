@@ -104,7 +104,7 @@ def test_values_and_coordinates_rise_strictly_through_the_baseline() -> None:
         for each in watched_quantities(baseline(theta), HANGER_3, BOTH):
             assert np.all(np.diff(each.coordinates) > 0)
             assert np.all(np.diff(each.values) > 0)
-            assert value_at(each, 0.0) == each.baseline
+            assert value_at(each, 0.0) == pytest.approx(each.baseline, rel=1e-12)
 
 
 def test_a_value_stops_at_the_end_of_its_table() -> None:
@@ -185,6 +185,6 @@ def test_a_description_whose_nominal_tension_was_corrected_keeps_the_tension() -
     known = baseline(SPRUNG)
     corrected = replace(HANGER_3, nominal_tension_n=2 * HANGER_3.nominal_tension_n)
     before, after = (watched_quantities(known, each, BOTH) for each in (HANGER_3, corrected))
-    assert after[0].baseline == before[0].baseline
+    assert after[0].baseline == pytest.approx(before[0].baseline, rel=1e-12)
     for one, other in zip(before[1:], after[1:], strict=True):
         np.testing.assert_allclose(one.coordinates, other.coordinates, atol=1e-9)

@@ -244,7 +244,7 @@ def test_a_change_between_two_tests_frees_the_level_at_the_later_one() -> None:
     between, after = readings[10].time - timedelta(days=2), readings[-1].time + timedelta(days=1)
     exact = states(readings, [TENSION], changes=[readings[10].time], options=OPTIONS)
     history = states(readings, [TENSION], changes=[between, after], options=OPTIONS)
-    assert np.array_equal(history.filtered_mean, exact.filtered_mean)
+    np.testing.assert_allclose(history.filtered_mean, exact.filtered_mean, atol=1e-9)
     assert history.filtered_mean[10, 0] == pytest.approx(0.05, abs=4e-3)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from shm.values.force_units import force_unit
 from shm.watch.neighbours.nouns import (
     NINETY_PERCENT,
     BridgePattern,
@@ -74,12 +75,12 @@ def _each(pattern: BridgePattern) -> str:
     moved = [row for row in pattern.rows if row.way != "unchanged"]
     if len(moved) == 1:
         return (
-            f"Hanger {moved[0].hanger} has {_way(moved[0])}, and its neighbours do not answer for "
-            "it: look at its sensor, its clamps and its description before the bridge."
+            f"Hanger {moved[0].hanger} has {_way(moved[0], pattern)}, and its neighbours do not "
+            "answer for it: look at its sensor, its clamps and its description before the bridge."
         )
     if not moved:
         return "Some hangers moved a little, each by itself: test again to see which."
-    told = [f"{row.hanger}: {row.shift_n / 1e3:+.0f} kN" for row in moved]
+    told = [f"{row.hanger}: {_force(row.shift_n, pattern, '+')}" for row in moved]
     return (
         f"{len(moved)} hangers moved, each by itself and not as shed load would ({_listed(told)}): "
         "compare their tests, sensors and descriptions before the bridge."
@@ -92,7 +93,7 @@ def _moved(pattern: BridgePattern, name: ExplanationName) -> str:
         return _undecided(pattern)
     rows = {row.hanger: row for row in pattern.rows}
     movers = [rows[hanger] for hanger in suspect.hangers]
-    told = " and ".join(f"hanger {row.hanger} has {_way(row)}" for row in movers)
+    told = " and ".join(f"hanger {row.hanger} has {_way(row, pattern)}" for row in movers)
     doubt = _others(pattern, suspect)
     remedy = (
         "look at its ends, its clamps and its anchorage"
@@ -119,13 +120,13 @@ def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], name: Explanati
         return f"{whose} neighbours have no test to compare"
     taken = sum(row.shift_n for row in answering)
     half = sum((row.high_n - row.shift_n) ** 2 for row in answering) ** 0.5
-    low, high = sorted(abs(taken + s * half) / 1e3 for s in (-1, 1))
+    low_n, high_n = sorted(abs(taken + s * half) for s in (-1, 1))
     verb = "taken up" if lost else "given up"
     names = _listed([str(row.hanger) for row in answering])
     many = len(answering) > 1
     return (
         f"{whose} neighbour{'s' if many else ''} {names} {'have' if many else 'has'} {verb} "
-        f"{abs(taken) / 1e3:.0f} kN of it (90 % interval {low:.0f} to {high:.0f} kN)"
+        f"{_force(abs(taken), pattern)} of it {_within(low_n, high_n, pattern)}"
     )
 
 
@@ -153,8 +154,8 @@ def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
 def _sum(pattern: BridgePattern) -> str:
     kept = pattern.sum_kept
     moved = (
-        f"The sum over {_group(pattern)} has moved by {kept.sum_n / 1e3:+.0f} kN "
-        f"(sd {kept.sum_sd_n / 1e3:.0f} kN)"
+        f"The sum over {_group(pattern)} has moved by {_force(kept.sum_n, pattern, '+')} "
+        f"(sd {_force(kept.sum_sd_n, pattern)})"
     )
     if kept.complete:
         return f"{moved}; the probability that it is kept is {kept.probability:.2f}."
@@ -175,11 +176,24 @@ def _group(pattern: BridgePattern) -> str:
     return _hangers(hangers).lower()
 
 
-def _way(row: HangerRow) -> str:
+def _way(row: HangerRow, pattern: BridgePattern) -> str:
     """`lost 34 kN (90 % interval 28 to 40 kN)`."""
-    low, high = sorted(abs(value) / 1e3 for value in (row.low_n, row.high_n))
+    low_n, high_n = sorted(abs(value) for value in (row.low_n, row.high_n))
     verb = "lost" if row.shift_n < 0 else "gained"
-    return f"{verb} {abs(row.shift_n) / 1e3:.0f} kN (90 % interval {low:.0f} to {high:.0f} kN)"
+    return f"{verb} {_force(abs(row.shift_n), pattern)} {_within(low_n, high_n, pattern)}"
+
+
+def _within(low_n: float, high_n: float, pattern: BridgePattern) -> str:
+    """`(90 % interval 28 to 40 kN)`."""
+    low, _, _ = _force(low_n, pattern).partition(" ")
+    return f"(90 % interval {low} to {_force(high_n, pattern)})"
+
+
+def _force(force_n: float, pattern: BridgePattern, sign: str = "") -> str:
+    """`34 kN`: in the unit of the tensions that shift, so that all of a sentence compare."""
+    largest_n = max(row.baseline_n for row in pattern.rows)
+    unit = force_unit(largest_n)
+    return f"{unit.of(force_n):{sign}.{unit.decimals(largest_n) - 1}f} {unit.name}"
 
 
 def _percent(row: HangerRow) -> str:
