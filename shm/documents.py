@@ -22,8 +22,10 @@ from shm.values import (
     PLANES,
     AddedMass,
     Alert,
+    Averaged,
     Drift,
     FloatArray,
+    Limits,
     ModalTest,
     Mode,
     Posterior,
@@ -311,6 +313,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "tension_n": summary(
             posterior.tension_n, most_probable["theta_F"] * posterior.nominal_tension_n
         ),
+        "repeatability_sd_n": posterior.repeatability_sd_n,
         "nominal_tension_n": posterior.nominal_tension_n,
         "parameters": {
             name: summary(posterior.parameter(name), most_probable[name])
@@ -335,16 +338,39 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "seconds": posterior.seconds,
         "seed": posterior.seed,
         "method": posterior.method,
+        "priors": posterior.priors,
+        "at_bounds": list(posterior.at_bounds),
+        "misfit_percent": posterior.misfit_percent,
+        "log_occam": posterior.log_occam,
+        "caveats": list(posterior.caveats),
     }
 
 
-def selection_document(selection: Selection) -> dict[str, Any]:
-    """The document of `shm select --json`."""
+def selection_document(selection: Selection, limits: Limits | None = None) -> dict[str, Any]:
+    """The document of `shm select --json`, with probabilities of the hanger's `limits`."""
     pairs = zip(selection.posteriors, selection.probabilities, strict=True)
     return {
         "models": [posterior_document(posterior, probability) for posterior, probability in pairs],
         "selected": selection.selected.model,
+        "averaged": averaged_document(selection.averaged(limits)),
     }
+
+
+def averaged_document(averaged: Averaged) -> dict[str, Any]:
+    """The tension over all model classes, as reports and alerts lead with it."""
+    return {**asdict(averaged), "caveats": list(averaged.caveats)}
+
+
+def averaged_from(document: Mapping[str, Any]) -> Averaged:
+    """The same back from its document."""
+    tension_n = {name: _known(value) for name, value in document["tension_n"].items()}
+    names = ("repeatability_sd_n", "probability_above_limit", "probability_slack")
+    numbers = {name: _known(document[name]) for name in names}
+    return Averaged(Summary(**tension_n), caveats=tuple(document["caveats"]), **numbers)
+
+
+def _known(value: float | None) -> float:
+    return NAN if value is None else float(value)
 
 
 # ---------------------------------------------------------------- drift
@@ -357,4 +383,5 @@ def drift_document(drift: Drift) -> dict[str, Any]:
 
 def alert_document(alert: Alert) -> dict[str, Any]:
     """What a hook gets on its standard input."""
-    return {"schema": "shm.alert/1", **asdict(alert)}
+    tension = alert.tension and averaged_document(alert.tension)
+    return {"schema": "shm.alert/1", **asdict(alert), "tension": tension}

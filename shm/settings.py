@@ -121,7 +121,12 @@ class Settings:
     )
     mains_hz: float = _row(50.0, "Hz", "frequency of the power grid", 1, 1000)
     models: str = _row(
-        "beam1,beam2,solid0,solid1,solid2", "", "model classes that compete", None, None
+        "beam1,beam2,beam3,solid0,solid1,solid2", "", "model classes that compete", None, None
+    )
+    priors: str = _choice(
+        "what is possible before a test: by the hanger's description, or by the thesis",
+        "description",
+        "thesis",
     )
     samples: int = _row(1000, "", "posterior samples kept a test and class", 100, 1_000_000)
     seed: int = _row(1, "", "seed of the random numbers", 0, None)

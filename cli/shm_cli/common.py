@@ -29,7 +29,8 @@ from rich.table import Column, Table
 from shm.bridge import load_hanger
 from shm.documents import dump, load_modes
 from shm.errors import NothingThere, UsageError
-from shm.inference import METHODS
+from shm.inference import METHODS, NOISE_FLOOR, UpdateOptions
+from shm.models import PRIORS, THESIS
 from shm.values import Hanger, ModalTest
 from shm_cli import completers
 
@@ -68,6 +69,14 @@ method_option = click.option(
     help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
 )
 
+priors_option = click.option(
+    "--priors",
+    type=click.Choice(PRIORS),
+    default=PRIORS[0],
+    show_default=True,
+    help="What is possible before the test: by the hanger's description, or by the thesis.",
+)
+
 log_file_option = click.option(
     "--log-file",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -95,6 +104,23 @@ hanger_file_option = click.option(
     metavar="H.toml",
     help="A [[hanger]] table, instead of a workspace.",
 )
+
+
+def update_options(
+    samples: int, seed: int, repeat: int, method: str, priors: str
+) -> UpdateOptions:
+    """How to update; raises UsageError for what the thesis's priors alone allow."""
+    if priors != THESIS:
+        asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (
+            method != NOISE_FLOOR
+        )
+        for option in asked:
+            raise UsageError(
+                f"{option} is the thesis's way: with priors of the description each test counts "
+                "once and the sampler works its own way.",
+                remedy=f"Add --priors {THESIS}, or leave {option} out.",
+            )
+    return UpdateOptions(samples, seed, repeat, method)
 
 
 def show(document: object) -> None:

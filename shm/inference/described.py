@@ -51,10 +51,10 @@ its length at each end, or whose supports give way. Which it is the frequencies 
 _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
+_ALIKE_WITHIN, _MIDDLES = 0.09, 32
 _MOST_REDRAWN = 20
 _FARTHEST = 8.0
 """Standard deviations to which c's distribution is tabulated."""
-_SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +110,8 @@ class Deviations:
     """
 
     def __init__(self, model: AsMade, calibration: Calibration | None):
-        hanger, scatter = model.hanger, model.hanger.scatter
-        sensor_sd = _SENSOR_SD_KG / (hanger.mass_per_length_kg_m * hanger.length_m)
-        sds = {
-            SECTION: scatter.section,
-            DENSITY: math.hypot(scatter.density, sensor_sd),
-            MODULUS: scatter.modulus,
-        }
-        means = {DENSITY: _SENSOR_KG / (hanger.mass_per_length_kg_m * hanger.length_m)}
+        scatter = model.hanger.scatter
+        sds = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
         if not model.length_is_open:
             sds[LENGTH] = scatter.length
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
@@ -125,7 +119,7 @@ class Deviations:
         if stated or (model.is_strand and taught):
             sds[BENDING] = scatter.bending_factor if stated else 0.3
         self.names = tuple(sds)
-        self.mean: FloatArray = np.array([means.get(name, 0.0) for name in self.names])
+        self.mean: FloatArray = np.zeros(len(self.names))
         covariance = np.diag(np.array(list(sds.values())) ** 2)
         if calibration is not None:
             rows = [self.names.index(n) for n in calibration.names if n in self.names]
@@ -153,6 +147,58 @@ def _root(covariance: FloatArray) -> FloatArray:
     """A square root, also of a covariance in which some deviation is known."""
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(vectors * np.sqrt(values.clip(0)))
+
+
+class EndDetails:
+    """The prior of springs together: the ends of one hanger are rarely each of another kind.
+
+    Each spring by itself is uniform in log10 k over its range. Together they are independent, or
+    all alike, or alike in each plane (a fork turns about one axis), a third each; alike is within
+    `_ALIKE_WITHIN` of the range, 0.4 decades. `columns` are those of the box's `names`. Reflection
+    at both ends of the range keeps each spring's own prior uniform.
+    """
+
+    def __init__(self, names: Sequence[str], springs: Sequence[str]):
+        self.columns: IntArray = np.array(
+            [k for k, name in enumerate(names) if name in springs], dtype=int
+        )
+        planes = [names[k] in ("log10_k1", "log10_k3") for k in self.columns]
+        whole = np.arange(len(planes))
+        by_plane = [whole[np.equal(planes, side)] for side in (True, False)]
+        self._kinds: list[list[IntArray]] = [
+            [whole[[k]] for k in whole],
+            [whole],
+            [group for group in by_plane if len(group)],
+        ]
+
+    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Shares of the springs' ranges (n, springs)."""
+        shares = rng.random((n, len(self.columns)))
+        kind = rng.integers(len(self._kinds), size=n)
+        for index, groups in enumerate(self._kinds[1:], start=1):
+            rows = np.flatnonzero(kind == index)
+            for group in groups:
+                middle = rng.random((len(rows), 1))
+                away = _ALIKE_WITHIN * rng.standard_normal((len(rows), len(group)))
+                shares[np.ix_(rows, group)] = _reflected(middle + away)
+        return shares
+
+    def log_density(self, shares: FloatArray) -> FloatArray:
+        """Log density (n,) of shares (n, springs), over that of independent springs."""
+        middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+        images = np.stack([shares, -shares, 2 - shares])
+        away = (images[..., None] - middles) / _ALIKE_WITHIN
+        own = np.exp(-0.5 * away**2).sum(axis=0) / (_ALIKE_WITHIN * math.sqrt(2 * math.pi))
+        total = np.ones(len(shares))
+        for groups in self._kinds[1:]:
+            parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
+            total = total + np.prod(parts, axis=0)
+        return np.asarray(np.log(total / len(self._kinds)))
+
+
+def _reflected(shares: FloatArray) -> FloatArray:
+    folded = np.abs(shares) % 2
+    return np.where(folded > 1, 2 - folded, folded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +252,7 @@ class DescribedCoordinates:
         self.box = self._box()
         swaps = [pair for pair in model.swaps if set(pair) <= set(self._felt)]
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
+        self._details = EndDetails(self.box.names, model.springs)
         self._reading = reading_of(tests)
         taught = calibration is not None and LENGTH in calibration.names
         fixed = _Ways(np.ones(1), np.zeros(1), np.zeros(1))
@@ -458,11 +505,25 @@ class DescribedCoordinates:
     def log_prior(self, z: FloatArray) -> FloatArray:
         """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
         count = len(self.box.names)
-        return np.asarray(self._inner.log_prior(z[:, :count]) + log_normal(z[:, count:]))
+        log = self._inner.log_prior(z[:, :count]) + log_normal(z[:, count:])
+        inside = np.isfinite(log)
+        if len(self._details.columns) and inside.any():
+            shares = self._shares_of_springs(self._inner.theta(z[inside, :count]))
+            log[inside] += self._details.log_density(shares)
+        return np.asarray(log)
 
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Places (n, d) from the folded prior."""
-        return np.hstack([self._inner.draw_prior(n, rng), self._deviates(n, rng)])
+        inner = rng.uniform(self.box.lower, self.box.upper, (n, len(self.box.names)))
+        columns = self._details.columns
+        width = self.box.upper[columns] - self.box.lower[columns]
+        inner[:, columns] = self.box.lower[columns] + width * self._details.draw(n, rng)
+        return np.hstack([self._inner.places(inner), self._deviates(n, rng)])
+
+    def _shares_of_springs(self, inner: FloatArray) -> FloatArray:
+        columns = self._details.columns
+        width = self.box.upper[columns] - self.box.lower[columns]
+        return np.asarray((inner[:, columns] - self.box.lower[columns]) / width)
 
     def draw_felt(self, n: int, rng: np.random.Generator) -> FloatArray:
         """The same with springs as stiff as the bar, within a few times."""

@@ -79,6 +79,11 @@ class Likelihood:
             first = measured.stop
         return rows
 
+    @property
+    def fit_error(self) -> FloatArray:
+        """Fractional standard deviations (measurements,) of all errors but sigma."""
+        return self.identification_error
+
     def by_mode(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
         return predicted

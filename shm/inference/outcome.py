@@ -136,7 +136,7 @@ def _highest_described(
     shares, seen = coordinates.smooth(z)
     at = int((log_likelihood - 0.5 * (seen**2).sum(axis=1)).argmax())
     count, sigma = shares.shape[1], samples[at, -1]
-    noise = np.hypot(sigma, problem.likelihood.identification_error)
+    noise = np.hypot(sigma, problem.likelihood.fit_error)
 
     def scaled(points: FloatArray) -> FloatArray:
         theta = coordinates.of_smooth(points[:, :count], points[:, count:])
@@ -174,7 +174,7 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     own = np.asarray(likelihood.identification_error)
     common = np.median(outcome.samples[:, -1])
     known = likelihood.frequencies if isinstance(likelihood, FieldLikelihood) else len(own)
-    variance = own**2 + np.where(np.arange(len(own)) < known, common**2, 0.0)
+    variance = np.asarray(likelihood.fit_error) ** 2 + np.where(np.arange(len(own)) < known, common**2, 0.0)
     precision = slopes.T @ (slopes / variance[:, None]) + np.eye(slopes.shape[1])
     gain = np.linalg.solve(precision, (slopes / variance[:, None]).T)[:, :known]
     step = 1e-4 * np.eye(slopes.shape[1])

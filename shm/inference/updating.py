@@ -108,5 +108,6 @@ def log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     if not isinstance(model, AsMade) or model.springs:
         return 0.0
     planes = {mode.plane for test in tests for mode in test.regular_modes}
-    decades = np.log10(RESTRAINT[1] / RESTRAINT[0])
-    return float(-2 * len(planes) * np.log(1 + decades))
+    one = 1 / (1 + np.log10(RESTRAINT[1] / RESTRAINT[0]))
+    # Springs each by itself, all alike, or alike in each plane (`EndDetails`).
+    return float(np.log(np.mean([one ** (2 * len(planes)), one, one ** len(planes)])))

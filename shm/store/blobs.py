@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from shm.documents import MODES_SCHEMA, parse_modes, parse_time
+from shm.documents import MODES_SCHEMA, averaged_from, parse_modes, parse_time
 from shm.values import (
     NAN,
     Alert,
@@ -126,8 +126,19 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
         predicted=tuple(_predicted(entry) for entry in document["predicted"]),
         tests=tuple(document["tests"]),
         method=document.get("method", "tmcmc"),  # absent before there was another
+        **_since_described(document),
         **values,
     )
+
+
+def _since_described(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What documents of before there were priors of a description lack: these were the thesis's."""
+    numbers = ("repeatability_sd_n", "misfit_percent", "log_occam")
+    return {
+        "priors": document.get("priors", "thesis"),
+        "at_bounds": tuple(document.get("at_bounds", ())),
+        **{name: number(document.get(name)) for name in numbers},
+    }
 
 
 def _predicted(entry: Mapping[str, Any]) -> PredictedFrequency:
@@ -151,13 +162,14 @@ def number(value: float | None) -> float:
 
 def alert_from_document(document: Mapping[str, Any]) -> Alert:
     """An alert back from its document; one of the first schemas has no kinds and no change."""
-    change = document.get("change")
+    change, tension = document.get("change"), document.get("tension")
     return Alert(
         **{name: document[name] for name in ("key", "hanger", "test", "message")},
         time=parse_time(document["time"]),
         drifts=tuple(_drift(entry) for entry in document["drifts"]),
         kinds=cast(tuple[AlertKind, ...], tuple(document.get("kinds", ()))),
         change=None if change is None else _change(change),
+        tension=None if tension is None else averaged_from(tension),
     )
 
 

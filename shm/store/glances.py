@@ -8,7 +8,7 @@ from datetime import datetime
 from enum import StrEnum
 
 from shm.store.rows import Acknowledgement, DeliveryState, Stage
-from shm.values import Summary
+from shm.values import Averaged, Summary
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,15 @@ class Numbers:
 
     `stiffness` is that of each plane's ends as `shm.models.ends.end_stiffness` has it, log10 of
     N m/rad, by `transverse_end_stiffness` and the like; empty where the class clamps the ends.
-    `parameters` are those of the class, as it takes them, and sigma.
+    `parameters` are those of the class, as it takes them, and sigma. `averaged` is the tension over
+    all model classes of the hanger.
     """
 
     tension_n: Summary
     most_probable_tension_n: float
     stiffness: Mapping[str, Summary]
     parameters: Mapping[str, Summary]
+    averaged: Averaged
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Row
+from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
 from shm.store.blobs import (
@@ -210,23 +210,7 @@ class Queries(Database):
     def selection(self, hanger: int) -> StoredSelection | None:
         """The selection in force."""
         with self.reading() as connection:
-            row = connection.execute(selection_in_force(hanger)).one_or_none()
-            if row is None:
-                return None
-            entries = (
-                sa.select(posteriors, selection_entries.c.probability)
-                .join(selection_entries)
-                .where(selection_entries.c.selection_id == row.id)
-                .order_by(
-                    selection_entries.c.probability.desc().nulls_last(), selection_entries.c.rank
-                )
-            )
-            ranked = connection.execute(entries).all()
-        selection = Selection(
-            tuple(_posterior(entry) for entry in ranked),
-            tuple(entry.probability for entry in ranked),
-        )
-        return StoredSelection(row.id, selection, row.selected_at, row.model)
+            return selection_of(connection, hanger)
 
     def selected_models(self) -> dict[int, str]:
         """The name of the selected or adopted class of each hanger that has one."""
@@ -267,6 +251,32 @@ _BASELINE = ("id", "set_at", "who", "why", "since")
 def _baseline(row: Row[Any], hanger: int) -> Baseline:
     values = {name: getattr(row, f"b_{name}") for name in _BASELINE}
     return Baseline(hanger=hanger, posterior=_posterior(row), **values)
+
+
+def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
+    """The selection in force, complete with samples."""
+    row = connection.execute(selection_in_force(hanger)).one_or_none()
+    if row is None:
+        return None
+    entries = (
+        sa.select(posteriors, selection_entries.c.probability)
+        .join(selection_entries)
+        .where(selection_entries.c.selection_id == row.id)
+        .order_by(selection_entries.c.probability.desc().nulls_last(), selection_entries.c.rank)
+    )
+    ranked = connection.execute(entries).all()
+    selection = Selection(
+        tuple(_posterior(entry) for entry in ranked),
+        tuple(entry.probability for entry in ranked),
+    )
+    return StoredSelection(row.id, selection, row.selected_at, row.model)
+
+
+def selection_numbers(connection: Connection) -> dict[int, int]:
+    """The number of the selection in force of each hanger that has one."""
+    query = sa.select(selections.c.hanger, sa.func.max(selections.c.id).label("id"))
+    query = query.where(selections.c.id.not_in(_undone_selections)).group_by(selections.c.hanger)
+    return {row.hanger: row.id for row in connection.execute(query)}
 
 
 def selection_in_force(hanger: int) -> sa.Select[Any]:

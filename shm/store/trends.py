@@ -23,15 +23,17 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
+from shm.documents import averaged_document, averaged_from
 from shm.store.blobs import number, posterior_from
 from shm.store.columns import Number
 from shm.store.database import Database
 from shm.store.files import in_force
 from shm.store.glances import BaselineGlance, Numbers, TrendPoint
-from shm.store.queries import baselines_now, hidden
+from shm.store.queries import baselines_now, hidden, selection_numbers, selection_of
 from shm.store.rows import Stage
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
-from shm.values import NAN, Hanger, Posterior, Summary
+from shm.values import NAN, Hanger, Posterior, Selection, Summary
+from shm.values.stated_tension import averaged_now
 
 log = logging.getLogger(__name__)
 
@@ -107,13 +109,15 @@ class Trends(Database):
 
         Some at a time, each time a transaction: it may be killed and begun again.
         """
-        missing = self._missing(hanger)
+        with self.reading() as connection:
+            key = key_of(hanger, selection_numbers(connection).get(hanger.id))
+        missing = self._missing(hanger, key)
         for begin in range(0, len(missing), _AT_ONCE):
             some = missing[begin : begin + _AT_ONCE]
             with self.reading() as connection:
                 made = _made(connection, some, {hanger.id: hanger})
             rows = [
-                {"posterior_id": id_, "key": key_of(hanger), "document": _document(numbers)}
+                {"posterior_id": id_, "key": key, "document": _document(numbers)}
                 for id_, numbers in made.items()
             ]
             with self.writing() as connection:
@@ -123,10 +127,10 @@ class Trends(Database):
             tell((begin + len(some)) / len(missing))
         return len(missing)
 
-    def _missing(self, hanger: Hanger) -> list[int]:
+    def _missing(self, hanger: Hanger, key: str) -> list[int]:
         """What is shown of a hanger and has no summary under its present description."""
         up_to_date = sa.exists().where(
-            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key_of(hanger)
+            summaries.c.posterior_id == posteriors.c.id, summaries.c.key == key
         )
         of_baselines = sa.select(baselines.c.posterior_id).where(
             baselines.c.id.in_(baselines_now(hanger.id))
@@ -186,7 +190,8 @@ def _numbers(
     connection: Connection, rows: Sequence[Row[Any]], hangers: Mapping[int, Hanger]
 ) -> dict[int, Numbers]:
     """Of each row's posterior: as they are kept, or made from its samples."""
-    keys = {number_: key_of(hanger) for number_, hanger in hangers.items()}
+    selected = selection_numbers(connection)
+    keys = {id_: key_of(hanger, selected.get(id_)) for id_, hanger in hangers.items()}
     kept = {
         row.posterior_id: _from_text(row.summary) for row in rows if row.key == keys[row.hanger]
     }
@@ -201,14 +206,19 @@ def _made(
 ) -> dict[int, Numbers]:
     columns = (posteriors.c[name] for name in ("id", "hanger", "document", "samples"))
     query = sa.select(*columns).where(posteriors.c.id.in_(ids))
-    return {
-        row.id: summarised(posterior_from(row.document, row.samples), hangers[row.hanger])
-        for row in connection.execute(query)
-    }
+    compared: dict[int, Selection | None] = {}
+    made = {}
+    for row in connection.execute(query).all():
+        if row.hanger not in compared:
+            found = selection_of(connection, row.hanger)
+            compared[row.hanger] = None if found is None else found.selection
+        posterior = posterior_from(row.document, row.samples)
+        made[row.id] = summarised(posterior, hangers[row.hanger], compared[row.hanger])
+    return made
 
 
-def summarised(posterior: Posterior, hanger: Hanger) -> Numbers:
-    """A posterior of `hanger` in numbers."""
+def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
+    """A posterior of `hanger` in numbers, its tension also over the classes of a `selection`."""
     # Imported here because who only asks what is kept needs no model.
     from shm.models.ends import end_stiffness
 
@@ -223,13 +233,14 @@ def summarised(posterior: Posterior, hanger: Hanger) -> Numbers:
         most_probable_tension_n=float(most_probable * posterior.nominal_tension_n),
         stiffness={name: Summary.of(samples) for name, samples in stiffness.items()},
         parameters={name: Summary.of(posterior.parameter(name)) for name in posterior.names},
+        averaged=averaged_now(posterior, selection, hanger.limits),
     )
 
 
 @lru_cache(_HANGERS_KNOWN)
-def key_of(hanger: Hanger) -> str:
-    """Tells one description of a hanger from another."""
-    return hashlib.sha256(repr(hanger).encode()).hexdigest()
+def key_of(hanger: Hanger, selection_id: int | None) -> str:
+    """Tells one description of a hanger, and one choice among its classes, from another."""
+    return hashlib.sha256(repr((hanger, selection_id)).encode()).hexdigest()
 
 
 def _document(numbers: Numbers) -> dict[str, Any]:
@@ -238,8 +249,12 @@ def _document(numbers: Numbers) -> dict[str, Any]:
         part: {name: astuple(each) for name, each in getattr(numbers, part).items()}
         for part in _NAMED
     }
-    plain = numbers.most_probable_tension_n
-    return {"tension_n": astuple(numbers.tension_n), "most_probable_tension_n": plain, **named}
+    return {
+        "tension_n": astuple(numbers.tension_n),
+        "most_probable_tension_n": numbers.most_probable_tension_n,
+        "averaged": averaged_document(numbers.averaged),
+        **named,
+    }
 
 
 @lru_cache(_NUMBERS_HELD)
@@ -249,6 +264,7 @@ def _from_text(text: str) -> Numbers:
     return Numbers(
         tension_n=_summary(document["tension_n"]),
         most_probable_tension_n=number(document["most_probable_tension_n"]),
+        averaged=averaged_from(document["averaged"]),
         **{part: _Summaries(document[part]) for part in _NAMED},
     )
 

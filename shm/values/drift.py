@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import Literal
 
 from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.posterior import Averaged
 
 End = Literal["deck", "arch"]
 
@@ -170,7 +171,8 @@ class Alert:
     """A shift that its owner should know of. `key` makes its delivery idempotent.
 
     `kinds` are the rules that raised it; `change` is None where the sequential test had no part.
-    A `test` alert is no finding: it shows that a hook works.
+    A `test` alert is no finding: it shows that a hook works. `tension` is that by the test,
+    averaged over the model classes; None where the alert does not say.
     """
 
     key: str
@@ -181,3 +183,4 @@ class Alert:
     drifts: tuple[Drift, ...]
     kinds: tuple[AlertKind, ...] = ()
     change: Change | None = None
+    tension: Averaged | None = None
