@@ -106,9 +106,7 @@ hanger_file_option = click.option(
 )
 
 
-def update_options(
-    samples: int, seed: int, repeat: int, method: str, priors: str
-) -> UpdateOptions:
+def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
     """How to update; raises UsageError for what the thesis's priors alone allow."""
     if priors != THESIS:
         asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (

@@ -9,7 +9,7 @@ import numpy as np
 import rich_click as click
 
 from shm.errors import UsageError
-from shm.models import Model, build
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, FloatArray
 from shm_cli import completers
 from shm_cli.common import (
@@ -55,7 +55,7 @@ def command(
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
     """
-    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id))
+    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS)
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
     if sweep is None:

@@ -8,10 +8,10 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import selection_document
-from shm.inference import UpdateOptions, select
+from shm.inference import select
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
-from shm.values import Selection
+from shm.values import Limits, Selection
 from shm.values.force_units import force_unit
 from shm_cli import completers
 from shm_cli.common import (
@@ -20,6 +20,7 @@ from shm_cli.common import (
     json_option,
     method_option,
     opened_store,
+    priors_option,
     progress_bar,
     repeat_option,
     samples_option,
@@ -28,8 +29,9 @@ from shm_cli.common import (
     show_table,
     table,
     tests_and_hanger,
+    update_options,
 )
-from shm_cli.update import modes_argument, tell_irregular, tell_poor_fit
+from shm_cli.update import modes_argument, show_stated, tell_irregular, tell_poor_fit
 
 
 @click.command()
@@ -46,6 +48,7 @@ from shm_cli.update import modes_argument, tell_irregular, tell_poor_fit
 @samples_option
 @repeat_option
 @method_option
+@priors_option
 @json_option
 @click.pass_context
 def command(
@@ -58,6 +61,7 @@ def command(
     samples: int,
     repeat: int,
     method: str,
+    priors: str,
     as_json: bool,
 ) -> None:
     """Compare model classes by their evidence.
@@ -69,19 +73,20 @@ def command(
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     """
+    options = update_options(samples, seed, repeat, method, priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
-    chosen = [build(name, hanger) for name in competing_names(hanger, names)]
+    chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
     tell_irregular(tests)
-    options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
         selection = select(tests, chosen, options, progress)
     tell_poor_fit(selection.selected)
     if as_json:
-        show({**selection_document(selection), "not_applicable": not_applicable})
+        document = selection_document(selection, hanger.limits)
+        show({**document, "not_applicable": not_applicable})
         return
-    show_selection(selection)
+    show_selection(selection, hanger.limits)
     for name, reason in not_applicable.items():
         click.echo(f"{name} does not apply: {reason}")
 
@@ -97,8 +102,9 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 
 
-def show_selection(selection: Selection) -> None:
-    """The model classes as a table, most probable first."""
+def show_selection(selection: Selection, limits: Limits | None = None) -> None:
+    """The tension over all classes in words, and the classes as a table, most probable first."""
+    show_stated(selection.averaged(limits))
     unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
     made = table(
         f"model classes of hanger {selection.selected.hanger}, most probable first",

@@ -9,16 +9,19 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, summary
-from shm.inference import UpdateOptions, update
+from shm.inference import update
 from shm.models import build
-from shm.values import ModalTest, Posterior
+from shm.values import Averaged, Limits, ModalTest, Posterior
 from shm.values.force_units import force_unit
+from shm.values.stated_tension import averaged_now, stated
 from shm_cli import completers
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
     json_option,
     method_option,
+    paragraph,
+    priors_option,
     progress_bar,
     repeat_option,
     samples_option,
@@ -27,6 +30,7 @@ from shm_cli.common import (
     show_table,
     table,
     tests_and_hanger,
+    update_options,
 )
 
 _POOR_FIT = 0.05
@@ -55,6 +59,7 @@ modes_argument = click.argument(
 @samples_option
 @repeat_option
 @method_option
+@priors_option
 @json_option
 @click.pass_context
 def command(
@@ -67,6 +72,7 @@ def command(
     samples: int,
     repeat: int,
     method: str,
+    priors: str,
     as_json: bool,
 ) -> None:
     """Posterior of tension and end stiffness.
@@ -76,16 +82,16 @@ def command(
     \b
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
+    options = update_options(samples, seed, repeat, method, priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     tell_irregular(tests)
-    options = UpdateOptions(samples, seed, repeat, method)
     with progress_bar("updating") as progress:
-        posterior = update(tests, build(model, hanger), options, progress)
+        posterior = update(tests, build(model, hanger, priors), options, progress)
     tell_poor_fit(posterior)
     if as_json:
         show(posterior_document(posterior))
         return
-    show_posterior(posterior)
+    show_posterior(posterior, hanger.limits)
 
 
 def tell_irregular(tests: Sequence[ModalTest]) -> None:
@@ -113,8 +119,17 @@ def tell_poor_fit(posterior: Posterior) -> None:
         )
 
 
-def show_posterior(posterior: Posterior) -> None:
-    """Parameters and predicted frequencies as tables."""
+def show_stated(averaged: Averaged) -> None:
+    """What keeps a tension from being taken at its word, then the tension with both intervals."""
+    for caveat in averaged.caveats:
+        click.echo(paragraph(caveat))
+    for sentence in stated(averaged).sentences:
+        click.echo(paragraph(sentence))
+
+
+def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
+    """The tension in words, parameters and predicted frequencies as tables."""
+    show_stated(averaged_now(posterior, limits=limits))
     made = table(
         f"{posterior.model}: posterior of hanger {posterior.hanger}, "
         f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",

@@ -1,8 +1,8 @@
 """The steps as a researcher calls them in a notebook; `import shm` offers them under their names.
 
 Each has the defaults of the command of its name and gives the value that the step itself gives.
-The steps behind them (`shm.identify.identify`, `shm.inference.update`, ...) take options as values and
-model classes as objects; these here take names and numbers.
+The steps behind them (`shm.identify.identify`, `shm.inference.update`, ...) take options as values
+and model classes as objects; these here take names and numbers.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
-    "limits",
+    "limits", "fittings_m",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -54,6 +54,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         kind=_kind(table),
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
+        fittings_m=_fittings(table, length_m),
     )
 
 
@@ -65,6 +66,20 @@ def _kind(table: Table) -> Kind:
         if value == kind:
             return cast(Kind, kind)
     raise table.refusal(f"kind = {value!r} is no kind of hanger", 'Write "rod" or "strand".')
+
+
+def _fittings(table: Table, length_m: float) -> tuple[float, float]:
+    """Lengths of the deck-end and the arch-end fitting; none where nothing is said."""
+    both = table.values.get("fittings_m", [0.0, 0.0])
+    numbers = isinstance(both, list) and all(
+        isinstance(each, int | float) and not isinstance(each, bool) and each >= 0 for each in both
+    )
+    if not numbers or len(both) != 2 or sum(both) >= length_m / 2:
+        raise table.refusal(
+            f"fittings_m = {both!r} is not two lengths that leave half of the hanger free",
+            "Write fittings_m = [DECK, ARCH], the lengths in m of forks, sockets or threads.",
+        )
+    return float(both[0]), float(both[1])
 
 
 def _limits(table: Table | None) -> Limits:

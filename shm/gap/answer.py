@@ -23,7 +23,9 @@ def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
         for each in attribution.explanations
         if each is leading or (each.group is not None and each.group == leading.group)
     ]
-    return [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+    found = [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+    # A group may lead by members that screening alone has weighed.
+    return found or [(1.0, attribution.unexplained)]
 
 
 def possible(attribution: Attribution) -> list[tuple[float, Fit]]:

@@ -170,12 +170,18 @@ def _explanations(
             variants=kind.tried,
             probability=chance,
             log_bayes_factor=kind.log_evidence - none.log_evidence,
-            log_fit=kind.best.log_fit - none.best.log_fit,
+            log_fit=_gain(kind, none),
         )
         for kind, chance in zip(kinds, chances, strict=True)
         if kind.effects and not kind.flexible
     ]
     return tuple(sorted(found, key=lambda each: -each.probability))
+
+
+def _gain(kind: Family, none: Family) -> float:
+    """What the best fit gains: at least what the evidence does, else a better fit was not found."""
+    gain = kind.best.log_fit - none.best.log_fit
+    return max(gain, kind.log_evidence - none.log_evidence)
 
 
 def _fit(kinds: Sequence[Family]) -> Fit:

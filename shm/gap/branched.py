@@ -12,14 +12,16 @@ from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch
 from shm.gap.landscape import log_normal
 from shm.inference.mixture import Normal, TMixture
-from shm.inference.tmcmc import normalised
+from shm.inference.tmcmc import normalised, systematic
 from shm.values import FloatArray, IntArray
 
 _FROM_PRIOR = 0.1
 _INFLATION = 1.3
-_FEWEST_TO_FIT = 8
+_FEWEST_TO_FIT = 12
 _LEAST_SHARE = 0.02
 _HEAVY = 0.1
+_TO_CLUSTER, _CLUSTERS, _POPULATION, _JITTER = 6, 6, 400, 0.2
+_FROM_WHOLE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +81,16 @@ class Proposal:
                 density[rows] = np.logaddexp(own, np.log(_FROM_PRIOR) + prior[rows])
         return np.asarray(np.log(self._shares)[points.branch] + density)
 
-    def refitted(self, points: Points, log_weight: FloatArray) -> Proposal:
-        """Moved towards weighted points."""
+    def refitted(
+        self, points: Points, log_weight: FloatArray, rng: np.random.Generator
+    ) -> Proposal:
+        """Moved towards weighted points: where these are many, new parts on their clusters."""
         tempered = _tempered(log_weight, _FEWEST_TO_FIT * self._dimension)
         shares, mixtures = [], []
         for k, mixture in enumerate(self._mixtures):
             rows = np.flatnonzero(points.branch == k)
             shares.append(float(np.exp(_total(log_weight[rows]) - _total(log_weight))))
-            mixtures.append(_refitted(mixture, points.w[rows], tempered[rows]))
+            mixtures.append(_refitted(mixture, points.w[rows], tempered[rows], rng))
         return Proposal(np.array(shares), mixtures, self._dimension)
 
 
@@ -94,10 +98,20 @@ def _total(log_weight: FloatArray) -> float:
     return float(logsumexp(log_weight)) if len(log_weight) else -np.inf
 
 
-def _refitted(mixture: TMixture | None, w: FloatArray, weights: FloatArray) -> TMixture | None:
-    """One step of expectation maximisation towards weighted points."""
+def _refitted(
+    mixture: TMixture | None, w: FloatArray, weights: FloatArray, rng: np.random.Generator
+) -> TMixture | None:
+    """Parts on the clusters of weighted points, or one step of expectation maximisation."""
     if weights.sum() <= 0:
         return mixture
+    share = weights / weights.sum()
+    if 1 / (share**2).sum() >= _TO_CLUSTER * w.shape[1]:
+        population = w[systematic(share, _POPULATION, rng)]
+        # Equal copies of a point would make a cluster of no extent.
+        spread = _JITTER * population.std(axis=0)
+        return TMixture.of(
+            population + spread * rng.standard_normal(population.shape), _CLUSTERS, rng
+        ).joined([Normal.of(population)], _FROM_WHOLE)
     if mixture is None:
         mixture = TMixture([Normal(np.zeros(w.shape[1]), np.eye(w.shape[1]))], np.ones(1))
     log = [

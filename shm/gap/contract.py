@@ -151,8 +151,8 @@ class Fit:
     derivatives by z. `noise` is the covariance of the data about the prediction: identification
     and model error, the model error at its most probable size `model_error` (a fraction). `draws`
     (n, d) are equal draws of the posterior. `log_fit` is the log likelihood at z, `log_evidence`
-    the log evidence. `method` is `screened`, `normal` or `sampled`. `peaks` are the normal
-    distributions that its evidence was first taken from.
+    the log evidence. `method` is `screened`, `normal` or `sampled`; `effective` is how many of its
+    draws count then. `peaks` are the normal distributions that its evidence was first taken from.
     """
 
     hypothesis: Hypothesis
@@ -168,3 +168,4 @@ class Fit:
     log_evidence_sd: float
     method: Method
     peaks: tuple[Peak, ...] = ()
+    effective: float = float("nan")

@@ -22,8 +22,8 @@ from shm.gap.contract import Covariance, Fit, Hypothesis, NoiseNode
 from shm.gap.fit import fitted, scattered
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS
 from shm.inference.tmcmc import normalised
+from shm.models.effects import EFFECTS
 from shm.values import FloatArray
 
 SHOWN = 3.0

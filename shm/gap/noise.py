@@ -3,14 +3,15 @@
 The frequencies err by their identification, by a small model error that belongs to a mode and so
 repeats in every test, and by what repeats in any case (`shm.gap.repeated`): cov = factor^2 diag(sd)
 R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently, but for
-peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma has a
-half-normal prior: the general model agrees with independent finite elements to 1e-5, and what is
-much larger than that is a gap, not scatter. Stated standard deviations rest on a few hits and are
-themselves uncertain: those of one mode in several tests are drawn together as far as they differ by
-chance, and `factor`, what is left and common to all, has a log-normal prior; a wide one would take
-a gap for noise. That of the shapes is taken from their own scatter between tests. Where no standard
-deviations are given there is instead one unknown standard deviation for all, log-uniform; where
-some are, both. Unknowns are integrated by the trapezoidal rule over their logarithm.
+peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma is as
+likely half-normal of 2e-5, as the general model agrees with independent finite elements, as it is
+log-uniform from there to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in
+every test, and whoever takes none of it for scatter finds a cause in each. Stated standard
+deviations rest on a few hits and are themselves uncertain: those of one mode in several tests are
+drawn together as far as they differ by chance, and `factor`, what is left and common to all, has a
+log-normal prior of 20 %. That of the shapes is taken from their own scatter between tests. Where no
+standard deviations are given there is instead one unknown standard deviation for all, log-uniform;
+where some are, both. Unknowns are integrated by the trapezoidal rule over their logarithm.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from shm.values import FloatArray, IntArray
 MODEL_ERROR_SCALE = 2e-5
 MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))
 SD_LOWER, SD_UPPER = 1e-4, 3e-2
-FACTOR_SPREAD = 0.08
+FACTOR_SPREAD = 0.2
 """Of the logarithm of true over stated standard deviations, common to all frequencies."""
 
 OVERLAP = 0.004
@@ -37,7 +38,8 @@ CORRELATIONS = (0.0, 0.4)
 """Of the errors of such peaks, one as likely as the other: our identification of both planes
 together leaves none, that of each by itself shares what both sensors heard."""
 
-_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 1e-4, 5
+_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 3e-3, 10
+_FIELD_SHARE = 0.5
 _SHAPES_SPREAD = 0.2
 _CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
 _SDS, _SDS_OF_SOME = 32, 12
@@ -211,7 +213,9 @@ def _model_errors(known: FloatArray) -> tuple[FloatArray, FloatArray]:
     values = np.geomspace(_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS)
     density = values * np.exp(-((values / MODEL_ERROR_SCALE) ** 2) / 2)
     # Below its smallest value the prior is flat: its integral there is the density by logarithm.
-    return values, _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
+    own = _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
+    field = _trapezoidal((values >= MODEL_ERROR_SCALE).astype(float))
+    return values, np.asarray((1 - _FIELD_SHARE) * own + _FIELD_SHARE * field)
 
 
 def _trapezoidal(density: FloatArray, below: float = 0.0) -> FloatArray:

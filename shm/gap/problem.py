@@ -16,6 +16,7 @@ from shm.gap.noise import nodes
 from shm.gap.readings import reading_loads
 from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
 from shm.gap.shapes import ShapeScaling, turn_loads
+from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Variant, parameters_of
 from shm.models.hanger import HangerModes
@@ -124,10 +125,19 @@ class GapProblem:
         return reading_loads(design, lambda of: self._predicted_near(of)[: of.frequencies])
 
     def section_of(self, design: Design) -> FloatArray:
-        """What the section along the bar does to the frequencies of a design: loads (F, k)."""
+        """What the section along the bar, the sensors' mass and the supports' give do to the
+        frequencies of a design: loads (F, k), the same k of every design.
+        """
         theta = self.theta(Hypothesis(), self._near)[:, : len(self._baseline.names)]
         alike = self._baseline.physical(np.repeat(theta, STRETCHES + 1, axis=0), 0)
-        return section_loads(design, alike, self.hanger)
+        section = section_loads(design, alike, self.hanger)
+        if not self.hanger.as_hanger:
+            return section
+        frequency_hz = np.exp(self._predicted_near(design)[: design.frequencies])
+        shared = shared_loads(
+            self.hanger, design.frequency_plane, design.frequency_order, frequency_hz
+        )
+        return np.hstack([section, shared])
 
     def _predicted_near(self, design: Design) -> FloatArray:
         """The data (data,) that the baseline near the measured ones predicts of a design."""

@@ -19,9 +19,9 @@ from shm.gap.shapes import ShapeScaling
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.values import FloatArray, Hanger, IntArray
 
-GAIN_SD = 0.005
-PLACE_SD_M = 0.003
-TURN_SD_RAD = float(np.radians(0.3))
+GAIN_SD = 0.015
+PLACE_SD_M = 0.01
+TURN_SD_RAD = float(np.radians(1.5))
 SECTION_REACH_M = 1.0
 """The standard deviation of the distance, in which the covariance of the section is normal."""
 

@@ -3,13 +3,14 @@
 Only what is not nearly linear is drawn, from t distributions put on the fit's peaks and refitted
 to their own weighted draws (Cappe et al. 2008, population Monte Carlo), with a share of the prior
 so that no weight is unbounded (Hesterberg 1995). Tension and the bar's deviations are integrated
-out at each draw. The evidence rests on fresh draws from the last mixture.
+out at each draw. Where too few draws are effective it goes on, and a fit says how many are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.special import logsumexp
@@ -22,12 +23,12 @@ from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
 from shm.inference.tmcmc import normalised, systematic
-from shm.values import FloatArray
+from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
-_TRIAL, _MOST_TRIALS = 100, 4
-_FINAL, _MOST_FINALS = 200, 4
-_ENOUGH = 120.0
-_GOOD_SHARE = 0.3
+_TRIAL, _MOST_TRIALS = 150, 10
+_FINAL, _MOST_FINALS = 400, 4
+_ATTEMPTS = 3
+_TO_FIT = 150.0
 _UNSEEN = 1.25
 _MUCH_BETTER = 2.0
 
@@ -71,6 +72,7 @@ def sampled(problem: GapProblem, fit: Fit, rng: np.random.Generator, draws: int)
         log_evidence=float(logsumexp(final.log_weight) - np.log(len(final.log_weight))),
         log_evidence_sd=float(_UNSEEN * np.sqrt(max(share, 0.0))),
         method="sampled",
+        effective=final.effective,
     )
 
 
@@ -93,19 +95,28 @@ class _Sampler:
         return float(self._conditional.settled(self._fit.z[None, self._other]).log_marginal[0])
 
     def run(self, rng: np.random.Generator) -> _Draws:
-        """Trials that the proposal is refitted to, then the draws that count."""
+        """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as could be had.
+
+        The proposal is refitted to all draws so far, each weighed against the mixture of all
+        proposals (Cornuet et al. 2012, Scand. J. Stat. 39). The answer rests on fresh draws; where
+        too few of these are effective they join the others, and the proposal is refitted again.
+        """
         proposal = Proposal.about(self._fit.peaks, self._branches, self._other)
-        for _ in range(_MOST_TRIALS):
-            trial = self._drawn(proposal, _TRIAL, rng)
-            if trial.effective >= _GOOD_SHARE * _TRIAL:
-                break
-            proposal = proposal.refitted(trial.points, trial.log_weight)
-        final = self._drawn(proposal, _FINAL, rng)
-        for _ in range(_MOST_FINALS):
-            if final.effective >= _ENOUGH:
-                break
-            final = final.joined(self._drawn(proposal, _FINAL, rng))
-        return final
+        pool = _Pool()
+        for _ in range(_ATTEMPTS):
+            for _ in range(_MOST_TRIALS):
+                pool.add(proposal, self._drawn(proposal, _TRIAL, rng))
+                drawn = pool.draws()
+                proposal = proposal.refitted(drawn.points, drawn.log_weight, rng)
+                if drawn.effective >= _TO_FIT:
+                    break
+            final = _Pool()
+            for _ in range(_MOST_FINALS):
+                final.add(proposal, self._drawn(proposal, _FINAL, rng))
+                if final.draws().effective >= ENOUGH_EFFECTIVE:
+                    return final.draws()
+            pool.join(final)
+        return pool.draws()
 
     def scattered(self, settled: Settled, rng: np.random.Generator) -> FloatArray:
         """Draws z (n, d) with the linear parameters drawn from their own posterior."""
@@ -116,10 +127,37 @@ class _Sampler:
         return z
 
     def _drawn(self, proposal: Proposal, count: int, rng: np.random.Generator) -> _Draws:
+        """Draws whose weights are those of the posterior alone, without any proposal's."""
         points = proposal.draw(count, rng)
         z = np.empty_like(points.w)
         for k, branch in enumerate(self._branches):
             z[points.branch == k] = branch.z(points.w[points.branch == k])
         settled = self._conditional.settled(z)
         prior = log_normal(points.w) + self._branches[0].log_prior
-        return _Draws(points, settled, settled.log_marginal + prior - proposal.log_density(points))
+        return _Draws(points, settled, settled.log_marginal + prior)
+
+
+class _Pool:
+    """Draws of several proposals, each weighed against the mixture of all."""
+
+    def __init__(self) -> None:
+        self._proposals: list[tuple[Proposal, int]] = []
+        self._draws: list[_Draws] = []
+
+    def add(self, proposal: Proposal, draws: _Draws) -> None:
+        self._proposals.append((proposal, len(draws.log_weight)))
+        self._draws.append(draws)
+
+    def join(self, other: _Pool) -> None:
+        self._proposals += other._proposals
+        self._draws += other._draws
+
+    def draws(self) -> _Draws:
+        """All of them; the mean of their weights is the evidence."""
+        whole = reduce(_Draws.joined, self._draws)
+        count = sum(each for _, each in self._proposals)
+        parts = [
+            np.log(each / count) + proposal.log_density(whole.points)
+            for proposal, each in self._proposals
+        ]
+        return replace(whole, log_weight=whole.log_weight - logsumexp(parts, axis=0))

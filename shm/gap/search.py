@@ -32,6 +32,10 @@ from shm.values import FloatArray
 SAMPLED_WITHIN = 4.0
 MOST_FITS = 30
 MOST_SAMPLED = 5
+BENT_WITHIN, MOST_BENT = 8.0, 6
+"""The same of a baseline with end springs, whose posterior no normal distribution follows: all
+that Laplace's method puts within so much, and the baseline itself, are sampled."""
+
 LEADERS = 3
 LEADING_PAIRS = 2
 MOST_PAIRS = 8
@@ -174,8 +178,12 @@ class Search:
         able = {e.hypothesis: e for e in tried if e.fit is not None and not e.hypothesis.flexible}
         weight = {h: e.log_evidence + log_prior(h, self.variants) for h, e in able.items()}
         first = max(weight.values())
-        near = [h for h in weight if weight[h] > first - SAMPLED_WITHIN]
-        chosen = sorted(near, key=lambda h: -weight[h])[:MOST_SAMPLED]
+        bent = len(self.problem.coordinates(Hypothesis()).other) > 0
+        within, most = (BENT_WITHIN, MOST_BENT) if bent else (SAMPLED_WITHIN, MOST_SAMPLED)
+        near = [h for h in weight if weight[h] > first - within]
+        chosen = sorted(near, key=lambda h: -weight[h])[:most]
+        if bent and Hypothesis() not in chosen:
+            chosen.append(Hypothesis())
         better = {h: able[h].fit for h in chosen}
         return [self._sampled(each, better.get(each.hypothesis)) for each in tried]
 

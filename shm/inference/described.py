@@ -16,12 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.special import ndtr, ndtri
-
 
 from shm.inference.coordinates import Coordinates, log_normal
 from shm.models.as_made import (
@@ -43,18 +39,11 @@ _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
 _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 """ln c and ln(mu l^2) by the deviations."""
 
-_FITTINGS = ((0.5, 0.0, 0.0), (0.5, -0.01, 0.015))
-"""Shares, means and standard deviations of ln of effective over taped length: a bar that ends where
-the tape did, or one whose forks, sockets or nuts are stiffer than it over one to three per cent of
-its length at each end, or whose supports give way. Which it is the frequencies say where they can."""
-
 _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
 _ALIKE_WITHIN, _MIDDLES = 0.09, 32
 _MOST_REDRAWN = 20
-_FARTHEST = 8.0
-"""Standard deviations to which c's distribution is tabulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +101,15 @@ class Deviations:
     def __init__(self, model: AsMade, calibration: Calibration | None):
         scatter = model.hanger.scatter
         sds = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
+        means: dict[str, float] = {}
         if not model.length_is_open:
-            sds[LENGTH] = scatter.length
+            means[LENGTH], sds[LENGTH] = _effective_length(model.hanger)
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
         taught = calibration is not None and BENDING in calibration.names
         if stated or (model.is_strand and taught):
             sds[BENDING] = scatter.bending_factor if stated else 0.3
         self.names = tuple(sds)
-        self.mean: FloatArray = np.zeros(len(self.names))
+        self.mean: FloatArray = np.array([means.get(name, 0.0) for name in self.names])
         covariance = np.diag(np.array(list(sds.values())) ** 2)
         if calibration is not None:
             rows = [self.names.index(n) for n in calibration.names if n in self.names]
@@ -141,6 +131,18 @@ class Deviations:
         if name not in self.names:
             return np.zeros(len(deviations))
         return np.asarray(deviations[:, self.names.index(name)])
+
+
+def _effective_length(hanger: Hanger) -> tuple[float, float]:
+    """Mean and standard deviation of ln of the length that swings over the taped one.
+
+    A fitting that is stiffer than the bar takes from none to all of its own length.
+    """
+    stated = hanger.scatter.effective_length
+    if math.isfinite(stated):
+        return 0.0, math.hypot(hanger.scatter.length, stated)
+    share = sum(hanger.fittings_m) / hanger.length_m
+    return -share / 2, math.hypot(hanger.scatter.length, share / math.sqrt(12))
 
 
 def _root(covariance: FloatArray) -> FloatArray:
@@ -201,31 +203,6 @@ def _reflected(shares: FloatArray) -> FloatArray:
     return np.where(folded > 1, 2 - folded, folded)
 
 
-@dataclass(frozen=True, eq=False)
-class _Ways:
-    """Normal distributions of x = (n, ln lambda): how the effective length may differ from the tape.
-
-    `shares` (w,), `mean` and `sd` (w,) of ln lambda; n is standard normal in each.
-    """
-
-    shares: FloatArray
-    mean: FloatArray
-    sd: FloatArray
-
-    @classmethod
-    def of(cls, hanger: Hanger, one: bool) -> _Ways:
-        """As taped, or as end fittings leave it; with `one` a single distribution as wide as both."""
-        stated = hanger.scatter.effective_length
-        if math.isfinite(stated):
-            return cls(np.ones(1), np.zeros(1), np.array([stated]))
-        shares, mean, sd = np.array(_FITTINGS).T
-        if not one:
-            return cls(shares, mean, sd)
-        centre = float(shares @ mean)
-        spread = math.sqrt(float(shares @ (sd**2 + (mean - centre) ** 2)))
-        return cls(np.ones(1), np.array([centre]), np.array([spread]))
-
-
 class DescribedCoordinates:
     """Places z (n, d) of parameters theta (n, parameters) of a bar as made.
 
@@ -254,25 +231,14 @@ class DescribedCoordinates:
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
         self._details = EndDetails(self.box.names, model.springs)
         self._reading = reading_of(tests)
-        taught = calibration is not None and LENGTH in calibration.names
-        fixed = _Ways(np.ones(1), np.zeros(1), np.zeros(1))
-        known = self._open or taught
-        self._ways = fixed if known else _Ways.of(self._hanger, self._reading is not None)
-        self._middle_way = fixed if known else _Ways.of(self._hanger, True)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
             others.append(own.row(section=1.0))
         if any(test.added_mass is not None for test in tests):
             others.append(own.row(section=1.0, density=1.0))
-        self._others = _basis(np.array(others).reshape(len(others), len(own.names)))
-        self._row_c = own.row(**_C)
-        self._mean_c = float(sum(own.mean_of(name) * share for name, share in _C.items()))
-        rest = self._row_c - self._others @ (self._others.T @ self._row_c)
-        self._size_c = float(np.linalg.norm(rest))
-        self._sees_c = not self._slips
-        seen = self._others.shape[1]
-        self.dimension = len(self.box.names) + seen + self._sees_c
-        self._spread_c = np.hypot(self._size_c, 2 * self._ways.sd)
+        seen = [] if self._slips else [own.row(**_C)]
+        self._seen = _basis(np.array([*others, *seen]).reshape(-1, len(own.names)))
+        self.dimension = len(self.box.names) + self._seen.shape[1]
 
     def _box(self) -> Prior:
         bounds = {TENSION: tuple(np.log(self.model.bounds[TENSION]))}
@@ -288,32 +254,14 @@ class DescribedCoordinates:
 
     # ------------------------------------------------ what is seen, and what is not
 
-    def _observed(self, with_reading: bool) -> tuple[FloatArray, FloatArray]:
-        """Rows A (r, k + 1) by which x = (n, ln lambda) is seen, and their noise's sd (r,)."""
-        rows = [np.append(row, 0.0) for row in self._others.T]
-        if self._sees_c:
-            rest = self._row_c - self._others @ (self._others.T @ self._row_c)
-            rows.append(np.append(rest, -2.0))
-        noise = [0.0] * len(rows)
-        if with_reading and self._reading is not None:
-            rows.append(self._row_mass)
-            noise.append(self._reading.sd)
-        return np.array(rows).reshape(len(rows), len(self._row_mass)), np.array(noise)
-
     @property
     def _row_mass(self) -> FloatArray:
-        """ln(mu l^2 lambda^2) by x: what stands between the tension and the apparent one."""
-        return np.append(self.deviations.row(**_MASS), 2.0)
+        """ln(mu l^2) by n (k,): what stands between the tension and the apparent one."""
+        return self.deviations.row(**_MASS)
 
     @property
-    def _mean_mass(self) -> float:
-        return float(sum(self.deviations.mean_of(name) * share for name, share in _MASS.items()))
-
-    def _gain(self, rows: FloatArray, noise: FloatArray, sd: float) -> FloatArray:
-        """How x follows what is seen (k + 1, r), by the normal's own regression."""
-        spread = np.append(np.ones(len(self._row_c)), sd**2)
-        inner = (rows * spread) @ rows.T + np.diag(noise**2)
-        return np.asarray((spread[:, None] * rows.T) @ np.linalg.pinv(inner, hermitian=True))
+    def _unseen_mass(self) -> FloatArray:
+        return np.asarray(self._row_mass - self._seen @ (self._seen.T @ self._row_mass))
 
     @property
     def reading(self) -> TensionReading | None:
@@ -322,104 +270,50 @@ class DescribedCoordinates:
     @property
     def reading_sd(self) -> float:
         """Of a measured tension about the one predicted at the middle of what is not seen."""
-        if self._reading is None:
-            return math.nan
-        sd = float(self._middle_way.sd[0])
-        rows, noise = self._observed(with_reading=False)
-        mass, spread = self._row_mass, np.append(np.ones(len(self._row_c)), sd**2)
-        left = mass - mass @ self._gain(rows, noise, sd) @ rows if len(rows) else mass
-        return math.hypot(self._reading.sd, math.sqrt(float(mass @ (spread * left))))
+        unseen = float(np.linalg.norm(self._unseen_mass))
+        return math.hypot(self._reading.sd, unseen) if self._reading else math.nan
 
-    def _middle(self, seen: FloatArray) -> FloatArray:
-        """The mean of x (n, k + 1) given what is seen (n, r)."""
-        mean, sd = float(self._middle_way.mean[0]), float(self._middle_way.sd[0])
-        rows, noise = self._observed(with_reading=False)
-        centre = np.append(np.zeros(len(self._row_c)), mean)
-        return np.asarray(
-            centre + (seen - rows @ centre) @ self._gain(rows, noise, sd).T
-            if len(rows)
-            else np.tile(centre, (len(seen), 1))
-        )
+    def _drawn(
+        self, inner: FloatArray, deviates: FloatArray, rng: np.random.Generator
+    ) -> FloatArray:
+        """n (n, k) given what is seen of it (n, r), and the reading along the mass."""
+        rest = rng.standard_normal((len(inner), len(self._row_mass)))
+        n = (deviates - rest @ self._seen) @ self._seen.T + rest
+        along = self._unseen_mass
+        size = float(np.linalg.norm(along))
+        if self._reading is None or size == 0:
+            return np.asarray(n)
+        along = along / size
+        nominal = math.log(self._hanger.nominal_tension_n) + self._mean_mass
+        off = math.log(self._reading.tension_n) - nominal - inner[:, 0] - n @ self._row_mass
+        off = off + size * (n @ along) - (self._reading.sd * rng.standard_normal(len(n)))
+        # Matheron's rule: the prior draw moved by what the noisy reading misses it by.
+        gain = size / (size**2 + self._reading.sd**2)
+        return np.asarray(n + (gain * (off - size * (n @ along)))[:, None] * along)
 
-    def _drawn(self, inner: FloatArray, seen: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """x (n, k + 1) given what is seen (n, r), and the reading: by Matheron's rule."""
-        count = len(inner)
-        rows, noise = self._observed(with_reading=True)
-        if self._reading is not None:
-            nominal = math.log(self._hanger.nominal_tension_n)
-            off = math.log(self._reading.tension_n) - nominal - inner[:, 0] - self._mean_mass
-            seen = np.column_stack([seen, off])
-        way = self._way_of(seen, rng)
-        x = rng.standard_normal((count, len(self._row_mass)))
-        x[:, -1] = self._ways.mean[way] + self._ways.sd[way] * x[:, -1]
-        noisy = seen - x @ rows.T - noise * rng.standard_normal((count, len(noise)))
-        for index, sd in enumerate(self._ways.sd):
-            mine = way == index
-            x[mine] += noisy[mine] @ self._gain(rows, noise, float(sd)).T
-        return x
-
-    def _way_of(self, seen: FloatArray, rng: np.random.Generator) -> IntArray:
-        """Which of the ways of the effective length each draw (n,) goes, by what is seen of c."""
-        log = np.tile(np.log(self._ways.shares), (len(seen), 1))
-        if self._sees_c:
-            away = seen[:, [self._others.shape[1]]] + 2 * self._ways.mean
-            log = log - 0.5 * (away / self._spread_c) ** 2 - np.log(self._spread_c)
-        share = np.exp(log - log.max(axis=1, keepdims=True)).cumsum(axis=1)
-        return (share < rng.random((len(seen), 1)) * share[:, -1:]).sum(axis=1)
-
-    def _seen_of(self, z: FloatArray) -> FloatArray:
-        """What is seen (n, r) at deviates (n, r): c's own part by the quantiles of its mixture."""
-        if not self._sees_c:
-            return z
-        own = self._quantile_c(z[:, -1])
-        return np.column_stack([z[:, :-1], own])
-
-    def _table_c(self) -> tuple[FloatArray, FloatArray]:
-        """Places y of c's part beyond the others, and their normal quantiles."""
-        centre = -2 * self._ways.mean
-        reach = 9 * self._spread_c.max() + np.abs(centre).max()
-        y = np.linspace(-reach, reach, 4001)
-        below = ndtr((y[:, None] - centre) / self._spread_c) @ self._ways.shares
-        above = ndtr((centre - y[:, None]) / self._spread_c) @ self._ways.shares
-        z = np.where(below < 0.5, ndtri(below.clip(1e-300)), -ndtri(above.clip(1e-300)))
-        kept = np.abs(z) < _FARTHEST + 0.5
-        return y[kept], z[kept]
-
-    def _quantile_c(self, z: FloatArray) -> FloatArray:
-        if len(self._ways.shares) == 1:
-            return np.asarray(-2 * self._ways.mean[0] + self._spread_c[0] * z)
-        return np.asarray(self._curves[0](z.clip(-_FARTHEST, _FARTHEST)))
-
-    def _place_c(self, y: FloatArray) -> FloatArray:
-        if len(self._ways.shares) == 1:
-            return np.asarray((y + 2 * self._ways.mean[0]) / self._spread_c[0])
-        low, high = self._curves[0]([-_FARTHEST, _FARTHEST])
-        return np.asarray(self._curves[1](y.clip(low, high)))
-
-    @cached_property
-    def _curves(self) -> tuple[PchipInterpolator, PchipInterpolator]:
-        y, z = self._table_c()
-        return PchipInterpolator(z, y), PchipInterpolator(y, z)
+    @property
+    def _mean_mass(self) -> float:
+        return float(sum(self.deviations.mean_of(name) * share for name, share in _MASS.items()))
 
     # ------------------------------------------------ places and parameters
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Parameters (n, parameters), what is not seen at its middle."""
         inner, deviates = self._split(z)
-        return self._assembled(inner, self._middle(self._seen_of(deviates)), None)
+        return self._assembled(inner, deviates @ self._seen.T, None)
 
     def finished(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Draws of all parameters (n, parameters): what is not seen is drawn."""
         inner, deviates = self._split(z)
-        inner, seen = self._inner.unfold(inner, rng), self._seen_of(deviates)
-        theta = self._assembled(inner, self._drawn(inner, seen, rng), rng)
+        inner = self._inner.unfold(inner, rng)
+        theta = self._assembled(inner, self._drawn(inner, deviates, rng), rng)
         if self._slips:
             column, (low, high) = self.names.index(BENDING), BENDING_FACTOR
             for _ in range(_MOST_REDRAWN):
                 out = np.flatnonzero((theta[:, column] < low) | (theta[:, column] > high))
                 if not len(out):
                     break
-                again = self._drawn(inner[out], seen[out], rng)
+                again = self._drawn(inner[out], deviates[out], rng)
                 theta[out] = self._assembled(inner[out], again, rng)
         return theta
 
@@ -428,13 +322,13 @@ class DescribedCoordinates:
         return self.theta(z)[:, 0] * self._hanger.nominal_tension_n
 
     def _assembled(
-        self, inner: FloatArray, x: FloatArray, rng: np.random.Generator | None
+        self, inner: FloatArray, n: FloatArray, rng: np.random.Generator | None
     ) -> FloatArray:
-        """Parameters (n, parameters) of the box's and of x = (n, ln lambda) (n, k + 1)."""
+        """Parameters (n, parameters) of the box's and of deviates n (n, k)."""
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
-        deviations = own.mean + x[:, :-1] @ own.factor.T
+        deviations = own.mean + n @ own.factor.T
         section, density, modulus = (own.column(deviations, name) for name in _DEVIATIONS)
-        taped = np.exp(own.column(deviations, LENGTH) + x[:, -1])
+        taped = np.exp(own.column(deviations, LENGTH))
         box = dict(zip(self.box.names, inner.T, strict=True))
         if self._slips:
             log_c = (section - density + modulus) / 2 - 2 * np.log(taped)
@@ -455,7 +349,7 @@ class DescribedCoordinates:
             low, high = self.model.bounds[name]
             known = box.get(name)
             if known is None:
-                known = np.full(len(x), high) if rng is None else rng.uniform(low, high, len(x))
+                known = np.full(len(n), high) if rng is None else rng.uniform(low, high, len(n))
             columns[name] = known + np.log10(stiffness / taped)
         return np.column_stack([columns[name] for name in self.names])
 
@@ -465,11 +359,11 @@ class DescribedCoordinates:
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
         taped = np.ones(len(theta)) if self._open else values[LENGTH]
         slip = values.get(BENDING, np.full(len(theta), stated))
-        logs = {name: values[name] for name in _DEVIATIONS} | {BENDING: np.log(slip / stated)}
+        logs = {name: values[name] for name in _DEVIATIONS}
+        logs |= {BENDING: np.log(slip / stated), LENGTH: np.log(taped)}
         deviations = np.column_stack(
             [logs.get(name, np.full(len(theta), own.mean_of(name))) for name in own.names]
         )
-        others = (deviations - own.mean) @ np.linalg.pinv(own.factor).T @ self._others
         stiffness = np.exp(2 * values[SECTION] + values[MODULUS]) * slip / stated
         mass = np.exp(values[SECTION] + values[DENSITY])
         log_c = np.log(stiffness / mass) / 2 - 2 * np.log(taped)
@@ -478,11 +372,8 @@ class DescribedCoordinates:
         box |= {name: values[name] - np.log10(stiffness / taped) for name in self._felt}
         inner = np.column_stack([box[name] for name in self.box.names])
         inner = inner.clip(self.box.lower, self.box.upper)
-        parts = [self._inner.places(inner), others]
-        if self._sees_c:
-            seen = others @ (self._others.T @ self._row_c)
-            parts.append(self._place_c(log_c - self._mean_c - seen)[:, None])
-        return np.hstack(parts)
+        deviates = (deviations - own.mean) @ np.linalg.pinv(own.factor).T @ self._seen
+        return np.hstack([self._inner.places(inner), deviates])
 
     def shared(self, names: Sequence[str], samples: FloatArray) -> tuple[IntArray, FloatArray]:
         """The columns of z that draws (n, parameters) of any class know, and their places there:
@@ -537,7 +428,7 @@ class DescribedCoordinates:
     def of_smooth(self, shares: FloatArray, deviates: FloatArray) -> FloatArray:
         """Parameters (n, parameters) of these, what is not seen at its middle."""
         inner = self.box.lower + (self.box.upper - self.box.lower) * shares
-        return self._assembled(inner, self._middle(self._seen_of(deviates)), None)
+        return self._assembled(inner, deviates @ self._seen.T, None)
 
     def _deviates(self, n: int, rng: np.random.Generator) -> FloatArray:
         return rng.standard_normal((n, self.dimension - len(self.box.names)))
@@ -561,9 +452,7 @@ def _is_felt(model: AsMade, spring: str, planes: set[Plane]) -> bool:
     return plane in planes
 
 
-def calibration_of(
-    names: Sequence[str], samples: FloatArray, hanger: Hanger
-) -> Calibration:
+def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:
     """What draws (n, parameters) of a posterior say of the bar's deviations."""
     values = dict(zip(names, samples.T, strict=True))
     kept = [n for n in (*_DEVIATIONS, LENGTH, BENDING) if n in values]

@@ -22,13 +22,13 @@ from emcee import EnsembleSampler
 from emcee.moves import DEMove, KDEMove
 
 from shm.errors import UsageError
-from shm.models import Model
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import Progress, UpdateOptions, silent
 from shm.inference.outcome import posterior_of
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, carried, search
 from shm.inference.updating import update
+from shm.models import Model
 from shm.values import FloatArray, ModalTest, Posterior
 
 RE_WEIGHTED = "re-weighted"

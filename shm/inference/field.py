@@ -42,7 +42,7 @@ hammer test reaches (docs/identification_benchmarks.md)."""
 
 
 class FieldLikelihood:
-    """Measured frequencies, one mode in all tests of like conditions together, and their likelihood.
+    """Measured frequencies, one mode in all tests of like conditions together; their likelihood.
 
     `frequency_hz` (data,) are weighted means over tests; `identification_error` (data,) their
     fractional standard deviations as stated. With a `reading` (tension in N, its fractional sd) the
@@ -131,7 +131,7 @@ class FieldLikelihood:
         return own
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
-        """Logarithms of predictions over measurements (n, data), mean systematic errors included."""
+        """Logarithms of predictions, with mean systematic errors, over measurements (n, data)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(predicted / self.frequency_hz) + self._shift
 

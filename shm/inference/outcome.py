@@ -115,9 +115,7 @@ def _draws(
     return np.column_stack([theta, sigma]), points.predicted
 
 
-def _most_probable(
-    problem: Problem, samples: FloatArray, log_likelihood: FloatArray
-) -> FloatArray:
+def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatArray) -> FloatArray:
     """The MAP estimate with sigma (parameters + 1,), climbed to from the likeliest sample."""
     coordinates = problem.coordinates
     if isinstance(coordinates, DescribedCoordinates):
@@ -142,6 +140,9 @@ def _highest_described(
         theta = coordinates.of_smooth(points[:, :count], points[:, count:])
         return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, points[:, count:]])
 
+    def one(point: FloatArray) -> FloatArray:
+        return np.asarray(scaled(point[None])[0])
+
     def slopes(point: FloatArray) -> FloatArray:
         steps = np.where(point < 0.5, _DIFFERENCE, -_DIFFERENCE)
         found = scaled(np.vstack([point, point + np.diag(steps)]))
@@ -150,9 +151,7 @@ def _highest_described(
     start = np.append(shares[at].clip(0, 1), seen[at])
     lower = np.append(np.zeros(count), np.full(len(start) - count, -np.inf))
     upper = np.append(np.ones(count), np.full(len(start) - count, np.inf))
-    fit = least_squares(
-        lambda point: scaled(point[None])[0], start, slopes, bounds=(lower, upper), max_nfev=30
-    )
+    fit = least_squares(one, start, slopes, bounds=(lower, upper), max_nfev=30)
     theta = coordinates.of_smooth(fit.x[None, :count], fit.x[None, count:])
     tau = problem.likelihood.likeliest_sigma(problem.run(theta))
     return np.append(theta[0], tau)
@@ -174,7 +173,8 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     own = np.asarray(likelihood.identification_error)
     common = np.median(outcome.samples[:, -1])
     known = likelihood.frequencies if isinstance(likelihood, FieldLikelihood) else len(own)
-    variance = np.asarray(likelihood.fit_error) ** 2 + np.where(np.arange(len(own)) < known, common**2, 0.0)
+    variance = np.asarray(likelihood.fit_error) ** 2
+    variance[:known] += common**2
     precision = slopes.T @ (slopes / variance[:, None]) + np.eye(slopes.shape[1])
     gain = np.linalg.solve(precision, (slopes / variance[:, None]).T)[:, :known]
     step = 1e-4 * np.eye(slopes.shape[1])

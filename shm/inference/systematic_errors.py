@@ -1,10 +1,10 @@
 """Errors that every test of a hanger has alike and that physics says the shape of.
 
 The accelerometer's own mass lowers each mode by where it sits, both planes alike; supports give way
-sideways and lower high orders of stiff bars. Both are small, known to first order and of uncertain
-size, so that their mean shifts a prediction and what is uncertain is a few normal errors ("loads":
-what one standard deviation of each does). The remaining errors of a mode are tau's
-(`shm.inference.field`).
+sideways and lower high orders of stiff bars; the section wanders. All are small, known to first
+order and of uncertain size, so that their mean shifts a prediction and what is uncertain is a few
+normal errors ("loads": what one standard deviation of each does). The remaining errors of a mode
+are tau's (`shm.inference.field`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ _GIVE_M_N, _GIVE_SD_M_N = 4e-9, 4e-9
 _ALIKE = 0.5
 """Of the variance of the supports' give, what both planes share."""
 
-_PLACES = 64
+_SECTION_REACH_M = 1.0
+"""Over which a rolled section goes together; a fifth of a short bar."""
+
+_PLACES, _FEW_PLACES = 64, 5
 _LEAST_SHARE = 1e-3
 
 
@@ -44,11 +47,55 @@ def systematic_errors(
     m w^2 / q of the amplitude. `places_m` are the sensors' where they are known.
     """
     sensor_mean, sensor = _sensors(hanger, order, places_m)
-    lowered = 4 * hanger.mass_per_length_kg_m * hanger.length_m * (frequency_hz / order) ** 2
-    common = np.sqrt(_ALIKE) * np.ones(len(plane))
-    own = np.sqrt(1 - _ALIKE) * (plane[:, None] == np.unique(plane))
-    give = -_GIVE_SD_M_N * lowered[:, None] * np.column_stack([common, own])
-    return sensor_mean - _GIVE_M_N * lowered, np.hstack([sensor, give])
+    section = _section(hanger, order)
+    lowered = _lowered(hanger, order, frequency_hz)
+    give = -_GIVE_SD_M_N * lowered[:, None] * _by_plane(plane)
+    return sensor_mean - _GIVE_M_N * lowered, np.hstack([sensor, give, section])
+
+
+def shared_loads(
+    hanger: Hanger, plane: IntArray, order: IntArray, frequency_hz: FloatArray
+) -> FloatArray:
+    """Loads (F, k) of sensors and supports alone, about no such error, k whatever the data are.
+
+    For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
+    theirs to claim.
+    """
+    ratio = 1 / (hanger.mass_per_length_kg_m * hanger.length_m)
+    low, high = np.minimum(_REACH_M, np.array([0.1, 0.5]) * hanger.length_m)
+    x_m = low + (high - low) * (np.arange(_FEW_PLACES) + 0.5) / _FEW_PLACES
+    felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2
+    sensor = np.hypot(_SENSOR_KG, _SENSOR_SD_KG) / np.sqrt(_FEW_PLACES) * felt
+    size = np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
+    return np.hstack([sensor, -size[:, None] * _by_plane(plane)])
+
+
+def _lowered(hanger: Hanger, order: IntArray, frequency_hz: FloatArray) -> FloatArray:
+    """By which part a frequency falls per m/N that the supports of its plane give way."""
+    mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
+    return np.asarray(4 * mass_kg * (frequency_hz / order) ** 2)
+
+
+def _by_plane(plane: IntArray) -> FloatArray:
+    """Shares (F, 3) of what the planes have in common and each for itself."""
+    own = np.sqrt(1 - _ALIKE) * (plane[:, None] == np.arange(2))
+    return np.column_stack([np.sqrt(_ALIKE) * np.ones(len(plane)), own])
+
+
+def _section(hanger: Hanger, order: IntArray) -> FloatArray:
+    """Loads (F, orders) of a section that wanders along the bar about its mean.
+
+    Of an area 1 + a(x), mode n changes by half of the mean of -a(x) cos(2 n pi x/L), to first order
+    and as a string (stiffness goes with the square of the area and adds as much where it counts);
+    the variance of that mean over a with correlation exp(-(s/r)^2 / 2) is
+    sd^2 sqrt(2 pi) (r/L) exp(-(2 n pi r/L)^2 / 2) / 2. Both planes have it alike.
+    """
+    reach = min(_SECTION_REACH_M / hanger.length_m, 0.2)
+    distinct = np.unique(order)
+    variance = np.sqrt(2 * np.pi) * reach * np.exp(-((2 * np.pi * distinct * reach) ** 2) / 2)
+    size = hanger.scatter.along * np.sqrt(variance / 2)
+    kept = size > _LEAST_SHARE * hanger.scatter.along
+    return np.asarray((order[:, None] == distinct[kept]) * size[kept])
 
 
 def _sensors(

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models import AsMade, Model
-from shm.models.as_made import RESTRAINT
 from shm.inference.hint import hinted
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
@@ -18,6 +16,8 @@ from shm.inference.problem import Problem
 from shm.inference.search import search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
+from shm.models import AsMade, Model
+from shm.models.as_made import RESTRAINT
 from shm.values import ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]

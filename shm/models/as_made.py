@@ -26,7 +26,7 @@ import numpy as np
 from shm.models.base import DESCRIPTION, Model, silent
 from shm.models.beam import Beam, Beam3
 from shm.models.conditions import Conditions
-from shm.values import AddedMass, FloatArray, Hanger, ModalTest, Plane
+from shm.values import AddedMass, FloatArray, ModalTest, Plane
 
 TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
@@ -53,8 +53,9 @@ class AsMade(Model):
 
     They stand behind its own: `theta_F` (true over nominal tension), `theta_L` (true over described
     length; where end plates leave the effective length open, effective over described), springs in
-    N m/rad, then `section`, `density` and `modulus` (logarithms of true over described area, density
-    and elastic modulus) and of a strand its `bending_factor` and, in beam3, its `shear_share`.
+    N m/rad, then `section`, `density` and `modulus` (logarithms of true over described area,
+    density and elastic modulus) and of a strand its `bending_factor` and, in beam3, its
+    `shear_share`.
     """
 
     priors = DESCRIPTION
@@ -103,12 +104,12 @@ class AsMade(Model):
         if plate is not None and self.length_is_open:
             # Plates hold the rod somewhere between their necks and their end faces.
             return 1 - 2 * plate.length_m / self.hanger.length_m, 1.0
-        most = _MOST_SD * self.hanger.scatter.length
-        return 1 - most, 1 + most
+        scatter, fittings = self.hanger.scatter, sum(self.hanger.fittings_m) / self.hanger.length_m
+        stated = scatter.effective_length
+        most = _MOST_SD * math.hypot(scatter.length, stated if math.isfinite(stated) else fittings)
+        return max(1 - most, 0.5), 1 + most
 
-    def stiffness_mass_length(
-        self, theta: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """e, mu and l, each (n,), of parameter sets (n, parameters)."""
         section, density, modulus = (self._column(theta, n) for n in (SECTION, DENSITY, MODULUS))
         slip = np.ones(len(theta))

@@ -1,4 +1,4 @@
-"""Beam 1 (clamped ends), Beam 2 (rotational end springs), thesis 2.4 and 5.1; Beam 3 (shear, too)."""
+"""Beam 1 (clamped ends) and Beam 2 (rotational end springs), thesis 2.4 and 5.1; Beam 3 (shear)."""
 
 from __future__ import annotations
 
@@ -147,15 +147,15 @@ class Beam3(Beam2):
         whose shear is `shear` (n,) times the theory's.
         """
         hanger, nu = self.hanger, self.hanger.poissons_ratio
-        shear_modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
-        coefficient = 6 * (1 + nu) / (7 + 6 * nu)
+        modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
+        rigid_n = 6 * (1 + nu) / (7 + 6 * nu) * modulus_pa * hanger.area_m2
         deck, arch = self.springs_n_m_rad(theta)
         return timoshenko_beam.frequencies_hz(
             self._length_m(theta)[:, None],
             self._tension_n(theta)[:, None],
             np.asarray(hanger.bending_stiffness_n_m2),
             np.asarray(hanger.mass_per_length_kg_m),
-            coefficient * shear_modulus_pa * hanger.area_m2 / (section * shear + _NO_SHEAR)[:, None],
+            rigid_n / (section * shear + _NO_SHEAR)[:, None],
             np.sqrt(hanger.second_moment_m4 / hanger.area_m2 * section)[:, None],
             deck,
             arch,

@@ -63,8 +63,8 @@ class Scatter:
     `tension` is how far the tension may be from the nominal one where that was weighed or measured;
     infinite where the nominal one says next to nothing. `bending_factor` is that of a strand's
     stated `bending_stiffness_factor`; NaN: anything from 0.3 to 1 (Papailiou 1997).
-    `effective_length` is by which the length that swings may differ from the taped one, as forks,
-    sockets or supports leave it open; NaN: as `shm.inference.described` has it.
+    `effective_length` is by which the length that swings may differ from the taped one; NaN: by
+    the tape's own error, and what `Hanger.fittings_m` leave open.
     """
 
     section: float = 0.01
@@ -132,7 +132,8 @@ class Hanger:
     `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of
     the solid section's bending stiffness that a strand has. Hangers of one `family` were made
     alike, of one delivery: what a measured tension says of the mass and stiffness of one holds for
-    its siblings. `models` names the model classes that
+    its siblings. `fittings_m` is over which length forks, sockets or threads stiffen the deck and
+    the arch end: so far the length that swings is open. `models` names the model classes that
     the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
     catalogue of effects. A bar with a nominal tension of 0 carries none.
     """
@@ -158,6 +159,7 @@ class Hanger:
     kind: Kind = "rod"
     family: str = ""
     limits: Limits = field(default_factory=Limits)
+    fittings_m: tuple[float, float] = (0.0, 0.0)
 
     @property
     def bending_stiffness_n_m2(self) -> float:

@@ -18,7 +18,7 @@ from typing import overload
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from shm.models import MODELS, AdoptedName, Model, described, is_adopted
+from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
 from shm.models.beam import Beam
 from shm.models.conditions import Conditions
 from shm.values import (
@@ -72,7 +72,7 @@ def watched_quantities(
     frequency by more than 1e-5, and parameters of adopted effects. Springs that can be exchanged
     without changing any frequency are one quantity.
     """
-    model = described(baseline.model, hanger)
+    model = class_of(baseline, hanger)
     base = base_point(baseline, model)
     responses = _responses(model, base, _held(model, base, modes), modes)
     springs = (_spring(each, baseline) for each in responses if each.largest > _INVISIBLE)
@@ -113,9 +113,17 @@ def _is_exchangeable(
 
 
 def base_point(baseline: Posterior, model: Model) -> FloatArray:
-    """The baseline's most probable parameter set (parameters,), its tension kept in N."""
+    """The baseline's most probable parameter set (parameters,), its tension kept in N.
+
+    What the bar as made deviates by from its description is part of it: all tests have it alike.
+    Springs lie within their prior, which is that of the described bar.
+    """
     known = dict(zip(baseline.names, baseline.most_probable.tolist(), strict=True))
     known[_TENSION_RATIO] *= baseline.nominal_tension_n / model.hanger.nominal_tension_n
+    springs, prior = _springs(model), model.prior
+    for name, lower, upper in zip(prior.names, prior.lower, prior.upper, strict=True):
+        if name in springs:
+            known[name] = float(np.clip(known[name], lower, upper))
     return np.array([known[name] for name in model.parameter_names])
 
 

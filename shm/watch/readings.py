@@ -31,7 +31,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from shm.errors import BadInput
-from shm.models import Model, described
+from shm.models import Model, class_of, described
 from shm.models.conditions import Conditions
 from shm.values import (
     PLANES,
@@ -139,7 +139,7 @@ class Reader:
         *,
         frequency_allowance: float = _FREQUENCY_ALLOWANCE,
     ):
-        self._model = described(baseline.model, hanger)
+        self._model = class_of(baseline, hanger)
         self._base = base_point(baseline, self._model)
         self._allowance = frequency_allowance
         usable = [test for test in tests if _is_described(test, self._model)]
@@ -158,7 +158,7 @@ class Reader:
         self._lowest = np.array([each.coordinates[0] for each in self.quantities])
         self._highest = np.array([each.coordinates[-1] for each in self.quantities])
         self.reference_temperature_c = mean_temperature_c(usable)
-        self._per_kelvin = self._softening(hanger, baseline.model)
+        self._per_kelvin = self._softening(hanger)
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
@@ -193,7 +193,7 @@ class Reader:
         total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
         return np.asarray(total / np.bincount(own, weight, len(self.modes)))
 
-    def _softening(self, hanger: Hanger, name: str) -> FloatArray:
+    def _softening(self, hanger: Hanger) -> FloatArray:
         """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
 
         Nothing where the class follows the temperature itself: it was fitted to what softens, too.
@@ -207,11 +207,12 @@ class Reader:
         if not np.array_equal(mild, warm):
             return np.zeros(len(self.modes))
         if model.expensive:
-            name, model = _CLAMPED, described(_CLAMPED, hanger)
+            model = described(_CLAMPED, hanger)
             known = dict(zip(self._model.parameter_names, base.tolist(), strict=True))
             base = np.array([known.get(each, 1.0) for each in model.parameter_names])
         stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
-        change = log_frequencies(described(name, stiffer), base[None], self.modes)
+        stiff = described(model.name, stiffer, model.priors)
+        change = log_frequencies(stiff, base[None], self.modes)
         change = change - log_frequencies(model, base[None], self.modes)
         return np.asarray(_MODULUS_PER_KELVIN * change[0] / _STIFFER)
 

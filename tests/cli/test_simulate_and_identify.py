@@ -9,7 +9,7 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.documents import load_modes
-from shm.models import build
+from shm.models import THESIS, build
 from shm.read import read
 from shm.values import Recording
 from shm_cli.main import run
@@ -38,7 +38,7 @@ def test_identified_frequencies_are_those_of_the_planted_state(
     assert ended.document["hanger"] == 3
     (test,) = ended.document["tests"]
     assert test["temperature_c"] == 7.5
-    truth = build("beam2", load_hanger(hanger_file)).frequencies_hz(
+    truth = build("beam2", load_hanger(hanger_file), THESIS).frequencies_hz(
         np.array([[650 / 711, 1, 7, 15, 7, 15]]), 8
     )[0]
     planes = ("transverse", "longitudinal")

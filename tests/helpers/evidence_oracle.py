@@ -23,7 +23,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from scipy.special import gammaincc, gammaln, logsumexp
 
-from shm.models import Model, build
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 
@@ -92,7 +92,7 @@ def log_marginal(square_misfit: FloatArray, frequencies: FloatArray, repeat: int
 
 def beam1_log_evidence(table: str, repeat: int, cells: int = 1000) -> float:
     """Beam1 by the midpoint rule with `cells` along each of theta_F and theta_L."""
-    model, measured = build("beam1", HANGER_3), np.array([TABLES[table][p] for p in PLANES])
+    model, measured = build("beam1", HANGER_3, THESIS), np.array([TABLES[table][p] for p in PLANES])
     theta_f, theta_l = _midpoints(0.5, 5.0, cells), _midpoints(0.5, 1.5, cells)
     values = []
     for chosen in theta_f[theta_f < 3]:
@@ -125,7 +125,7 @@ class _Beam2:
     """The likelihood of (theta_F, theta_L) for `measured` (2, modes): the rest integrated out."""
 
     def __init__(self, measured: FloatArray, repeat: int, resolution: Resolution):
-        self._model: Model = build("beam2", HANGER_3)
+        self._model: Model = build("beam2", HANGER_3, THESIS)
         self._measured, self._repeat = measured, repeat
         self._nodes = chebyshev.chebpts1(resolution.nodes)
         fine, weights = legendre.leggauss(resolution.springs)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from shm.documents import dump, modes_document
-from shm.models import build
+from shm.models import THESIS, build
 from shm.store import Workspace
 from shm.values import PLANES, Hanger, ModalTest, Mode
 
@@ -44,7 +44,7 @@ def make_workspace(
 
 def modes_of(hanger: Hanger, tension: float, modes: int = 6) -> tuple[Mode, ...]:
     """The first modes of a clamped beam, in both planes, at a fraction of the nominal tension."""
-    model = build("beam1", hanger)
+    model = build("beam1", hanger, THESIS)
     theta = np.array([[tension if name == "theta_F" else 1.0 for name in model.parameter_names]])
     frequencies = model.frequencies_hz(theta, modes)[0]
     return tuple(

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.models import build
+from shm.models import DESCRIPTION, THESIS, build
 from shm.inference import UpdateOptions, update
 from shm.values import PLANES, ModalTest, Mode, Posterior, Thresholds
 from shm.watch import (
@@ -30,7 +30,7 @@ BASELINE_TESTS = 3
 
 
 def _test(number: int, theta: tuple[float, ...], rng: np.random.Generator) -> ModalTest:
-    exact = build("beam2", HANGER_3).frequencies_hz(np.array([theta]), MODES)[0]
+    exact = build("beam2", HANGER_3, THESIS).frequencies_hz(np.array([theta]), MODES)[0]
     modes = tuple(
         Mode(plane, order + 1, float(hz * (1 + SD * rng.standard_normal())), float(hz * SD))
         for plane, row in zip(PLANES, exact, strict=True)
@@ -41,10 +41,10 @@ def _test(number: int, theta: tuple[float, ...], rng: np.random.Generator) -> Mo
 
 
 @cache
-def _baseline() -> tuple[Posterior, tuple[ModalTest, ...]]:
+def _baseline(priors: str = DESCRIPTION) -> tuple[Posterior, tuple[ModalTest, ...]]:
     rng = np.random.default_rng(1)
     tests = tuple(_test(number, SOUND, rng) for number in range(BASELINE_TESTS))
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, priors)
     return update(tests, model, UpdateOptions(samples=300, seed=1)), tests
 
 
@@ -52,8 +52,8 @@ def _dated(tests: tuple[ModalTest, ...]) -> list[tuple[ModalTest, datetime]]:
     return [(test, test.time) for test in tests if test.time is not None]
 
 
-def _watched(*later: tuple[float, ...]) -> Watched:
-    posterior, tests = _baseline()
+def _watched(*later: tuple[float, ...], priors: str = DESCRIPTION) -> Watched:
+    posterior, tests = _baseline(priors)
     rng = np.random.default_rng(2)
     since = tuple(_test(BASELINE_TESTS + k, theta, rng) for k, theta in enumerate(later))
     options = WatchOptions()
@@ -98,7 +98,8 @@ def test_a_test_older_than_the_baseline_is_compared_with_it_all_the_same() -> No
 def test_a_solid_class_is_watched_by_the_rotational_stiffness_of_its_faces() -> None:
     names = ("theta_F", "log10_k1", "log10_k2", "log10_k3", "log10_k4")
     samples = np.column_stack([np.ones(100), np.full((100, 4), 8.0)])
-    solid = replace(_baseline()[0], model="solid2", names=names, samples=samples)
+    known = replace(_baseline()[0], priors=THESIS)
+    solid = replace(known, model="solid2", names=names, samples=samples)
     found = end_stiffness(solid, HANGER_3)
     spacing, thickness, width = 0.0425, 0.040, 1.0644
     thin = 2e8 / spacing * (width * thickness**2 / 4 + thickness**3 / 12)

@@ -322,7 +322,9 @@ def _wander(rng: np.random.Generator, length_m: float, sd: float, share: float) 
     return relative
 
 
-def _toml(kind: _Kind, length_m: float, hanger: int, family: str | None) -> str:
+def _toml(
+    kind: _Kind, length_m: float, hanger: int, family: str | None, fittings_m: list[float]
+) -> str:
     rod = {"diameter_m": kind.diameter_m, "density_kg_m3": STEEL_KG_M3}
     strand = {"kind": "strand", "area_m2": kind.area_m2, "second_moment_m4": kind.second_moment_m4}
     strand |= {"mass_per_length_kg_m": kind.mass_kg_m, "bending_stiffness_factor": STATED_FACTOR}
@@ -330,6 +332,7 @@ def _toml(kind: _Kind, length_m: float, hanger: int, family: str | None) -> str:
     entry |= rod if kind.rod else strand
     entry |= {"length_m": length_m, "elastic_modulus_pa": kind.modulus_pa}
     entry |= {"nominal_tension_n": kind.stress_pa * kind.area_m2}
+    entry |= {"fittings_m": fittings_m} if any(fittings_m) else {}  # what anybody sees and tapes
     lines = (f"{k} = {json.dumps(v)}\n" for k, v in entry.items())  # also right for TOML
     return "[[hanger]]\n" + "".join(lines)
 
@@ -363,6 +366,7 @@ def _build(
     low, high = np.array([[0.01 * length, 1.2, 1.1], [0.03 * length, 4.0, 2.0]])
     drawn = (EndZone(*(float(v) for v in made.uniform(low, high))) for _ in range(2))
     zones = tuple(drawn) if zoned else (EndZone(), EndZone())
+    seen = [round(zone.length_m, 2) for zone in zones] if zoned else [0.0, 0.0]
     height = min(field.uniform(1.0, 2.2), field.uniform(0.15, 0.40) * length)  # within reach
     sensor = field.uniform(*knobs.sensor_kg)
     shear, rotary = SHEAR_FACTOR * modulus * area / (2 + 2 * POISSON), mass * second_moment / area
@@ -453,7 +457,7 @@ def _build(
     truth |= {"stated_sd": stated_sd if is_stated else None, "frequency_sd": float(real_sd)}
     measured = {"schema": "shm.modes/1", "hanger": hanger, "tests": documents}
     names = tuple(name for name, yes in groups if yes)
-    return Case(index, _toml(kind, stated_length, hanger, family), measured, truth, names)
+    return Case(index, _toml(kind, stated_length, hanger, family, seen), measured, truth, names)
 
 
 def sound_hangers(seed: int, count: int, nuisances: Nuisances | None = None) -> list[Case]:

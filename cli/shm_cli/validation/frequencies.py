@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.models import build
+from shm.models import THESIS, build
 from shm.values import FloatArray, Hanger
 from shm_cli import thesis
 
@@ -55,7 +55,7 @@ def compared(hanger: Hanger, progress: Callable[[str, float], None]) -> list[Fre
 def _fixed_ends(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     nominal = np.array([[1.0]])
     for name, table, limit in (("s1", "A.1", 0.3), ("s2", "A.2", np.nan), ("solid0", "A.3", 0.3)):
-        found = build(name, hanger).reference_frequencies_hz(nominal, _MODES)[0, 0]
+        found = build(name, hanger, THESIS).reference_frequencies_hz(nominal, _MODES)[0, 0]
         yield _row(table, name, "711 kN", found, tables[name]["converged"], limit)
 
 
@@ -73,7 +73,7 @@ def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[Fre
         nominal_tension_n=hanger.nominal_tension_n * area / hanger.area_m2,
     )
     theta = np.array([[1.0, 1 - 2 * plate_m / hanger.length_m]])
-    euler = build("beam1", faceted).frequencies_hz(theta, _MODES)[0, 0]
+    euler = build("beam1", faceted, THESIS).frequencies_hz(theta, _MODES)[0, 0]
     shear = _solid_over_beam(hanger, theta)
     condition = f"section of {corners} corners, same stress"
     yield _row("A.2", "s2", condition, euler * shear, tables["s2"]["converged"], 0.3)
@@ -81,15 +81,15 @@ def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[Fre
 
 def _solid_over_beam(hanger: Hanger, theta: FloatArray) -> FloatArray:
     """What shear and rotary inertia take off the clamped beam's frequencies."""
-    solid = build("s2", hanger).reference_frequencies_hz(theta[:, :1], _MODES)[0, 0]
-    return np.asarray(solid / build("beam1", hanger).frequencies_hz(theta, _MODES)[0, 0])
+    solid = build("s2", hanger, THESIS).reference_frequencies_hz(theta[:, :1], _MODES)[0, 0]
+    return np.asarray(solid / build("beam1", hanger, THESIS).frequencies_hz(theta, _MODES)[0, 0])
 
 
 def _springs(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     for name, table in (("solid1", "A.4"), ("solid2", "A.5")):
         stiffness = {key: min(float(key[1:]), _STIFFEST_SOLVED) for key in tables[name]}
         theta = np.array([[1.0, *[np.log10(k)] * _SPRINGS[name]] for k in stiffness.values()])
-        found = build(name, hanger).reference_frequencies_hz(theta, _MODES)[:, 0]
+        found = build(name, hanger, THESIS).reference_frequencies_hz(theta, _MODES)[:, 0]
         for key, ours in zip(stiffness, found, strict=True):
             condition = f"k = {float(key[1:]):.0e} N/m"
             yield _row(table, name, condition, ours, tables[name][key], 1.5)
@@ -97,7 +97,7 @@ def _springs(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
 
 def _clamped_beams(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     """Tables A.6 and A.7 at the stated tension, and at the one that they carry."""
-    model = build("beam1", hanger)
+    model = build("beam1", hanger, THESIS)
     for key, length_m, table in (("length_12", 12.0, "A.6"), ("length_9_817", 9.817, "A.7")):
         printed = list(tables["beam1_in_thesis"][key])
         carried_n = _TENSIONS_OF_BEAM_TABLES_N[key]

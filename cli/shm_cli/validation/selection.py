@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.documents import load_modes
-from shm.models import build
 from shm.inference import UpdateOptions, select
+from shm.models import THESIS, build
 from shm.values import Hanger, Posterior, Selection
 from shm_cli import thesis
 
@@ -46,7 +46,7 @@ def compared(
     rows = []
     for printing, path in thesis.PRINTINGS.items():
         for repeat in _REPEATS:
-            models = [build(name, hanger) for name in thesis.EVIDENCE]
+            models = [build(name, hanger, THESIS) for name in thesis.EVIDENCE]
             options = UpdateOptions(samples=2000, seed=seed, repeat=repeat)
             label = f"{printing}, N_D = {repeat},"
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.errors import UsageError
+from shm.models.as_made import TENSION_RATIO, AsMade
 from shm.models.base import Model
 from shm.models.beam import Beam
 from shm.models.composed.scatter import Deviation
@@ -44,8 +45,8 @@ class Baseline:
         left_out = {_LENGTH} if hanger.nominal_tension_n else {_LENGTH, _TENSION}
         self.parameters = tuple(
             self._parameter(key, *both)
-            for key, both in self._model.bounds.items()
-            if key not in left_out
+            for key, both in AsMade(self._model).bounds.items()
+            if key in self._model.bounds and key not in left_out
         )
         self._last: tuple[bytes, int, FloatArray] | None = None
 
@@ -85,7 +86,9 @@ class Baseline:
         if key == _TENSION and math.isfinite(known):
             reason = "the nominal tension, as exactly as the hanger's description states it"
             return Deviation(key, "", 1 - known, 1 + known, NAN, reason)
-        reason = f"the prior of model class {self.name}"
+        reason = "the prior of the hanger's description"
+        if key == _TENSION:
+            return Parameter(key, "", *TENSION_RATIO, NAN, reason, spread="logarithmic")
         return Parameter(key, _unit(key), lower, upper, NAN, reason)
 
     def _whole(self, theta: FloatArray) -> FloatArray:
