@@ -22,8 +22,11 @@ from shm.gap.shrinkage import held_out, shrinkage
 from shm.gap.trends import trends
 from shm.gap.where import residuals
 from shm.models import check_baseline
+from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
 from shm.values import (
+    ENOUGH_EFFECTIVE,
+    MOST_MISFIT_PERCENT,
     NAN,
     Cause,
     Diagnosis,
@@ -78,6 +81,8 @@ def diagnose(
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
+    tension_before = _tension(problem, [(1.0, before)], rng)
+    tension_after = _tension(problem, possible(attribution), rng)
     return Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
@@ -94,10 +99,11 @@ def diagnose(
         fit_p_value=attribution.p_value,
         model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
-        tension_before_n=_tension(problem, [(1.0, before)], rng),
-        tension_after_n=_tension(problem, possible(attribution), rng),
+        tension_before_n=tension_before,
+        tension_after_n=tension_after,
         next_measurements=following,
         remarks=(
+            *_states(problem, before, after, tension_after),
             *found.remarks,
             *clear.misnumbered,
             *set_aside(aside, clear.otherwise),
@@ -107,6 +113,39 @@ def diagnose(
         seconds=time.perf_counter() - started,
         outliers=aside,
     )
+
+
+def _states(
+    problem: GapProblem, before: Fit, after: Fit | None, tension_n: TensionEstimate
+) -> tuple[str, ...]:
+    """What keeps the answer from being taken at its word, to be read first."""
+    found = []
+    for fit in (before, *((after,) if after else ())):
+        if fit.effective < ENOUGH_EFFECTIVE:
+            what = fit.hypothesis.name.replace("_", " ") or f"baseline {problem.baseline}"
+            found.append(
+                f"The sampler failed for {what}: {fit.effective:.0f} effective draws, "
+                f"{ENOUGH_EFFECTIVE} are needed. Its probability and its tension are uncertain."
+            )
+    nominal_n = problem.hanger.nominal_tension_n
+    if nominal_n and (
+        tension_n.q95 > 0.98 * TENSION_RATIO[1] * nominal_n
+        or tension_n.q05 < 1.02 * TENSION_RATIO[0] * nominal_n
+    ):
+        found.append(
+            f"The tension lies at the bound of its prior ({TENSION_RATIO[0]:g} to "
+            f"{TENSION_RATIO[1]:g} times nominal): check nominal_tension_n and the description."
+        )
+    best = after or before
+    count = problem.design.frequencies
+    rest = (problem.observations.value - best.predicted)[:count]
+    misfit_percent = 100 * float(np.sqrt(np.mean(rest**2)))
+    if misfit_percent > MOST_MISFIT_PERCENT:
+        found.append(
+            f"The leading explanation misses the frequencies by {misfit_percent:.1f} % (root mean "
+            "square): it does not fit this hanger."
+        )
+    return tuple(found)
 
 
 def _cause(problem: GapProblem, explanation: Explanation) -> Cause:

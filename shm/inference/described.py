@@ -26,6 +26,7 @@ from shm.models.as_made import (
     DENSITY,
     LENGTH,
     MODULUS,
+    RESTRAINT,
     SECTION,
     SHEAR,
     TENSION,
@@ -43,6 +44,7 @@ _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
 _ALIKE_WITHIN, _MIDDLES = 0.09, 32
+_STIFFEST = 1 / math.log10(RESTRAINT[1] / RESTRAINT[0])
 _MOST_REDRAWN = 20
 
 
@@ -154,10 +156,10 @@ def _root(covariance: FloatArray) -> FloatArray:
 class EndDetails:
     """The prior of springs together: the ends of one hanger are rarely each of another kind.
 
-    Each spring by itself is uniform in log10 k over its range. Together they are independent, or
-    all alike, or alike in each plane (a fork turns about one axis), a third each; alike is within
-    `_ALIKE_WITHIN` of the range, 0.4 decades. `columns` are those of the box's `names`. Reflection
-    at both ends of the range keeps each spring's own prior uniform.
+    They are independent, or all alike, or alike in each plane (a fork turns about one axis), or
+    made to clamp (welded, or a nut on a thick plate): all in the stiffest decade. A quarter each,
+    every spring's log10 k uniform over its range, or over that decade; alike is within
+    `_ALIKE_WITHIN` of the range, 0.4 decades. `columns` are those of the box's `names`.
     """
 
     def __init__(self, names: Sequence[str], springs: Sequence[str]):
@@ -176,7 +178,9 @@ class EndDetails:
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Shares of the springs' ranges (n, springs)."""
         shares = rng.random((n, len(self.columns)))
-        kind = rng.integers(len(self._kinds), size=n)
+        kind = rng.integers(len(self._kinds) + 1, size=n)
+        stiff = kind == len(self._kinds)
+        shares[stiff] = 1 - _STIFFEST * shares[stiff]
         for index, groups in enumerate(self._kinds[1:], start=1):
             rows = np.flatnonzero(kind == index)
             for group in groups:
@@ -195,7 +199,9 @@ class EndDetails:
         for groups in self._kinds[1:]:
             parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
             total = total + np.prod(parts, axis=0)
-        return np.asarray(np.log(total / len(self._kinds)))
+        stiff = (shares > 1 - _STIFFEST).all(axis=1)
+        total = total + stiff * _STIFFEST ** -float(shares.shape[1])
+        return np.asarray(np.log(total / (len(self._kinds) + 1)))
 
 
 def _reflected(shares: FloatArray) -> FloatArray:

@@ -16,15 +16,16 @@ from datetime import datetime
 import numpy as np
 
 from shm.errors import NothingThere, UsageError
+from shm.inference import update
+from shm.inference.options import Progress, silent
+from shm.inference.tmcmc import normalised
 from shm.models import build
 from shm.models.adopted import variant_of
 from shm.models.adopted_name import AdoptedName
+from shm.pipeline.calibrating import options_of
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.terms import update_terms
 from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredSelection, Workspace
-from shm.inference import UpdateOptions, update
-from shm.inference.options import Progress, silent
-from shm.inference.tmcmc import normalised
 from shm.values import Hanger, Posterior
 from shm.watch import gap_percent, has_grown
 
@@ -100,11 +101,11 @@ def adopt(
     name = adopted_name(wish.effects, wish.at, wish.baseline, hanger, diagnosis, tests)
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
-    samples, seed, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
+    terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
     posterior = update(
         [test.test for test in chosen],
-        build(str(name), hanger),
-        UpdateOptions(samples=samples, seed=seed),
+        build(str(name), hanger, terms.priors),
+        options_of(terms, hanger),
         progress,
         hint=baseline.posterior,
     )

@@ -12,9 +12,9 @@ from typing import Any
 
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
-from shm.models import competing_names
+from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.parcel import Opens, Parcel
-from shm.pipeline.terms import identify_lineage, update_terms
+from shm.pipeline.terms import Taught, identify_lineage, update_terms
 from shm.pipeline.watching import to_watch
 from shm.resources import give_back_memory
 from shm.store import (
@@ -29,6 +29,7 @@ from shm.store import (
     Workspace,
 )
 from shm.values import Alert, Hanger, Posterior, Selection, WatchedTest
+from shm.values.stated_tension import averaged_now
 
 DELIVERIES = 16
 _DELIVERIES_A_HOOK = 4
@@ -139,13 +140,21 @@ class Jobs:
     def _later_tests(
         self, hanger: Hanger, model: str, tests: Sequence[WaitingTest], oldest: int | None
     ) -> Iterator[Job]:
-        for test in tests:
-            if test.stage is Stage.IDENTIFIED:
-                yield _job("update", test.id, partial(self._update, hanger, model, test), [test])
+        to_update = [test for test in tests if test.stage is Stage.IDENTIFIED]
+        for test in self._untaught(to_update):
+            yield _job("update", test.id, partial(self._update, hanger, model, test), [test])
         # Watched in the order of their times, so that an alert names the first test that shows it.
         for test in tests[:1]:
             if test.stage is Stage.UPDATED and (oldest is None or test.recording_id < oldest):
                 yield _job("watch", test.id, partial(self._watch, hanger, test), [test])
+
+    def _untaught(self, tests: Sequence[WaitingTest]) -> Iterator[WaitingTest]:
+        """Tests up to the first whose tension was read: later ones learn from its posterior."""
+        weighed = self.store.weighed_among([test.id for test in tests]) if len(tests) > 1 else ()
+        for test in tests:
+            yield test
+            if test.id in weighed:
+                return
 
     def _identify(self, recording: StoredRecording) -> Step:
         workspace, selected = self.workspace, self.store.selected_models()
@@ -165,9 +174,10 @@ class Jobs:
         tests = [self.store.test(test.id) for test in first]
         names = competing_names(hanger, self.workspace.settings.model_names)
         settings = self.workspace.settings
-        samples, seed, lineage = update_terms(hanger, names, tests, settings)
+        taught = self._taught(hanger, min(test.time for test in tests))
+        terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
         plain = [test.test for test in tests]
-        run = partial(run_step, "select_model", plain, hanger, names, samples, seed)
+        run = partial(run_step, "select_model", plain, hanger, names, terms)
 
         def keep(found: Selection) -> None:
             self.store.selected(hanger.id, tests, found, lineage, self.clock())
@@ -179,9 +189,9 @@ class Jobs:
         test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id, model)
         # Not the latest posterior: a result must not depend on which tests were computed before.
         known = baseline.posterior if baseline else None
-        settings = self.workspace.settings
-        samples, seed, lineage = update_terms(hanger, [model], [test], settings, known)
-        run = partial(run_step, "update_test", test.test, hanger, model, known, samples, seed)
+        settings, taught = self.workspace.settings, self._taught(hanger, test.time)
+        terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
+        run = partial(run_step, "update_test", test.test, hanger, model, known, terms)
         makes_baseline = self._makes_baseline(test, model)
 
         def keep(found: Posterior) -> None:
@@ -190,6 +200,25 @@ class Jobs:
             self.store.keep_summaries(hanger)
 
         return Step(run, keep)
+
+    def _taught(self, hanger: Hanger, before: datetime) -> Taught | None:
+        """The last time before then that the hanger's own tension was read, else a sibling's."""
+        if self.workspace.settings.priors != DESCRIPTION:
+            return None
+        siblings = [
+            each.id
+            for each in self.workspace.bridge.hangers
+            if hanger.family and each.family == hanger.family and each.id != hanger.id
+        ]
+        own = self.store.weighed_test([hanger.id], before)
+        weighed = own or (self.store.weighed_test(siblings, before) if siblings else None)
+        if weighed is None:
+            return None
+        try:
+            posterior = self.store.posterior_of(weighed)
+        except NothingThere:  # not through updating yet
+            return None
+        return Taught(posterior, own is not None)
 
     def _makes_baseline(self, test: StoredTest, model: str) -> bool:
         """Whether a test, done again, would be compared with what it has made itself."""
@@ -207,6 +236,9 @@ class Jobs:
         limit_years = self.workspace.settings.false_call_years
         needed = to_watch(self.store, baseline, test)
         tests = (needed.baseline_tests, needed.later)
+        selection = self.store.selection(hanger.id)
+        compared = None if selection is None else selection.selection
+        tension = averaged_now(current, compared, hanger.limits)
         step = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
@@ -217,7 +249,7 @@ class Jobs:
             state = KeptWatch(needed.key, test.time, content)
             return self.store.watched(test, baseline, watched, alert, hooks, self.clock(), state)
 
-        return Step(partial(step, needed.kept), keep)
+        return Step(partial(step, needed.kept, tension), keep)
 
     def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

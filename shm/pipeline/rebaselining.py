@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from shm.errors import NothingThere
+from shm.inference import update
+from shm.inference.options import Progress, silent
 from shm.models import build
+from shm.pipeline.calibrating import options_of
 from shm.pipeline.terms import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
-from shm.inference import UpdateOptions, update
-from shm.inference.options import Progress, silent
 from shm.values import Hanger
 
 
@@ -50,11 +51,11 @@ def rebaseline(
         )
     chosen = _since(store, hanger, order.since)
     model = before.posterior.model
-    samples, seed, lineage = update_terms(hanger, [model], chosen, workspace.settings)
+    terms, lineage = update_terms(hanger, [model], chosen, workspace.settings)
     posterior = update(
         [test.test for test in chosen],
-        build(model, hanger),
-        UpdateOptions(samples=samples, seed=seed),
+        build(model, hanger, terms.priors),
+        options_of(terms, hanger),
         progress,
         hint=before.posterior,
     )

@@ -12,15 +12,16 @@ from shm.bridge import Bridge
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
+from shm.inference import refresh, select, update
 from shm.models import build
+from shm.pipeline.calibrating import options_of
 from shm.pipeline.parcel import Opens
-from shm.pipeline.terms import competing, identify_settings, read_limits
+from shm.pipeline.terms import Terms, competing, identify_settings, read_limits
 from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX
-from shm.inference import UpdateOptions, refresh, select, update
-from shm.values import Alert, Hanger, ModalTest, Posterior, Selection, WatchedTest
+from shm.values import Alert, Averaged, Hanger, ModalTest, Posterior, Selection, WatchedTest
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
@@ -109,19 +110,19 @@ def _refuse_future(time: datetime | None, latest: datetime, what: str) -> None:
 
 
 def select_model(
-    tests: Sequence[ModalTest], hanger: Hanger, names: Sequence[str], samples: int, seed: int
+    tests: Sequence[ModalTest], hanger: Hanger, names: Sequence[str], terms: Terms
 ) -> Selection:
     """The competing classes of a hanger, compared on its first tests."""
-    models = [build(name, hanger) for name in names]
-    return select(tests, models, UpdateOptions(samples=samples, seed=seed))
+    models = [build(name, hanger, terms.priors) for name in names]
+    return select(tests, models, options_of(terms, hanger))
 
 
 def update_test(
-    test: ModalTest, hanger: Hanger, name: str, known: Posterior | None, samples: int, seed: int
+    test: ModalTest, hanger: Hanger, name: str, known: Posterior | None, terms: Terms
 ) -> Posterior:
     """The posterior of one test in the selected class, from what is `known` where that helps."""
-    model, options = build(name, hanger), UpdateOptions(samples=samples, seed=seed)
-    # Where the description has changed since, the class may have other parameters by now.
+    model, options = build(name, hanger, terms.priors), options_of(terms, hanger)
+    # Where description or priors have changed since, the class may have other parameters by now.
     if known is None or known.names[:-1] != model.parameter_names:
         return update([test], model, options)
     return refresh([test], model, known, options)
@@ -134,8 +135,11 @@ def watch_test(
     hanger: Hanger,
     limit_years: float,
     kept: bytes | None = None,
+    tension: Averaged | None = None,
 ) -> tuple[WatchedTest, Alert | None, bytes] | None:
     """What the watch says after a test, the alert that it calls for, and what to keep of it.
+
+    The alert leads with the `tension` by the test.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
     that one alone, with what was `kept` before it: None where nothing can go on from that.
@@ -154,5 +158,5 @@ def watch_test(
     gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
     alert = joined(found.alert, gap)
     # A new baseline makes a standing condition a new one.
-    alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}")
+    alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}", tension=tension)
     return found.test, alert, found.kept

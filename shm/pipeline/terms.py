@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -31,14 +31,33 @@ _IDENTIFY_SETTINGS = (
 )
 
 
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """The posterior of a test whose tension was read, too; `own`: of this hanger, not a sibling."""
+
+    posterior: Posterior
+    own: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """How an update is made: samples, seed, priors, and what a measured tension has taught."""
+
+    samples: int
+    seed: int
+    priors: str
+    taught: Taught | None = None
+
+
 def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
     """The selected class of a hanger, or all that compete where none is selected yet.
 
     Raises UsageError where the selected class does not apply to the hanger, or none does.
     """
     if hanger.id in selected:
-        return (build(selected[hanger.id], hanger),)
-    return tuple(build(name, hanger) for name in competing_names(hanger, settings.model_names))
+        return (build(selected[hanger.id], hanger, settings.priors),)
+    names = competing_names(hanger, settings.model_names)
+    return tuple(build(name, hanger, settings.priors) for name in names)
 
 
 def identify_settings(settings: Settings) -> dict[str, Any]:
@@ -79,14 +98,16 @@ def update_terms(
     tests: Sequence[StoredTest],
     settings: Settings,
     known: Posterior | None = None,
-) -> tuple[int, int, Lineage]:
-    """Samples, seed and lineage of an update; the seed depends on what is updated alone."""
-    samples, seed = settings.samples, seed_of(settings.seed, [test.key for test in tests])
-    terms = {"models": list(models), "samples": samples, "seed": seed}
+    taught: Taught | None = None,
+) -> tuple[Terms, Lineage]:
+    """Terms and lineage of an update; the seed depends on what is updated alone."""
+    seed = seed_of(settings.seed, [test.key for test in tests])
+    terms = Terms(settings.samples, seed, settings.priors, taught)
+    plain = {"samples": terms.samples, "seed": seed, "priors": terms.priors}
     inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
-    if known is not None:
-        inputs.append(hashlib.sha256(known.samples.tobytes()).hexdigest())
-    return samples, seed, Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
+    from_others = [known, taught.posterior if taught else None]
+    inputs += [hashlib.sha256(each.samples.tobytes()).hexdigest() for each in from_others if each]
+    return terms, Lineage.of(inputs, {"models": list(models), **plain, "hanger": asdict(hanger)})
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

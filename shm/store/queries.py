@@ -46,6 +46,7 @@ plain_tests = sa.select(*_columns, recordings.c.sha256).join(recordings)
 _undone = adoptions.c.undone_at.is_not(None)
 _undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
+_WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
 # holds, or it was adopted and that was undone. And those of baselines set anew: their tests have
 # a posterior each, which must still show what moved between them.
@@ -140,6 +141,24 @@ class Queries(Database):
         if hanger is not None:
             query = query.where(tests.c.hanger == hanger)
         return self._tests(query.order_by(tests.c.time, tests.c.id))
+
+    def weighed_test(self, hangers: Collection[int], before: datetime) -> StoredTest | None:
+        """The latest test of these hangers before then whose tension was read, too."""
+        query = plain_tests.where(
+            tests.c.hanger.in_(hangers),
+            tests.c.time < before,
+            tests.c.stage != Stage.REFUSED,
+            in_force(tests),
+            _WEIGHED,
+        )
+        found = self._tests(query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(1))
+        return found[0] if found else None
+
+    def weighed_among(self, ids: Collection[int]) -> frozenset[int]:
+        """Which of these tests are of a tension that was read, too."""
+        query = sa.select(tests.c.id).where(tests.c.id.in_(ids), _WEIGHED)
+        with self.reading() as connection:
+            return frozenset(connection.scalars(query))
 
     def tests_of(self, baseline: Baseline) -> tuple[StoredTest, ...]:
         """The tests from which a baseline was made, as they were then, by time."""

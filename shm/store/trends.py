@@ -22,8 +22,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.errors import UsageError
 from shm.documents import averaged_document, averaged_from
+from shm.errors import UsageError
 from shm.store.blobs import number, posterior_from
 from shm.store.columns import Number
 from shm.store.database import Database

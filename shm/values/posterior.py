@@ -98,7 +98,7 @@ class Posterior:
     def caveats(self) -> tuple[str, ...]:
         """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
         found = []
-        if self.effective_sample_size < ENOUGH_EFFECTIVE:
+        if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
                 f"The sampler failed: {self.effective_sample_size:.0f} effective draws of "
                 f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. Do not use this tension."

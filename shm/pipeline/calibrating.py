@@ -1,0 +1,58 @@
+"""A measured tension teaches what the bar is made of: for its later tests, and for its siblings.
+
+Frequencies see tension, mass and length together; where the tension was read as well, what is left
+is mass, stiffness and length of that bar. Siblings of one delivery share its steel and its rolling,
+not its tape: their own scatter about the one that was weighed is taken for a third of the stated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.inference import UpdateOptions
+from shm.inference.described import Calibration, calibration_of
+from shm.models import DESCRIPTION
+from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.pipeline.terms import Taught, Terms
+from shm.values import Hanger, Posterior
+
+_SHARE_WITHIN_A_FAMILY = 1 / 3
+_UNSTATED_BENDING_SD = 0.3
+
+
+def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
+    """The terms of an update as its options."""
+    learnt = calibration(terms.taught, hanger)
+    return UpdateOptions(samples=terms.samples, seed=terms.seed, calibration=learnt)
+
+
+def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
+    """What a measured tension has taught of `hanger`; None where there is nothing to learn from."""
+    if taught is None or not is_teacher(taught.posterior):
+        return None
+    learnt = calibration_of(taught.posterior.names, taught.posterior.samples, hanger)
+    return learnt if taught.own else of_sibling(learnt, hanger)
+
+
+def is_teacher(posterior: Posterior) -> bool:
+    """Whether the bar as made is among its parameters."""
+    return posterior.priors == DESCRIPTION and SECTION in posterior.names
+
+
+def of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:
+    """The same for a hanger of the same family, whose length was taped on its own."""
+    scatter = hanger.scatter
+    bending = scatter.bending_factor
+    sds = {
+        SECTION: scatter.section,
+        DENSITY: scatter.density,
+        MODULUS: scatter.modulus,
+        BENDING: bending if np.isfinite(bending) else _UNSTATED_BENDING_SD,
+    }
+    kept = [index for index, name in enumerate(learnt.names) if name != LENGTH]
+    names = tuple(learnt.names[index] for index in kept)
+    own = np.array([_SHARE_WITHIN_A_FAMILY * sds[name] for name in names])
+    covariance = learnt.covariance[np.ix_(kept, kept)] + np.diag(own**2)
+    return replace(learnt, names=names, mean=learnt.mean[kept], covariance=covariance)
