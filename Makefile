@@ -31,7 +31,7 @@ SLOW := $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
 	$(patsubst %,tests/watch/test_%.py,bridge_drifts neighbours sequential sequential_rate \
 		state watching)
-NUMERICS := $(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile \
+NUMERICS := $(BIN)/python -m pytest --quiet \
 	tests/models tests/gap tests/inference tests/watch $(SLOW:%=--ignore=%)
 
 test-arithmetic: .venv/development

@@ -14,6 +14,7 @@ from shm.settings import load_settings
 from shm.values import Limits, Selection
 from shm.values.force_units import force_unit
 from shm_cli import completers
+from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -49,6 +50,7 @@ from shm_cli.update import modes_argument, show_stated, tell_irregular, tell_poo
 @repeat_option
 @method_option
 @priors_option
+@calibrated_by_option
 @json_option
 @click.pass_context
 def command(
@@ -62,6 +64,7 @@ def command(
     repeat: int,
     method: str,
     priors: str,
+    calibrated_by: Path | None,
     as_json: bool,
 ) -> None:
     """Compare model classes by their evidence.
@@ -80,6 +83,7 @@ def command(
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
     tell_irregular(tests)
     with progress_bar("updating") as progress:
+        options = calibrated(options, calibrated_by, hanger, chosen, progress)
         selection = select(tests, chosen, options, progress)
     tell_poor_fit(selection.selected)
     if as_json:

@@ -15,6 +15,7 @@ from shm.values import Averaged, Limits, ModalTest, Posterior
 from shm.values.force_units import force_unit
 from shm.values.stated_tension import averaged_now, stated
 from shm_cli import completers
+from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -60,6 +61,7 @@ modes_argument = click.argument(
 @repeat_option
 @method_option
 @priors_option
+@calibrated_by_option
 @json_option
 @click.pass_context
 def command(
@@ -73,6 +75,7 @@ def command(
     repeat: int,
     method: str,
     priors: str,
+    calibrated_by: Path | None,
     as_json: bool,
 ) -> None:
     """Posterior of tension and end stiffness.
@@ -86,7 +89,9 @@ def command(
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     tell_irregular(tests)
     with progress_bar("updating") as progress:
-        posterior = update(tests, build(model, hanger, priors), options, progress)
+        chosen = build(model, hanger, priors)
+        options = calibrated(options, calibrated_by, hanger, [chosen], progress)
+        posterior = update(tests, chosen, options, progress)
     tell_poor_fit(posterior)
     if as_json:
         show(posterior_document(posterior))

@@ -102,7 +102,7 @@ def _refitted(
     mixture: TMixture | None, w: FloatArray, weights: FloatArray, rng: np.random.Generator
 ) -> TMixture | None:
     """Parts on the clusters of weighted points, or one step of expectation maximisation."""
-    if weights.sum() <= 0:
+    if weights.sum() <= 0 or not w.shape[1]:  # all of it is integrated out
         return mixture
     share = weights / weights.sum()
     if 1 / (share**2).sum() >= _TO_CLUSTER * w.shape[1]:

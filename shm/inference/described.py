@@ -241,7 +241,7 @@ class DescribedCoordinates:
         if isinstance(model.model, Beam3) and not model.is_strand:
             others.append(own.row(section=1.0))
         if any(test.added_mass is not None for test in tests):
-            others.append(own.row(section=1.0, density=1.0))
+            others.append(own.row(section=1.0, density=1.0, theta_L=1.0))
         seen = [] if self._slips else [own.row(**_C)]
         self._seen = _basis(np.array([*others, *seen]).reshape(-1, len(own.names)))
         self.dimension = len(self.box.names) + self._seen.shape[1]

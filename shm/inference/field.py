@@ -36,6 +36,13 @@ _USUAL_SHARE = 0.95
 _STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.6, 0.4
 _SD_SPREAD, _SD_FREEDOM = 0.2, 4.0
 _PHI_NODES = 3
+_ALIKE = 1e-6
+_BLOCK = 400
+"""Misfits taken together, so that intermediate results stay in the processor's cache."""
+
+_UNFELT = 0.1
+"""Of the least standard deviation of a datum: loads and tau below that change nothing."""
+
 _UNSTATED_SD = 1e-4
 """Of a frequency whose error nobody states and no second test shows, as a fraction of it: what a
 hammer test reaches (docs/identification_benchmarks.md)."""
@@ -120,7 +127,10 @@ class FieldLikelihood:
             self.frequency_hz[: self.frequencies],
             tuple(sorted(places)),
         )
-        return np.append(mean, np.zeros(int(self.has_reading))), loads
+        least = max(self.identification_error[: self.frequencies].min(), TAU_LOWER)
+        left, size, _ = np.linalg.svd(loads, full_matrices=False)
+        kept = size > _UNFELT * least
+        return np.append(mean, np.zeros(int(self.has_reading))), left[:, kept] * size[kept]
 
     @property
     def fit_error(self) -> FloatArray:
@@ -202,11 +212,21 @@ class FieldLikelihood:
     def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Nodes (k,) of tau, and the log of each one's share of the prior (k, 1)."""
         step = step_in_sd / np.sqrt(2 * self.frequencies)
-        span = np.log(TAU_UPPER / TAU_LOWER)
-        nodes = np.linspace(np.log(TAU_LOWER), np.log(TAU_UPPER), int(span / step) + 2)
-        usual = nodes <= np.log(TAU_USUAL)
-        share = np.where(usual, _USUAL_SHARE / usual.sum(), (1 - _USUAL_SHARE) / (~usual).sum())
-        return np.exp(nodes), np.log(share)[:, None]
+        least = 2 * _UNFELT * float(self.identification_error[: self.frequencies].min())
+        lowest = np.log(np.clip(least, TAU_LOWER, TAU_USUAL / 10))
+        top, usual = np.log(TAU_UPPER), np.log(TAU_USUAL)
+        nodes = np.linspace(lowest, top, int((top - lowest) / step) + 2)
+        density = np.where(
+            nodes <= usual,
+            _USUAL_SHARE / (usual - np.log(TAU_LOWER)),
+            (1 - _USUAL_SHARE) / (top - usual),
+        )
+        share = density * (nodes[1] - nodes[0])
+        # The first stands for all that is too small to be felt.
+        share[0] = share[0] / 2 + _USUAL_SHARE * (lowest - np.log(TAU_LOWER)) / (
+            usual - np.log(TAU_LOWER)
+        )
+        return np.exp(nodes), np.log(share / share.sum())[:, None]
 
 
 def _values(modes: Sequence[Mode], of_mode: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -243,17 +263,37 @@ def _sd_factors(scatter: float, freedom: int) -> tuple[FloatArray, FloatArray]:
 
 def _by_loads(rest: FloatArray, variance: FloatArray, loads: FloatArray) -> FloatArray:
     """-(quadratic + log volume)/2 (n, nodes) of misfits (n, F) whose covariance is that of the
-    nodes' variances (F, nodes) and of loads (F, k), by Woodbury's identity.
+    nodes' variances (F, nodes) and of loads (F, k).
+
+    Where all data have one variance, by the loads' own directions, which are those of every node;
+    else by Woodbury's identity.
     """
+    if np.ptp(variance, axis=0).max() <= _ALIKE * variance.min():
+        return _by_directions(rest, variance[0], loads)
     precision = 1 / variance
     inner = np.einsum("fk,fj,fl->jkl", loads, precision, loads) + np.eye(loads.shape[1])
     factor = np.linalg.cholesky(inner)
     volume = np.log(variance).sum(axis=0) + 2 * np.log(np.einsum("jkk->jk", factor)).sum(axis=1)
     # (nodes, k, F): what takes a misfit to the loads' own whitened deviates.
     pull = np.linalg.solve(factor, loads.T[None] * precision.T[:, None, :])
-    shared = (rest @ pull.reshape(-1, rest.shape[1]).T) ** 2
-    quadratic = rest**2 @ precision - shared.reshape(len(rest), len(inner), -1).sum(axis=2)
-    return np.asarray(-0.5 * (quadratic + volume))
+    flat = pull.reshape(-1, rest.shape[1]).T
+    found = rest**2 @ precision + volume
+    for first in range(0, len(rest), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        shared = (rest[block] @ flat) ** 2
+        found[block] -= shared.reshape(len(shared), len(inner), -1).sum(axis=2)
+    return np.asarray(-0.5 * found)
+
+
+def _by_directions(rest: FloatArray, variance: FloatArray, loads: FloatArray) -> FloatArray:
+    """The same where every datum has the variance (nodes,) of its node."""
+    directions, size, _ = np.linalg.svd(loads, full_matrices=False)
+    along = size[:, None] ** 2
+    quadratic = (rest**2).sum(axis=1)[:, None] - (rest @ directions) ** 2 @ (
+        along / (along + variance)
+    )
+    volume = (len(loads) - len(size)) * np.log(variance) + np.log(along + variance).sum(axis=0)
+    return np.asarray(-0.5 * (quadratic / variance + volume))
 
 
 def _by_matrices(

@@ -64,7 +64,8 @@ def _shared_places(problem: Problem, posterior: Posterior) -> tuple[IntArray, Fl
     columns = _shared(problem, posterior)
     lower, upper = problem.prior.lower[columns], problem.prior.upper[columns]
     names = [problem.prior.names[i] for i in columns]
-    samples = np.array([posterior.parameter(name) for name in names]).reshape(len(names), -1).T
+    samples = np.array([posterior.parameter(name) for name in names])
+    samples = samples.reshape(len(names), len(posterior.samples)).T
     return columns, quantile((samples - lower) / (upper - lower))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.models.adopted_name import AdoptedEffect, AdoptedName
-from shm.models.as_made import AsMade
+from shm.models.as_made import TENSION, AsMade
 from shm.models.base import DESCRIPTION, THESIS, Model
 from shm.models.composed import ComposedHanger
 from shm.models.conditions import Conditions
@@ -52,12 +52,17 @@ class Adopted(Model):
         held = [scatter.get(each.name) == 0 for each in self._composed.parameters]
         self._free = np.flatnonzero(~np.array(held))
         free = [self._composed.parameters[index] for index in self._free]
-        self._logarithmic = np.array([in_log(each) for each in free])
+        of_class = MODELS[made.baseline].bounds
+        # The class's own keep their names, and are uniform as they are there.
+        self._logarithmic = np.array([in_log(e) and e.name not in of_class for e in free])
         half = {name: _HALF_WIDTH_IN_SD * sd for name, sd in asdict(hanger.scatter).items()}
-        bounds = {own_name(e): bounds_of(e) for e in free}
-        if priors == DESCRIPTION:
-            known = AsMade(MODELS[made.baseline](hanger)).bounds
-            bounds |= {own: known[own] for own in bounds if own in MODELS[made.baseline].bounds}
+        known = AsMade(MODELS[made.baseline](hanger)).bounds if priors == DESCRIPTION else of_class
+        bounds = {
+            e.name if e.name in of_class else own_name(e): known.get(e.name, bounds_of(e))
+            for e in free
+        }
+        if math.isfinite(hanger.scatter.tension) and TENSION in bounds:
+            bounds[TENSION] = bounds_of(free[0])  # weighed: as exactly as the description says
         bounds |= {name: (-half[name], half[name]) for name in bounds if name in half}
         for each in made.effects:
             for parameter, both in each.ranges.items():

@@ -140,8 +140,9 @@ class AsMade(Model):
         own, factor = self.as_described(theta)
         mass = conditions.added_mass
         if mass is not None:
-            # What a mass weighs counts against the real bar's.
-            kg: Any = mass.mass_kg / self.stiffness_mass_length(theta)[1]
+            # What a mass weighs counts against the real bar's, which is longer, too.
+            _, per_length, length = self.stiffness_mass_length(theta)
+            kg: Any = mass.mass_kg / (per_length * (1.0 if self.length_is_open else length))
             conditions = replace(conditions, added_mass=AddedMass(kg, mass.x_m))
         if isinstance(self.model, Beam3) and mass is None:
             section = np.exp(self._column(theta, SECTION))

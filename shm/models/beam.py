@@ -135,6 +135,13 @@ class Beam3(Beam2):
     def unfit(cls, hanger: Hanger) -> str:
         return "it does not model turnbuckles." if hanger.turnbuckles else super().unfit(hanger)
 
+    @property
+    def shear_stiffness_n(self) -> float:
+        """Kappa G A of the described bar."""
+        hanger, nu = self.hanger, self.hanger.poissons_ratio
+        shear_modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
+        return 6 * (1 + nu) / (7 + 6 * nu) * shear_modulus_pa * hanger.area_m2
+
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         one = np.ones(len(theta))
         return self.frequencies_of_section(theta, one, one, modes)
@@ -146,9 +153,7 @@ class Beam3(Beam2):
         is `section` (n,) times the described one, which changes shear and rotary inertia alone, and
         whose shear is `shear` (n,) times the theory's.
         """
-        hanger, nu = self.hanger, self.hanger.poissons_ratio
-        modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
-        rigid_n = 6 * (1 + nu) / (7 + 6 * nu) * modulus_pa * hanger.area_m2
+        hanger, rigid_n = self.hanger, self.shear_stiffness_n
         deck, arch = self.springs_n_m_rad(theta)
         return timoshenko_beam.frequencies_hz(
             self._length_m(theta)[:, None],

@@ -101,13 +101,14 @@ class _Kept:
                 is_called=bool(called),
             ),
             point.time,
-            Interval.of_summary(point.tension_n),
+            Interval.of_averaged(point.averaged),
             "; ".join(called_words(change) for change in called),
             opened,
             next((each for each in drifts if each.quantity == TENSION), None),
             point.test,
             point.model,
-            baseline_tension_n=Interval.of_summary(baseline.tension_n) if baseline else None,
+            baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
+            averaged=point.averaged,
         )
 
 
@@ -123,7 +124,7 @@ def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[in
 def _course(points: Sequence[TrendPoint], alerts: int) -> Course:
     if len(points) < 2:
         return Course(len(points), alerts)
-    first, last = (Interval.of_summary(points[at].tension_n) for at in (0, -1))
+    first, last = (Interval.of_averaged(points[at].averaged) for at in (0, -1))
     return Course(len(points), alerts, last.since(first))
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.values import (
     NAN,
     Alert,
+    Averaged,
     Diagnosis,
     Drift,
     FloatArray,
@@ -28,6 +30,7 @@ from shm.values import (
     Summary,
 )
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.stated_tension import averaged_now, selection_now
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
 
@@ -38,11 +41,16 @@ _WIDE = 0.5
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean with its central 90 % interval."""
+    """A mean with its central 90 % interval.
+
+    `repeatability_sd` is the standard deviation with which the same test would give it again, less
+    than the interval says where part of that is the same in all tests; None: not known.
+    """
 
     mean: float
     low: float
     high: float
+    repeatability_sd: float | None = None
 
     @classmethod
     def of_samples(cls, samples: FloatArray) -> Interval:
@@ -60,9 +68,20 @@ class Interval:
         """From what was kept of samples."""
         return cls(summary.mean, summary.q05, summary.q95)
 
+    @classmethod
+    def of_averaged(cls, averaged: Averaged) -> Interval:
+        """Of a tension over all model classes, in N."""
+        return cls.of_summary(averaged.tension_n).repeating(averaged.repeatability_sd_n)
+
+    def repeating(self, sd: float) -> Interval:
+        """The same with the standard deviation of a repetition; NaN is not known."""
+        return replace(self, repeatability_sd=sd if math.isfinite(sd) else None)
+
     def scaled(self, factor: float) -> Interval:
         """The same quantity in a unit 1/`factor` as large."""
-        return Interval(self.mean * factor, self.low * factor, self.high * factor)
+        own = self.repeatability_sd
+        repeats = None if own is None else own * factor
+        return Interval(self.mean * factor, self.low * factor, self.high * factor, repeats)
 
     def in_unit(self, unit: ForceUnit) -> Interval:
         """A force in N in another unit."""
@@ -78,9 +97,15 @@ class Interval:
         return self.width > _WIDE * abs(self.mean)
 
     def since(self, then: Interval) -> Interval:
-        """The relative change from `then`, of two independent estimates: widths in squares."""
+        """The relative change from `then`: repeatabilities in squares.
+
+        Where one is not known, of two independent estimates: widths in squares.
+        """
         ratio = self.mean / then.mean
-        half = math.hypot(self.width, ratio * then.width) / 2 / abs(then.mean)
+        widths = [each.width / 2 for each in (self, then)]
+        if self.repeatability_sd is not None and then.repeatability_sd is not None:
+            widths = [NORMAL_90 * self.repeatability_sd, NORMAL_90 * then.repeatability_sd]
+        half = math.hypot(widths[0], ratio * widths[1]) / abs(then.mean)
         return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
     def less(self, then: Interval) -> Interval:
@@ -111,7 +136,7 @@ def trend_row(posterior: Posterior, test: ModalTest, hanger: Hanger) -> TrendRow
     return TrendRow(
         test=test.id,
         model=posterior.model,
-        tension_n=Interval.of_samples(posterior.tension_n),
+        tension_n=Interval.of_samples(posterior.tension_n).repeating(posterior.repeatability_sd_n),
         stiffness={
             name: Interval.of_samples(samples)
             for name, samples in end_stiffness(posterior, hanger).items()
@@ -135,6 +160,8 @@ class Numbers(Protocol):
     @property
     def tension_n(self) -> Summary: ...
     @property
+    def averaged(self) -> Averaged: ...
+    @property
     def stiffness(self) -> Mapping[str, Summary]: ...
 
 
@@ -143,7 +170,7 @@ def trend_row_of(kept: Numbers) -> TrendRow:
     return TrendRow(
         test=kept.test,
         model=kept.model,
-        tension_n=Interval.of_summary(kept.tension_n),
+        tension_n=Interval.of_summary(kept.tension_n).repeating(kept.averaged.repeatability_sd_n),
         stiffness={name: Interval.of_summary(each) for name, each in kept.stiffness.items()},
         time=kept.taken_at,
         temperature_c=kept.temperature_c,
@@ -205,16 +232,27 @@ class HangerReport:
             or math.isclose(row.measured_hz, measured.get((row.plane, row.order), NAN))
         )
 
+    @cached_property
+    def compared(self) -> Selection:
+        """The model classes as they are by the latest test."""
+        return selection_now(self.posterior, self.selection)
+
+    @cached_property
+    def averaged(self) -> Averaged:
+        """The tension over all model classes by the latest test: the headline."""
+        return self.compared.averaged(self.hanger.limits)
+
     @property
     def tension_n(self) -> Interval:
-        return Interval.of_samples(self.posterior.tension_n)
+        """The same, absolute."""
+        return Interval.of_averaged(self.averaged)
 
     @property
     def baseline_tension_n(self) -> Interval | None:
         """The baseline's tension; None where no earlier test forms one."""
         if self.baseline is None or self.baseline.tests == self.posterior.tests:
             return None
-        return Interval.of_samples(self.baseline.tension_n)
+        return Interval.of_averaged(averaged_now(self.baseline, self.selection))
 
     @property
     def tension_unit(self) -> ForceUnit:

@@ -30,7 +30,12 @@ def json(data: HangerReport) -> dict[str, Any]:
         "test": documents.test_document(data.latest),
         "posterior": documents.posterior_document(data.posterior),
         "baseline": documents.posterior_document(data.baseline) if data.baseline else None,
-        "selection": documents.selection_document(data.selection) if data.selection else None,
+        "selection": (
+            documents.selection_document(data.selection, data.hanger.limits)
+            if data.selection
+            else None
+        ),
+        "averaged": documents.averaged_document(data.averaged),
         "trend": [asdict(row) for row in data.trend],
         "drifts": [documents.drift_document(drift) for drift in data.drifts],
         "alerts": [documents.alert_document(alert) for alert in data.alerts],

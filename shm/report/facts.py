@@ -5,18 +5,17 @@ from __future__ import annotations
 from shm.report import words
 from shm.report.content import HangerReport
 from shm.report.summary import is_found, of_nominal, tension_change
+from shm.values.stated_tension import StatedTension, stated
 
 
 def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
     """What, value, what stands beside it."""
     unit = data.tension_unit
-    tension = data.tension_n.in_unit(unit)
+    said = stated(data.averaged, unit)
+    repeats = f"; repeatability {said.repeatability}" if said.repeatability else ""
     return (
-        (
-            "Tension",
-            f"{words.mean(tension)} {unit.name}",
-            f"90 % interval {words.span(tension)} {unit.name}",
-        ),
+        ("Tension", said.tension, f"90 % interval {said.interval}{repeats}"),
+        *_limits(data, said),
         _of_nominal(data),
         _since_baseline(data),
         (
@@ -29,6 +28,20 @@ def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
             words.model_class(data.posterior.model),
             f"{words.counted(len(data.latest.modes), 'mode')} identified",
         ),
+    )
+
+
+def _limits(data: HangerReport, said: StatedTension) -> tuple[tuple[str, str, str], ...]:
+    """The probabilities that the owner's limits ask for."""
+    limits, unit = data.hanger.limits, data.tension_unit
+    asked = (
+        ("Above its limit", said.above, limits.tension_max_n),
+        ("Slack", said.slack, limits.tension_min_n),
+    )
+    return tuple(
+        (what, probability, f"probability; limit {words.rounded_tension(limit_n, unit)}")
+        for what, probability, limit_n in asked
+        if probability
     )
 
 

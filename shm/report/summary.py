@@ -15,6 +15,7 @@ from shm.report.diagnosis.tensions import AFTER, tension_of
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
+from shm.values.stated_tension import stated
 
 _CONVERGED_R_HAT = 1.1
 _WATCH_PROBABILITY = 0.5
@@ -56,7 +57,9 @@ def status_of(
 def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
+        *data.averaged.caveats,
         _tension(data),
+        *_repeats_and_limits(data),
         _against_nominal(data),
         _against_baseline(data),
         _change(data),
@@ -133,6 +136,11 @@ def _tension(data: HangerReport) -> str:
         f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
         f"({when}, {words.temperature(data.latest.temperature_c)})."
     )
+
+
+def _repeats_and_limits(data: HangerReport) -> tuple[str, ...]:
+    """How well a test repeats it, and the probabilities that the owner's limits ask for."""
+    return stated(data.averaged, data.tension_unit).sentences[1:]
 
 
 def _against_nominal(data: HangerReport) -> str:

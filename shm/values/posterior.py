@@ -108,8 +108,10 @@ class Posterior:
                 f"The evidence is wrong: its log Occam factor is {self.log_occam:.1f}, above 0. "
                 "Do not compare this model class with others."
             )
-        if self.at_bounds:
-            names = ", ".join(self.at_bounds)
+        # A spring at an end of its range is an end that is clamped or turns freely: no fault.
+        cut_off = [name for name in self.at_bounds if not name.startswith("log10_k")]
+        if cut_off:
+            names = ", ".join(cut_off)
             found.append(f"At the bound of its prior: {names}. The interval is cut off there.")
         if self.misfit_percent > MOST_MISFIT_PERCENT:
             found.append(
@@ -128,7 +130,7 @@ class Posterior:
         return self.parameter("theta_F") * self.nominal_tension_n
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Averaged:
     """The tension over all model classes, each with its probability: what a report leads with.
 

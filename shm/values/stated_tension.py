@@ -15,7 +15,12 @@ _LEAST_SAID, _MOST_DECIMALS = 0.01, 6
 def averaged_now(
     posterior: Posterior, selection: Selection | None = None, limits: Limits | None = None
 ) -> Averaged:
-    """The tension by a `posterior`, averaged over the classes of its hanger's `selection`.
+    """The tension by a `posterior`, averaged over the classes of its hanger's `selection`."""
+    return selection_now(posterior, selection).averaged(limits)
+
+
+def selection_now(posterior: Posterior, selection: Selection | None = None) -> Selection:
+    """The classes of a hanger's `selection` as they are by a later `posterior` of one of them.
 
     Where later tests are updated in the selected class alone, the others follow as it has moved
     since: of a change they say the same, of the tension itself each its own.
@@ -24,13 +29,13 @@ def averaged_now(
     compared = list(selection.posteriors) if selection is not None and known else []
     same = [each for each in compared if _of_one_class(each, posterior)]
     if selection is None or not same:
-        return Selection((posterior,), (1.0,)).averaged(limits)
+        return Selection((posterior,), (1.0,))
     moved = float(posterior.tension_n.mean() / same[0].tension_n.mean())
     probable = list(zip(compared, selection.probabilities, strict=True))
     others = [(each, share) for each, share in probable if each is not same[0]]
     now = [replace(each, nominal_tension_n=each.nominal_tension_n * moved) for each, _ in others]
     own = next(share for each, share in probable if each is same[0])
-    return Selection((posterior, *now), (own, *(share for _, share in others))).averaged(limits)
+    return Selection((posterior, *now), (own, *(share for _, share in others)))
 
 
 def _of_one_class(one: Posterior, other: Posterior) -> bool:

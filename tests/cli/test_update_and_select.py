@@ -20,6 +20,9 @@ QUANTILES = {"mean", "sd", "q05", "q50", "q95", "map"}
 QUICK = ("--samples", 100)
 
 
+THESIS = ("--priors", "thesis")
+
+
 def call(modes_file: Path, hanger_file: Path, *more: object) -> tuple[object, ...]:
     known = ("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", "--seed", 5)
     return (*known, *QUICK, "--json", *more)
@@ -36,8 +39,14 @@ def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
         "samples", "effective_sample_size", "r_hat", "predicted", "seconds", "seed",
     }  # fmt: skip
     assert set(document["tension_n"]) == QUANTILES
-    assert set(document["parameters"]) == {"theta_F", "theta_L", "sigma"}
+    own = {"theta_F", "theta_L", "section", "density", "modulus", "sigma"}
+    assert set(document["parameters"]) == own
+    assert (document["priors"], document["at_bounds"]) == ("description", [])
+    assert document["misfit_percent"] < 1
+    assert document["log_occam"] < 0
     assert document["tension_n"]["mean"] == pytest.approx(0.9 * 711e3, rel=0.05)
+    # What the description leaves open, mass and length above all, is no part of a repetition.
+    assert 0 < 5 * document["repeatability_sd_n"] < document["tension_n"]["sd"]
     assert (document["model"], document["seed"], document["samples"]) == ("beam1", 5, 100)
     assert document["predicted"][0]["measured_hz"] > 0
     again = shm(*call(modes_file, hanger_file)).document
@@ -48,9 +57,67 @@ def test_a_data_set_counted_ten_times_weighs_more(
     shm: Shm, modes_file: Path, hanger_file: Path
 ) -> None:
     once, tenfold = (
-        shm(*call(modes_file, hanger_file, "--repeat", repeat)).document for repeat in (1, 10)
+        shm(*call(modes_file, hanger_file, *THESIS, "--repeat", repeat)).document
+        for repeat in (1, 10)
     )
     assert tenfold["log_evidence"] > once["log_evidence"] + 10
+
+
+def test_the_priors_of_the_thesis_have_its_parameters(
+    shm: Shm, modes_file: Path, hanger_file: Path
+) -> None:
+    document = shm(*call(modes_file, hanger_file, *THESIS)).document
+    assert set(document["parameters"]) == {"theta_F", "theta_L", "sigma"}
+    assert document["priors"] == "thesis"
+    assert document["repeatability_sd_n"] is None
+
+
+@pytest.mark.parametrize("option", [("--repeat", 10), ("--method", "textbook")])
+def test_what_is_the_thesis_s_alone_is_refused_with_other_priors(
+    shm: Shm, modes_file: Path, hanger_file: Path, option: tuple[object, ...]
+) -> None:
+    ended = shm(*call(modes_file, hanger_file, *option))
+    assert ended.code == 2
+    assert "--priors thesis" in ended.err
+
+
+def test_the_tension_leads_with_both_intervals_and_the_limits(
+    shm: Shm, modes_file: Path, hanger_file: Path, tmp_path: Path
+) -> None:
+    limited = tmp_path / "limited.toml"
+    limits = "\n[hanger.limits]\ntension_max_n = 900e3\ntension_min_n = 300e3\n"
+    limited.write_text(hanger_file.read_text() + limits)
+    ended = shm("select", modes_file, "--hanger-file", limited, "--models", "beam1", *QUICK)
+    told = " ".join(ended.out.split())
+    at = [
+        told.index(words)
+        for words in ("Tension 6", "Repeatability", "exceeds its limit: below", "slack: below")
+    ]
+    assert at == sorted(at)
+    assert "absolute" in told[: at[1]]
+    averaged = shm(
+        "select", modes_file, "--hanger-file", limited, "--models", "beam1", *QUICK, "--json"
+    ).document["averaged"]
+    assert averaged["probability_above_limit"] == averaged["probability_slack"] == 0
+    assert averaged["tension_n"]["q05"] < 0.9 * 711e3 < averaged["tension_n"]["q95"]
+
+
+def test_a_tension_that_was_measured_calibrates_another_test(
+    shm: Shm, modes_file: Path, hanger_file: Path, tmp_path: Path
+) -> None:
+    weighed = json.loads(modes_file.read_text(encoding="utf-8"))
+    read = {"tension_read_n": 0.9 * 711e3, "tension_read_sd_n": 0.001 * 711e3}
+    weighed["tests"] = [test | read for test in weighed["tests"]]
+    known = tmp_path / "weighed.modes.json"
+    known.write_text(json.dumps(weighed), encoding="utf-8")
+    plain = shm(*call(modes_file, hanger_file)).document["tension_n"]
+    ended = shm(*call(modes_file, hanger_file, "--calibrated-by", known))
+    assert ended.code == 0, ended.err
+    found = ended.document["tension_n"]
+    assert found["sd"] < 0.5 * plain["sd"]
+    assert found["mean"] == pytest.approx(0.9 * 711e3, abs=4 * found["sd"])
+    assert shm(*call(modes_file, hanger_file, "--calibrated-by", modes_file)).code == 3
+    assert shm(*call(modes_file, hanger_file, *THESIS, "--calibrated-by", known)).code == 2
 
 
 def test_select_ranks_the_models_and_their_probabilities_add_to_one(
@@ -173,7 +240,7 @@ def test_a_wrong_file_is_bad_input(
 
 
 def test_the_textbook_method_warns_in_plain_words(modes_file: Path, hanger_file: Path) -> None:
-    arguments = [str(a) for a in call(modes_file, hanger_file, "--method", "textbook")]
+    arguments = [str(a) for a in call(modes_file, hanger_file, *THESIS, "--method", "textbook")]
     program = [sys.executable, "-c", "from shm_cli.main import main; main()"]
     ended = subprocess.run([*program, *arguments], capture_output=True, text=True, check=True)
     assert ended.stderr.startswith("Warning: textbook TMCMC: a bias of -1 to -7")

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models import Model
 from shm.inference import UpdateOptions
+from shm.models import Model
 from shm.values import Hanger, ModalTest, Posterior, Selection
 from tests.helpers.workspaces import modes_of
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models import Model, build
-from shm.models.conditions import Conditions
-from shm.simulate import HangerState, TestConditions, planted_modes
 from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
+from shm.models import THESIS, Model, build
+from shm.models.conditions import Conditions
+from shm.simulate import HangerState, TestConditions, planted_modes
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -47,7 +47,7 @@ def a_test(name: str, temperature_c: float = NAN, mass: AddedMass | None = None)
 
 
 def test_each_test_is_predicted_under_its_own_conditions() -> None:
-    model = build(WARMTH, HANGER_3)
+    model = build(WARMTH, HANGER_3, THESIS)
     theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
     tests = measured(model, theta, [a_test("a", 10.0), a_test("b", 25.0), a_test("c", 10.0)])
     tests[1] = replace(tests[1], modes=tests[1].modes[3:8])
@@ -61,7 +61,7 @@ def test_each_test_is_predicted_under_its_own_conditions() -> None:
 
 
 def test_tests_alike_to_the_class_are_one_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
-    model, asked = build("beam1", HANGER_3), []
+    model, asked = build("beam1", HANGER_3, THESIS), []
     evaluate = model.frequencies_hz
     theta = np.array([[1.0, 1.0]])
     tests = measured(model, theta, [a_test("a", 10.0), a_test("b", 25.0)])
@@ -78,7 +78,7 @@ def test_tests_alike_to_the_class_are_one_evaluation(monkeypatch: pytest.MonkeyP
 
 def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
     """A strand with 30 % less bending stiffness: the clamped rod puts its tension 5 % off."""
-    model = build("beam1+bending_stiffness@everywhere", HANGER_3)
+    model = build("beam1+bending_stiffness@everywhere", HANGER_3, THESIS)
     theta = parameters(model, stiffness_change=-0.3)
     (test,) = measured(model, theta, [a_test("a")])
     options = UpdateOptions(samples=200)
@@ -92,28 +92,28 @@ def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
 
 def test_tests_at_two_temperatures_tell_the_tension_at_the_reference() -> None:
     size = "tension_per_kelvin_n_k=-3300..-2700"
-    model = build(f"{WARMTH}:{size}", HANGER_3)
+    model = build(f"{WARMTH}:{size}", HANGER_3, THESIS)
     theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
     (test,) = measured(model, theta, [a_test("a", 25.0)])
     found = update([test], model, UpdateOptions(samples=200))
     assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.02)
-    ignored = update([test], build("beam1", HANGER_3), UpdateOptions(samples=200))
+    ignored = update([test], build("beam1", HANGER_3, THESIS), UpdateOptions(samples=200))
     assert ignored.tension_n.mean() < 0.96 * HANGER_3.nominal_tension_n
 
 
 @pytest.mark.parametrize("name", ["beam1", "beam1+bending_stiffness@everywhere"])
 def test_a_known_mass_is_part_of_the_prediction_and_not_of_the_tension(name: str) -> None:
-    adopted = build("beam1+bending_stiffness@everywhere", HANGER_3)
+    adopted = build("beam1+bending_stiffness@everywhere", HANGER_3, THESIS)
     laden = a_test("a", mass=AddedMass(25.0, 3.6))
     (test,) = measured(adopted, parameters(adopted), [laden], modes=4)
-    found = update([test], build(name, HANGER_3), UpdateOptions(samples=100))
+    found = update([test], build(name, HANGER_3, THESIS), UpdateOptions(samples=100))
     assert found.tension_n.mean() == pytest.approx(HANGER_3.nominal_tension_n, rel=0.05)
 
 
 @pytest.mark.parametrize("name", ["beam1", "beam2"])
 def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
     """Beam classes take the mass's share from the general model; the simulator has its own."""
-    model, springs = build(name, HANGER_3), (2e7, 4e7, 8e7, 6e7)
+    model, springs = build(name, HANGER_3, THESIS), (2e7, 4e7, 8e7, 6e7)
     given = dict(zip(SPRINGS, np.log10(springs), strict=True))
     theta = model.pack({"theta_F": 1.0, "theta_L": 1.0, **(given if name == "beam2" else {})})
     mass = AddedMass(25.0, 3.6)
@@ -128,5 +128,5 @@ def test_no_tension_is_inferred_from_an_irregular_mode() -> None:
     tests = [ModalTest("t1", (irregular, regular), 3), ModalTest("t2", (regular, regular), 3)]
     likelihood = Likelihood(tests)
     assert likelihood.modes == [regular] * 3
-    model = build("beam1", HANGER_3)
+    model = build("beam1", HANGER_3, THESIS)
     assert likelihood.predict(model, parameters(model, theta_L=1.0)).shape == (1, 3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-from shm.models import build
 from shm.inference.coordinates import Coordinates
+from shm.models import THESIS, build
 from tests.helpers.hangers import HANGER_3
 
 OWN = 3e6
@@ -15,7 +15,7 @@ OWN = 3e6
 
 @pytest.fixture(params=["beam1", "beam2"])
 def coordinates(request) -> Coordinates:
-    model = build(request.param, HANGER_3)
+    model = build(request.param, HANGER_3, THESIS)
     return Coordinates(model.prior, model.swaps, OWN)
 
 
@@ -73,7 +73,7 @@ def test_points_anywhere_fold_into_the_prior_and_stay_there(coordinates) -> None
 
 
 def test_pairs_that_give_as_much_lie_on_a_nearly_straight_line() -> None:
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     coordinates = Coordinates(model.prior, model.swaps, OWN)
     stronger = np.linspace(7.0, 11.9, 50)
     weaker = np.log10(1 / (2 / (1e7 + OWN) - 1 / (10**stronger + OWN)) - OWN)
@@ -84,7 +84,7 @@ def test_pairs_that_give_as_much_lie_on_a_nearly_straight_line() -> None:
 
 
 def test_frequencies_hardly_change_along_that_line() -> None:
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     own = model.wave_stiffness_n_m_rad(3.5)
     coordinates = Coordinates(model.prior, model.swaps, own)
     start = coordinates.places(np.array([[1.0, 1.0, 7.2, 8.0, 7.2, 7.5]]))

@@ -9,10 +9,10 @@ import pytest
 
 from shm.documents import posterior_document
 from shm.errors import BadInput, UsageError
-from shm.models import Model, build
 from shm.inference import UpdateOptions, ensemble, refresh, update
 from shm.inference.importance import Weighted
 from shm.inference.problem import Points
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 
@@ -41,7 +41,7 @@ def measured(model: Model, seed: int, error: float = 0.01, **changes: float) -> 
 
 @pytest.fixture(scope="module")
 def beam1() -> Model:
-    return build("beam1", HANGER_3)
+    return build("beam1", HANGER_3, THESIS)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_its_evidence_is_that_of_quadrature(beam1: Model, known: Posterior) -> N
 
 
 def test_a_loosened_end_is_followed_by_a_decade() -> None:
-    beam2 = build("beam2", HANGER_3)
+    beam2 = build("beam2", HANGER_3, THESIS)
     before = update([measured(beam2, 5, 0.004)], beam2, UpdateOptions(500))
     loosened = measured(beam2, 6, 0.004, log10_k1=6.0, theta_F=0.92)
     found = refresh([loosened], beam2, before, UpdateOptions(1000, seed=1))
@@ -243,7 +243,7 @@ def test_a_posterior_of_another_class_is_refused(
     beam1: Model, known: Posterior, later: ModalTest
 ) -> None:
     with pytest.raises(UsageError, match=r"beam1 says nothing about beam2"):
-        refresh([later], build("beam2", HANGER_3), known)
+        refresh([later], build("beam2", HANGER_3, THESIS), known)
     with pytest.raises(BadInput, match="beyond the ends"):
         refresh([replace(later, added_mass=AddedMass(25.0, 13.6))], beam1, known)
 

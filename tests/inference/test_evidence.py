@@ -11,11 +11,11 @@ from scipy.special import ndtri
 from scipy.stats import multivariate_normal
 
 from shm.errors import UsageError
-from shm.models import Model, build
 from shm.inference import METHODS, BiasedEvidenceWarning, UpdateOptions, update
 from shm.inference.likelihood import Likelihood
 from shm.inference.problem import Problem
 from shm.inference.updating import infer
+from shm.models import THESIS, Model, build
 from shm.values import FloatArray, Posterior
 from tests.helpers.evidence_oracle import (
     ORACLE,
@@ -44,7 +44,7 @@ def test_a_coarser_quadrature_agrees_with_the_stored_oracle(table: str, repeat: 
 @pytest.mark.parametrize(("table", "model", "repeat"), ORACLE)
 def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int) -> None:
     options = UpdateOptions(1000, seed=11, repeat=repeat)
-    posterior = update([modal_test(TABLES[table])], build(model, HANGER_3), options)
+    posterior = update([modal_test(TABLES[table])], build(model, HANGER_3, THESIS), options)
     error = posterior.log_evidence - ORACLE[table, model, repeat]
     assert abs(error) < 4 * posterior.log_evidence_sd
     assert posterior.log_evidence_sd < 0.08
@@ -134,7 +134,7 @@ def test_two_modes_of_unequal_mass_get_their_shares() -> None:
 
 def run(seed: int) -> Posterior:
     options = UpdateOptions(200, seed)
-    return update([modal_test(TABLES["1.1"])], build("beam2", HANGER_3), options)
+    return update([modal_test(TABLES["1.1"])], build("beam2", HANGER_3, THESIS), options)
 
 
 def test_the_same_seed_gives_the_same_posterior_whatever_the_executor() -> None:
@@ -149,7 +149,7 @@ def test_the_textbook_method_warns_and_follows_its_own_evidence() -> None:
     """On beam1, where the likelihood is broad, it comes close; it is too low all the same."""
     options = UpdateOptions(1000, 1, method="textbook")
     with pytest.warns(BiasedEvidenceWarning, match="-1 to -7"):
-        posterior = update([modal_test(TABLES["1.1"])], build("beam1", HANGER_3), options)
+        posterior = update([modal_test(TABLES["1.1"])], build("beam1", HANGER_3, THESIS), options)
     assert posterior.samples.shape == (1000, 3)
     assert posterior.method == "textbook"
     assert posterior.log_evidence == pytest.approx(ORACLE["1.1", "beam1", 1], abs=6)
@@ -160,7 +160,7 @@ def test_the_textbook_method_warns_and_follows_its_own_evidence() -> None:
 def test_the_textbook_evidence_is_right_where_nothing_changes_phase() -> None:
     """One frequency of unknown model error: a broad likelihood that any path follows."""
     test = modal_test({"transverse": [5.8]})
-    model = build("beam1", HANGER_3)
+    model = build("beam1", HANGER_3, THESIS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", BiasedEvidenceWarning)
         found = [

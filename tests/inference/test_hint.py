@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models import build
-from shm.models.beam import Beam2
 from shm.inference import UpdateOptions, select, update
 from shm.inference.hint import hinted
 from shm.inference.likelihood import Likelihood
 from shm.inference.problem import Problem
+from shm.models import THESIS, build
+from shm.models.beam import Beam2
 from shm.values import Posterior
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
 from tests.helpers.hangers import HANGER_3
@@ -28,12 +28,12 @@ class ExpensiveBeam2(Beam2):
 
 @pytest.fixture(scope="module")
 def cheap() -> Posterior:
-    return update(TESTS, build("beam1", HANGER_3), UpdateOptions(500))
+    return update(TESTS, build("beam1", HANGER_3, THESIS), UpdateOptions(500))
 
 
 @pytest.fixture(scope="module")
 def alone() -> Posterior:
-    return update(TESTS, build("beam2", HANGER_3), UpdateOptions(1000, 5))
+    return update(TESTS, build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 5))
 
 
 def assert_same(found: Posterior, expected: Posterior) -> None:
@@ -49,7 +49,7 @@ def assert_same(found: Posterior, expected: Posterior) -> None:
 def test_a_hint_gives_the_same_posterior_for_fewer_evaluations(
     cheap: Posterior, alone: Posterior
 ) -> None:
-    found = update(TESTS, build("beam2", HANGER_3), UpdateOptions(1000, 5), hint=cheap)
+    found = update(TESTS, build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 5), hint=cheap)
     assert_same(found, alone)
     assert found.evaluations < 0.9 * alone.evaluations
 
@@ -61,13 +61,13 @@ def test_a_wrong_hint_gives_the_same_posterior(cheap: Posterior, alone: Posterio
     middle = np.median(alone.parameter("theta_F"))
     samples[:, column] = 1.15 * middle + 0.002 * (samples[:, column] - samples[:, column].mean())
     wrong = replace(cheap, samples=samples)
-    found = update(TESTS, build("beam2", HANGER_3), UpdateOptions(1000, 5), hint=wrong)
+    found = update(TESTS, build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 5), hint=wrong)
     assert_same(found, alone)
 
 
 def test_the_density_of_the_starts_is_that_of_their_draws(cheap: Posterior) -> None:
     """The mean of prior over starts, under the starts, is one; and the starts lie inside."""
-    problem = Problem(build("beam2", HANGER_3), Likelihood(TESTS))
+    problem = Problem(build("beam2", HANGER_3, THESIS), Likelihood(TESTS))
     hint = hinted(problem, cheap)
     assert hint is not None
     z = hint.draw(20_000, np.random.default_rng(1))
@@ -77,13 +77,13 @@ def test_the_density_of_the_starts_is_that_of_their_draws(cheap: Posterior) -> N
 
 def test_a_posterior_that_shares_no_parameter_is_no_hint(cheap: Posterior) -> None:
     stranger = replace(cheap, names=("mass", "damping", "sigma"))
-    problem = Problem(build("beam2", HANGER_3), Likelihood(TESTS))
+    problem = Problem(build("beam2", HANGER_3, THESIS), Likelihood(TESTS))
     assert hinted(problem, stranger) is None
     assert hinted(problem, None) is None
 
 
 def test_selection_starts_expensive_classes_from_the_cheap_ones(alone: Posterior) -> None:
-    models = [ExpensiveBeam2(HANGER_3), build("beam1", HANGER_3)]
+    models = [ExpensiveBeam2(HANGER_3), build("beam1", HANGER_3, THESIS)]
     heard: list[str] = []
     selection = select(
         TESTS, models, UpdateOptions(1000, 5), lambda label, fraction: heard.append(label)

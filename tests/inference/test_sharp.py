@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.models import build
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.options import silent
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, search
 from shm.inference.updating import infer
 from shm.inference.valley import along
+from shm.models import THESIS, build
 from shm.values import PLANES, BoolArray, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -23,7 +23,7 @@ FAR = 15.0
 
 def problem_of(theta: tuple[float, ...], sd: float) -> Problem:
     """Orders 2 to 6 of the exact beam, with errors of standard deviation `sd` (fraction)."""
-    model, rng = build("beam2", HANGER_3), np.random.default_rng(81)
+    model, rng = build("beam2", HANGER_3, THESIS), np.random.default_rng(81)
     exact = model.frequencies_hz(np.array([theta]), 6)[0, :, 1:]
     measured = exact * (1 + sd * rng.standard_normal(exact.shape))
     modes = tuple(

@@ -9,9 +9,9 @@ import pytest
 from scipy.special import gammaincc, gammaln, logsumexp
 
 from shm.errors import BadInput, UsageError
-from shm.models import Model, build
 from shm.inference import UpdateOptions, select, update
 from shm.inference.likelihood import Likelihood
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 
@@ -57,7 +57,7 @@ def beam1_quadrature() -> tuple[float, float, float]:
         0.5 + 4.5 * (np.arange(700) + 0.5) / 700,
         0.5 + 1.0 * (np.arange(400) + 0.5) / 400,
     ]
-    theta, values = grid(build("beam1", HANGER_3), np.array(list(TABLE_1_1.values())), axes)
+    theta, values = grid(build("beam1", HANGER_3, THESIS), np.array(list(TABLE_1_1.values())), axes)
     weights = np.exp(values - values.max())
     mean = np.average(theta[:, 0], weights=weights)
     sd = np.sqrt(np.average((theta[:, 0] - mean) ** 2, weights=weights))
@@ -65,7 +65,7 @@ def beam1_quadrature() -> tuple[float, float, float]:
 
 
 def test_beam_1_has_the_evidence_of_quadrature(beam1_quadrature) -> None:
-    posterior = update([modal_test(TABLE_1_1)], build("beam1", HANGER_3))
+    posterior = update([modal_test(TABLE_1_1)], build("beam1", HANGER_3, THESIS))
     assert posterior.log_evidence == pytest.approx(
         beam1_quadrature[0], abs=4 * posterior.log_evidence_sd
     )
@@ -73,7 +73,9 @@ def test_beam_1_has_the_evidence_of_quadrature(beam1_quadrature) -> None:
 
 
 def test_beam_1_has_the_tension_of_quadrature(beam1_quadrature) -> None:
-    posterior = update([modal_test(TABLE_1_1)], build("beam1", HANGER_3), UpdateOptions(4000, 2))
+    posterior = update(
+        [modal_test(TABLE_1_1)], build("beam1", HANGER_3, THESIS), UpdateOptions(4000, 2)
+    )
     _, mean, sd = beam1_quadrature
     tension = posterior.tension_n / HANGER_3.nominal_tension_n
     assert tension.mean() == pytest.approx(mean, abs=5 * sd / np.sqrt(4000))
@@ -90,7 +92,7 @@ def test_beam_2_has_the_evidence_of_quadrature_on_one_plane() -> None:
     one, other = (springs[index] for index in np.triu_indices(16))
     pair_weights = np.outer(spring_weights, spring_weights)[np.triu_indices(16)]
     pair_weights[one != other] *= 2
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     total = []
     for f in theta_f[theta_f < 3]:
         theta = np.column_stack(
@@ -115,7 +117,7 @@ def test_beam_2_has_the_evidence_of_quadrature_on_one_plane() -> None:
 @pytest.mark.trial
 def test_the_claimed_error_of_the_evidence_is_that_between_seeds() -> None:
     runs = [
-        update([modal_test(TABLE_1_1)], build("beam2", HANGER_3), UpdateOptions(400, seed))
+        update([modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS), UpdateOptions(400, seed))
         for seed in range(6)
     ]
     spread = np.std([run.log_evidence for run in runs], ddof=1)
@@ -127,18 +129,20 @@ def test_the_claimed_error_of_the_evidence_is_that_between_seeds() -> None:
 def test_the_same_seed_gives_the_same_posterior() -> None:
     options = UpdateOptions(200, seed=7)
     first, second = (
-        update([modal_test(TABLE_1_1)], build("beam2", HANGER_3), options) for _ in range(2)
+        update([modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS), options) for _ in range(2)
     )
     np.testing.assert_array_equal(first.samples, second.samples)
     assert first.log_evidence == second.log_evidence
-    other = update([modal_test(TABLE_1_1)], build("beam2", HANGER_3), replace(options, seed=8))
+    other = update(
+        [modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS), replace(options, seed=8)
+    )
     assert not np.array_equal(first.samples, other.samples)
 
 
 @pytest.mark.parametrize("springs", [(6.8, 7.6, 7.3, 8.2), (7.0, 7.6, 7.0, 7.6), (11, 11, 11, 11)])
 def test_a_planted_tension_is_found_however_sharp_the_data(springs: tuple[float, ...]) -> None:
     """Frequencies good to 0.002 Hz confine the posterior to 1e-20 of the prior."""
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     names = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
     truth = model.pack({"theta_F": 0.9, "theta_L": 1.0, **dict(zip(names, springs, strict=True))})
     noise = 0.002 * np.random.default_rng(5).standard_normal((2, 8))
@@ -154,14 +158,14 @@ def test_a_planted_tension_is_found_however_sharp_the_data(springs: tuple[float,
 
 def test_exchangeable_ends_are_both_found() -> None:
     posterior = update(
-        [modal_test(TABLE_1_1)], build("beam2", HANGER_3), UpdateOptions(1000, 3, 10)
+        [modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 3, 10)
     )
     softer_deck = np.mean(posterior.parameter("log10_k1") < posterior.parameter("log10_k3"))
     assert 0.4 < softer_deck < 0.6
 
 
 def test_convergence_figures_are_sane() -> None:
-    posterior = update([modal_test(TABLE_1_1)], build("beam2", HANGER_3))
+    posterior = update([modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS))
     assert posterior.samples.shape == (1000, 7)
     assert len(np.unique(posterior.samples[:, 0])) > 800
     assert 400 < posterior.effective_sample_size <= 1000
@@ -170,7 +174,7 @@ def test_convergence_figures_are_sane() -> None:
 
 def test_the_most_probable_value_beats_every_sample() -> None:
     tests = [modal_test(TABLE_1_1)]
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     posterior = update(tests, model, UpdateOptions(300))
     best = posterior.most_probable[None]
     likelihood = Likelihood(tests)
@@ -180,7 +184,9 @@ def test_the_most_probable_value_beats_every_sample() -> None:
 
 def test_counting_the_data_ten_times_narrows_the_tension() -> None:
     once, ten_times = (
-        update([modal_test(TABLE_1_1)], build("beam1", HANGER_3), UpdateOptions(500, 1, repeat))
+        update(
+            [modal_test(TABLE_1_1)], build("beam1", HANGER_3, THESIS), UpdateOptions(500, 1, repeat)
+        )
         for repeat in (1, 10)
     )
     assert ten_times.tension_n.std() < once.tension_n.std() / 2
@@ -188,7 +194,7 @@ def test_counting_the_data_ten_times_narrows_the_tension() -> None:
 
 def test_an_uncertain_frequency_counts_less() -> None:
     """One mode is 20 % off; with its standard deviation stated the tension must not follow it."""
-    model = build("beam1", HANGER_3)
+    model = build("beam1", HANGER_3, THESIS)
     exact = model.frequencies_hz(np.array([[1.0, 1.0]]), 10)[0, 0] * np.where(
         np.arange(10) == 3, 1.2, 1.0
     )
@@ -200,7 +206,7 @@ def test_an_uncertain_frequency_counts_less() -> None:
 
 
 def test_selection_ranks_by_evidence_and_its_probabilities_add_to_one() -> None:
-    models = [build(name, HANGER_3) for name in ("beam1", "beam2")]
+    models = [build(name, HANGER_3, THESIS) for name in ("beam1", "beam2")]
     selection = select([modal_test(TABLE_1_1)], models, UpdateOptions(300))
     first, second = selection.posteriors
     assert selection.selected.model == "beam2"
@@ -214,7 +220,7 @@ def test_progress_is_heard_from_start_to_end() -> None:
     heard: list[tuple[str, float]] = []
     update(
         [modal_test(TABLE_1_1)],
-        build("beam1", HANGER_3),
+        build("beam1", HANGER_3, THESIS),
         UpdateOptions(200),
         lambda label, fraction: heard.append((label, fraction)),
     )
@@ -223,7 +229,7 @@ def test_progress_is_heard_from_start_to_end() -> None:
 
 
 def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:
-    model = build("beam1", HANGER_3)
+    model = build("beam1", HANGER_3, THESIS)
     with pytest.raises(BadInput, match="no measured frequency"):
         update([ModalTest("t1", ())], model)
     with pytest.raises(BadInput, match="beyond the ends"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import Model, applicable, build, competing_names, described
+from shm.models import PRIORS, Model, applicable, build, competing_names, described
 from shm.models.adopted import missed_by_one_test, places_of
 from shm.models.adopted_name import AdoptedEffect, AdoptedName
 from shm.models.effects import EFFECTS, Variant
@@ -105,14 +105,14 @@ def test_every_effect_of_the_hanger_can_be_adopted_and_moves_a_frequency(
     test = ModalTest("t", (), temperature_c=30.0, amplitude=2.0)
     found = model.frequencies_at(theta, 4, model.conditions(test))
     assert found.shape == (5, 2, 4)
-    bare = build("beam1", HANGER_3).frequencies_hz(np.array([[1.0, 1.0]]), 4)
+    bare = described("beam1", HANGER_3).frequencies_hz(np.array([[1.0, 1.0]]), 4)
     assert np.abs(found / bare - 1).max() > 1e-4
 
 
 @pytest.mark.parametrize("baseline", ["beam1", "beam2"])
 def test_no_effect_is_the_baseline(baseline: str) -> None:
     name = f"{baseline}+effective_length@both_ends"
-    model, bare = build(name, HANGER_3), build(baseline, HANGER_3)
+    model, bare = build(name, HANGER_3), described(baseline, HANGER_3)
     springs = {f"log10_k{i}": 6.0 + i / 3 for i in range(1, 5)}
     theta = parameters(model, **springs)
     expected = bare.frequencies_hz(parameters(bare, theta_L=1.0, **springs), 6)
@@ -173,12 +173,29 @@ def test_a_class_that_follows_the_temperature_refuses_a_test_without() -> None:
 def test_priors_are_those_of_the_catalogue_and_of_the_scatter() -> None:
     bounds = build(MASS, HANGER_3).bounds
     mass = EFFECTS["point_mass"].parameters(HANGER_3, Variant())[0]
-    assert bounds["theta_F"] == (0.5, 5.0)
+    assert bounds["section"] == pytest.approx((-0.01 * 3**0.5, 0.01 * 3**0.5))
     assert bounds["log10_mass_kg"][0] == pytest.approx(np.log10(mass.lower))
     assert bounds["x_m"] == (0.0, 12.0)
     signed = build("beam1+bending_stiffness@everywhere", HANGER_3).bounds["stiffness_change"]
     assert signed == (-0.8, 0.8)
     assert build(f"{MASS}:x_m=3..4", HANGER_3).bounds["x_m"] == (3.0, 4.0)
+
+
+@pytest.mark.parametrize("priors", PRIORS)
+@pytest.mark.parametrize("baseline", ["beam1", "beam2"])
+def test_tension_and_springs_keep_the_names_and_the_ranges_of_their_class(
+    baseline: str, priors: str
+) -> None:
+    """What reads a posterior's tension asks for theta_F, whatever its class has adopted."""
+    bounds = build(f"{baseline}+point_mass@everywhere", HANGER_3, priors).bounds
+    own = build(baseline, HANGER_3, priors).bounds
+    shared = [name for name in own if name == "theta_F" or name.startswith("log10_k")]
+    assert {name: bounds[name] for name in shared} == {name: own[name] for name in shared}
+
+
+def test_a_tension_that_was_weighed_stays_as_exact_in_an_adopted_class() -> None:
+    weighed = replace(HANGER_3, scatter=Scatter(tension=0.02))
+    assert build(MASS, weighed).bounds["theta_F"] == pytest.approx((0.98, 1.02))
 
 
 def test_a_hanger_without_scatter_has_no_deviations() -> None:

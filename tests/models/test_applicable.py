@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shm.errors import UsageError
-from shm.models import MODELS, applicable, build, competing_names
+from shm.models import MODELS, THESIS, applicable, build, competing_names
 from shm.models.beam import Beam1
 from shm.values import Hanger, Turnbuckle
 from tests.helpers.hangers import HANGER_3
@@ -77,7 +77,8 @@ def test_building_a_class_that_does_not_apply_names_those_that_do(
     with pytest.raises(UsageError, match=complaint) as refusal:
         build("plated", hanger)
     assert "beam2" in refusal.value.remedy
-    assert isinstance(build("plated", HANGER_3), Plated)
+    assert isinstance(build("plated", HANGER_3, THESIS), Plated)
+    assert isinstance(build("plated", HANGER_3).model, Plated)
 
 
 def test_an_unknown_class_among_the_hangers_own_is_told_with_the_hanger() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from shm.models import build
+from shm.models import THESIS, build
 from shm.models.effects import EFFECTS, Conditions, Survey, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, solve
 from shm.models.hanger.physical import Zone
@@ -59,7 +59,7 @@ def frequencies(*args: object, **kwargs: object) -> np.ndarray:
 
 def exact(kind: str, hanger: Hanger = ROD, **values: float) -> np.ndarray:
     """Frequencies of an exact beam (planes, modes)."""
-    beam = build(kind, hanger)
+    beam = build(kind, hanger, THESIS)
     theta: Mapping[str, float] = {"theta_F": 1.0, "theta_L": 1.0} | values
     return beam.frequencies_hz(beam.pack(theta)[None], MODES)[0]
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shm.models import build, tensioned_beam
+from shm.models import THESIS, build, tensioned_beam
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.values import Turnbuckle
 from tests.helpers.hangers import HANGER_3
@@ -67,7 +67,7 @@ def test_springs_from_none_to_rigid_are_exact(xi: float, k: tuple[float, ...]) -
 def test_turnbuckles_are_those_of_the_stepped_beam(name: str) -> None:
     low, high = Turnbuckle(1.5, 0.6, 150.0, 1e7), Turnbuckle(9.0, 0.4, 60.0, 3e7)
     hanger = replace(HANGER_3, plate=None, turnbuckles=(low, high))
-    model, rng = build(name, hanger), np.random.default_rng(1)
+    model, rng = build(name, hanger, THESIS), np.random.default_rng(1)
     prior = model.prior
     theta = rng.uniform(prior.lower, prior.upper, (20, len(prior.names)))
     theta[:, 1] = 1.0

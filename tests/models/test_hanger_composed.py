@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.models import build
+from shm.models import THESIS, build
 from shm.models.composed import Baseline, ComposedHanger, deviations_of, scattered
 from shm.models.effects import Conditions, Variant
 from shm.models.hanger import PhysicalHanger, solve
@@ -24,7 +24,7 @@ COUPLED = replace(HANGER_3, plate=None, turnbuckles=(Turnbuckle(1.5, 0.6, 150.0,
 @pytest.mark.parametrize("hanger", [HANGER_3, COUPLED])
 @pytest.mark.parametrize("name", ["beam1", "beam2"])
 def test_a_beam_as_baseline_is_the_class_at_the_descriptions_length(name: str, hanger) -> None:
-    baseline, model = Baseline(name, hanger), build(name, hanger)
+    baseline, model = Baseline(name, hanger), build(name, hanger, THESIS)
     assert "theta_L" not in baseline.names
     rng = np.random.default_rng(0)
     lower, upper = (
@@ -39,7 +39,7 @@ def test_a_beam_as_baseline_is_the_class_at_the_descriptions_length(name: str, h
 
 @pytest.mark.parametrize("name", ["s1", "s2"])
 def test_a_solid_baseline_has_the_frequencies_of_its_class(name: str) -> None:
-    composed, model = ComposedHanger(HANGER_3, name, [], PLACES), build(name, HANGER_3)
+    composed, model = ComposedHanger(HANGER_3, name, [], PLACES), build(name, HANGER_3, THESIS)
     theta = np.array([[0.9, 0, 0, 0, 0], [1.2, 0, 0, 0, 0]])
     found = composed.modes(theta, PLAIN, 4)
     np.testing.assert_allclose(found.frequency_hz, model.frequencies_hz(theta[:, :1], 4), rtol=1e-9)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import MODELS, Model, build
+from shm.models import MODELS, PRIORS, THESIS, Model, build
 from shm.values import AddedMass, ModalTest
 from tests.helpers.hangers import HANGER_3
 
 
-@pytest.fixture(params=MODELS)
+@pytest.fixture(params=[(name, priors) for name in MODELS for priors in PRIORS], ids=" ".join)
 def model(request: pytest.FixtureRequest) -> Model:
-    return build(request.param, HANGER_3)
+    name, priors = request.param
+    return build(name, HANGER_3, priors)
 
 
 @pytest.fixture
@@ -88,20 +89,22 @@ def test_an_unknown_class_is_refused_with_the_known_ones() -> None:
 
 def test_beam_1_of_hanger_3_gives_the_exact_first_frequency() -> None:
     """5.58 Hz at 12 m, 7.67 Hz at 9.817 m; the thesis prints 5.64 and 7.70 (ERRATA)."""
-    model = build("beam1", HANGER_3)
+    model = build("beam1", HANGER_3, THESIS)
     long, short = model.frequencies_hz(np.array([[1.0, 1.0], [1.0, 9.817 / 12]]), 1)[:, 0, 0]
     assert long == pytest.approx(5.58, abs=0.005)
     assert short == pytest.approx(7.67, abs=0.005)
 
 
 def test_beam_2_with_stiff_springs_is_beam_1() -> None:
-    stiff = build("beam2", HANGER_3).frequencies_hz(np.array([[1.1, 0.97, 15, 15, 15, 15]]), 6)
-    clamped = build("beam1", HANGER_3).frequencies_hz(np.array([[1.1, 0.97]]), 6)
+    stiff = build("beam2", HANGER_3, THESIS).frequencies_hz(
+        np.array([[1.1, 0.97, 15, 15, 15, 15]]), 6
+    )
+    clamped = build("beam1", HANGER_3, THESIS).frequencies_hz(np.array([[1.1, 0.97]]), 6)
     np.testing.assert_allclose(stiff, clamped, rtol=1e-7)
 
 
 def test_the_springs_of_beam_2_act_in_their_own_plane() -> None:
-    model = build("beam2", HANGER_3)
+    model = build("beam2", HANGER_3, THESIS)
     base = model.pack(dict.fromkeys(model.parameter_names, 8.0) | {"theta_F": 1, "theta_L": 1})
     reference = model.frequencies_hz(base[None], 4)[0]
     for name, plane in {"log10_k1": 0, "log10_k3": 0, "log10_k2": 1, "log10_k4": 1}.items():

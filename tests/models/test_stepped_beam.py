@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from shm.errors import UsageError
-from shm.models import build, tensioned_beam
+from shm.models import THESIS, build, tensioned_beam
 from shm.models.stepped import SteppedBeam
 from shm.simulate import HangerState, natural_frequencies
 from shm.simulate.elements import plane_modes
@@ -57,7 +57,7 @@ def test_segments_of_one_section_are_the_uniform_beam(xi, shares, deck, arch) ->
 @pytest.mark.parametrize("name", ["beam1", "beam2"])
 def test_a_turnbuckle_that_is_like_the_bar_changes_nothing(name: str) -> None:
     same = Turnbuckle(7.0, 0.5, 0.5 * MASS, EI)
-    plain, coupled = build(name, HANGER_3), build(name, with_turnbuckles(same))
+    plain, coupled = build(name, HANGER_3, THESIS), build(name, with_turnbuckles(same), THESIS)
     prior = plain.prior
     theta = np.random.default_rng(3).uniform(prior.lower, prior.upper, (300, len(prior.names)))
     ratio = coupled.frequencies_hz(theta, 6) / plain.frequencies_hz(theta, 6)
@@ -101,7 +101,7 @@ def test_a_stiff_and_heavy_middle_leaves_pairs_of_modes_that_are_all_found() -> 
 )
 def test_frequencies_and_shapes_are_those_of_hermite_elements(turnbuckles, theta) -> None:
     hanger = with_turnbuckles(*turnbuckles)
-    model, parameters = build("beam2", hanger), np.array(theta, dtype=float)
+    model, parameters = build("beam2", hanger, THESIS), np.array(theta, dtype=float)
     stiffness = 10 ** parameters[2:]
     state = HangerState(711e3 * theta[0], *stiffness, length_m=12 * theta[1])
     exact, elements = (
@@ -125,8 +125,8 @@ def test_the_effective_length_is_taken_up_by_the_bar_between_the_turnbuckles() -
     high = replace(HIGH, x_m=left * (1.2 + 7.0) + 0.6 + 0.2)
     shorter = with_turnbuckles(low, high, length_m=9.0)
     np.testing.assert_allclose(
-        build("beam1", hanger).frequencies_hz(np.array([[1.0, 0.75]]), 6),
-        build("beam1", shorter).frequencies_hz(np.array([[1.0, 1.0]]), 6),
+        build("beam1", hanger, THESIS).frequencies_hz(np.array([[1.0, 0.75]]), 6),
+        build("beam1", shorter, THESIS).frequencies_hz(np.array([[1.0, 1.0]]), 6),
         rtol=1e-9,
     )
 
@@ -136,8 +136,8 @@ def test_turnbuckles_may_touch_each_other_and_an_end() -> None:
     one = with_turnbuckles(replace(LOW, x_m=0.3))
     theta = np.array([[1.0, 0.9, 7, 7, 8, 8]])
     np.testing.assert_allclose(
-        build("beam2", with_turnbuckles(*halves)).frequencies_hz(theta, 6),
-        build("beam2", one).frequencies_hz(theta, 6),
+        build("beam2", with_turnbuckles(*halves), THESIS).frequencies_hz(theta, 6),
+        build("beam2", one, THESIS).frequencies_hz(theta, 6),
         rtol=1e-9,
     )
 
@@ -145,20 +145,23 @@ def test_turnbuckles_may_touch_each_other_and_an_end() -> None:
 def test_the_ends_can_be_exchanged_only_where_the_turnbuckles_lie_alike_from_both() -> None:
     theta = np.array([[1.0, 1.0, 6.5, 6, 8, 9]])
     swapped = theta[:, [0, 1, 4, 5, 2, 3]]
-    middle, low = build("beam2", with_turnbuckles(MIDDLE)), build("beam2", with_turnbuckles(LOW))
+    middle, low = (
+        build("beam2", with_turnbuckles(MIDDLE), THESIS),
+        build("beam2", with_turnbuckles(LOW), THESIS),
+    )
     np.testing.assert_allclose(
         middle.frequencies_hz(swapped, 6), middle.frequencies_hz(theta, 6), rtol=1e-10
     )
-    assert middle.swaps == build("beam2", HANGER_3).swaps != ()
+    assert middle.swaps == build("beam2", HANGER_3, THESIS).swaps != ()
     assert np.abs(low.frequencies_hz(swapped, 6) / low.frequencies_hz(theta, 6) - 1).max() > 1e-3
     assert low.swaps == ()
 
 
 def test_an_effective_length_without_room_for_the_turnbuckles_is_refused() -> None:
     with pytest.raises(UsageError, match=r"0\.6 m long together"):
-        build("beam1", with_turnbuckles(LOW)).frequencies_hz(np.array([[1.0, 0.04]]), 3)
+        build("beam1", with_turnbuckles(LOW), THESIS).frequencies_hz(np.array([[1.0, 0.04]]), 3)
 
 
 def test_a_hanger_that_is_half_turnbuckle_is_no_beam_of_variable_length() -> None:
     with pytest.raises(UsageError, match="6 m long together"):
-        build("beam2", with_turnbuckles(replace(MIDDLE, length_m=6.0)))
+        build("beam2", with_turnbuckles(replace(MIDDLE, length_m=6.0)), THESIS)

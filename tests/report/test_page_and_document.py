@@ -69,7 +69,7 @@ def test_dark_light_and_print_styles_are_there(page: str) -> None:
 
 def test_the_page_leads_with_the_summary_and_the_state(outline: Outline) -> None:
     told = " ".join(" ".join(outline.words).split())
-    assert told.index("carries 650 kN") < told.index("Numbers")
+    assert told.index("carries 651 kN") < told.index("Numbers")
     assert "Alert" in told
 
 
@@ -95,7 +95,9 @@ def test_the_document_survives_json_and_holds_the_contract(season: HangerReport)
     )
     assert document["status"] == "alert"
     assert len(document["trend"]) == 10
-    assert set(document["trend"][0]["tension_n"]) == {"mean", "low", "high"}
+    assert set(document["trend"][0]["tension_n"]) == {
+        "mean", "low", "high", "repeatability_sd",
+    }  # fmt: skip
     assert document["selection"]["selected"] == "beam2"
     assert document["drifts"][0]["quantity"] == "tension"
     assert document["generated_at"] == "2026-09-08T10:00:00Z"

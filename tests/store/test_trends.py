@@ -22,9 +22,11 @@ from shm.store import (
     Store,
     StoredTest,
     TrendPoint,
+    trends,
 )
 from shm.store.tables import posteriors
-from shm.values import EndPlate, Hanger, Posterior, Selection, Summary
+from shm.values import EndPlate, Hanger, Limits, Posterior, Selection, Summary
+from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
@@ -61,18 +63,20 @@ def updated(store: Store, number: int, tension: float, hanger: int = 3) -> Store
 
 
 def from_history(store: Store, hanger: Hanger) -> list[Told]:
+    found = store.selection(hanger.id)
+    selection = found.selection if found else None
     return [
         (
             stored.test.id,
             (stored.time, stored.test.time, stored.test.temperature_c),
             posterior.model,
-            in_numbers(posterior, hanger),
+            in_numbers(posterior, hanger, selection),
         )
         for stored, posterior in store.history(hanger.id)
     ]
 
 
-def in_numbers(posterior: Posterior, hanger: Hanger) -> Numbers:
+def in_numbers(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
     stiffness = end_stiffness(posterior, hanger)
     most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
     return Numbers(
@@ -80,6 +84,7 @@ def in_numbers(posterior: Posterior, hanger: Hanger) -> Numbers:
         most_probable_tension_n=most_probable["theta_F"] * posterior.nominal_tension_n,
         stiffness={name: Summary.of(samples) for name, samples in stiffness.items()},
         parameters={name: Summary.of(posterior.parameter(name)) for name in posterior.names},
+        averaged=averaged_now(posterior, selection, hanger.limits),
     )
 
 
@@ -187,13 +192,45 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
     assert file_store.baseline_temperatures() == {3: 11.5, 4: 11.5}
 
 
-def test_only_what_is_not_kept_is_made_from_samples(file_store: Store) -> None:
+def test_only_what_is_not_kept_is_made_from_samples(
+    file_store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
     begun(file_store)
     assert file_store.keep_summaries(HANGER_3) == 1
     assert file_store.keep_summaries(HANGER_3) == 0
-    without_samples(file_store)
     updated(file_store, 2, 0.95)
+    made: list[tuple[str, ...]] = []
+    summarised = trends.summarised
+
+    def noted(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
+        made.append(posterior.tests)
+        return summarised(posterior, hanger, selection)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(trends, "summarised", noted)
+        assert [point.test for point in file_store.trend(HANGER_3)] == ["t1", "t2"]
+    assert made == [("t2",)]
+    assert file_store.keep_summaries(HANGER_3) == 1
+    without_samples(file_store)
     assert [point.test for point in file_store.trend(HANGER_3)] == ["t1", "t2"]
+
+
+def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store) -> None:
+    begun(file_store)
+    (first,) = file_store.trend(HANGER_3)
+    found = file_store.selection(3)
+    assert found is not None
+    assert first.averaged == found.selection.averaged(HANGER_3.limits)
+    updated(file_store, 2, 0.9)
+    latest = file_store.trend(HANGER_3)[-1]
+    ratio = latest.tension_n.mean / first.tension_n.mean
+    assert latest.averaged.tension_n.mean == pytest.approx(
+        ratio * first.averaged.tension_n.mean, rel=2e-3
+    )
+    limited = replace(HANGER_3, limits=Limits(tension_max_n=latest.averaged.tension_n.q50))
+    assert file_store.trend(limited)[-1].averaged.probability_above_limit == pytest.approx(
+        0.5, abs=0.02
+    )
 
 
 def test_another_description_of_the_hanger_gives_another_stiffness(file_store: Store) -> None:

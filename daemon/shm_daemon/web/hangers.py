@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path
 
+from shm.documents import averaged_document
 from shm.errors import BadInput, NothingThere
 from shm.store import DeliveryState, Store, StoredWatch, TrendPoint, Workspace
 from shm.values import Hanger
@@ -16,6 +17,7 @@ from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.models import Hangers, HangerState, Status
+from shm_daemon.web.plotting import plain
 
 router = APIRouter(prefix="/api", tags=["state"])
 Number = Annotated[int, Path(ge=0, le=2**31 - 1, description="The number of the hanger.")]
@@ -98,9 +100,10 @@ def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
 
 def _tension(latest: TrendPoint | None) -> dict[str, Any]:
     if latest is None:
-        return {"model": None, "tension_n": None}
+        return {"model": None, "tension_n": None, "averaged": None}
     summary = {**asdict(latest.tension_n), "map": latest.most_probable_tension_n}
-    return {"model": latest.model, "tension_n": summary}
+    averaged = plain(averaged_document(latest.averaged))
+    return {"model": latest.model, "tension_n": summary, "averaged": averaged}
 
 
 def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:

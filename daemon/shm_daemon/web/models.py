@@ -79,6 +79,26 @@ class Shift(BaseModel):
     probability: float | None = Field(description="That the shift is beyond the threshold.")
 
 
+class Tension(BaseModel):
+    """A tension in N in numbers; `q05` and `q95` bound 90 % of it."""
+
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+
+
+class AveragedTension(BaseModel):
+    """The tension over all model classes, each with its probability; its interval is absolute."""
+
+    tension_n: Tension
+    repeatability_sd_n: float | None = Field(description="With which the same test repeats it.")
+    probability_above_limit: float | None = Field(description="Null where no limit is set.")
+    probability_slack: float | None = Field(description="Null where no limit is set.")
+    caveats: list[str] = Field(description="What keeps it from being taken at its word.")
+
+
 class HangerState(BaseModel):
     """What is known of a hanger after its latest test; null or empty before the first."""
 
@@ -87,7 +107,8 @@ class HangerState(BaseModel):
     latest_test_at: datetime | None
     model: str | None
     nominal_tension_n: float
-    tension_n: Quantity | None
+    tension_n: Quantity | None = Field(description="By the class in force alone.")
+    averaged: AveragedTension | None = Field(description="The headline.")
     baseline_set_at: datetime | None
     shifts: list[Shift]
     open_alerts: int

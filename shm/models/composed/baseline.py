@@ -10,7 +10,7 @@ import numpy as np
 from shm.errors import UsageError
 from shm.models.as_made import TENSION_RATIO, AsMade
 from shm.models.base import Model
-from shm.models.beam import Beam
+from shm.models.beam import Beam, Beam3
 from shm.models.composed.scatter import Deviation
 from shm.models.effects.base import Parameter
 from shm.models.hanger import PhysicalHanger, solve
@@ -68,7 +68,16 @@ class Baseline:
             deck_end_m=np.full(len(theta), deck_m),
             arch_end_m=np.full(len(theta), arch_m),
         )
-        return bar.on_springs(self._model.springs_n_m_rad(whole))
+        bar = bar.on_springs(self._model.springs_n_m_rad(whole))
+        if not isinstance(self._model, Beam3):
+            return bar
+        hanger, one = self.hanger, np.ones(len(theta))
+        turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
+        return replace(
+            bar,
+            shear_compliance_1_n=one / self._model.shear_stiffness_n,
+            rotary_inertia_kg_m=turning * one,
+        )
 
     def ratio(self, theta: FloatArray, modes: int) -> FloatArray:
         """The class's frequencies over those of the general model (n, 2, modes)."""

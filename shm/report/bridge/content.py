@@ -9,7 +9,7 @@ from datetime import datetime
 from shm.report.content import Interval
 from shm.report.period import Period
 from shm.report.summary import Status, of_nominal
-from shm.values import Drift, Hanger
+from shm.values import Averaged, Drift, Hanger
 from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.neighbours import BridgePattern
 
@@ -31,10 +31,10 @@ class Course:
 class HangerLine:
     """A hanger as the report of its bridge shows it.
 
-    `tension_n` is that of its latest test, None before the first; `drift` that of its tension
-    since its baseline, None where nothing was compared; `called` says in a few words what was
-    called since; `open_alerts` counts those that nobody took note of. `course` is None without a
-    period.
+    `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
+    it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
+    says in a few words what was called since; `open_alerts` counts those that nobody took note of.
+    `course` is None without a period.
     """
 
     hanger: Hanger
@@ -48,6 +48,7 @@ class HangerLine:
     model: str = ""
     course: Course | None = None
     baseline_tension_n: Interval | None = None
+    averaged: Averaged | None = None
 
     @property
     def of_nominal(self) -> Interval | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shm.documents import drift_document
+from shm.documents import averaged_document, drift_document
 from shm.report.bridge.content import BridgeReport
 from shm.report.bridge.summary import advice, summary
 from shm.report.period import period_json
@@ -35,6 +35,7 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "status": line.status.name.lower() if line.status else None,
                 "latest": line.latest,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
+                "averaged": averaged_document(line.averaged) if line.averaged else None,
                 "drift": drift_document(line.drift) if line.drift else None,
                 "test": line.test or None,
                 "model": line.model or None,

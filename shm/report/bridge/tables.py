@@ -10,10 +10,15 @@ from shm.report.shifts import shift_cells, shift_unit
 from shm.report.table import Table
 from shm.values import Drift
 from shm.values.force_units import ForceUnit
+from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _BAR = 6
 _PERCENT_DECIMALS = 1
+
+
+_BESIDE = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
+"""What stands beside a tension where it is known, with its heading."""
 
 
 def tables(data: BridgeReport, *, bars: bool = False) -> tuple[Table, ...]:
@@ -101,28 +106,39 @@ def _signed(interval: Interval, places: int) -> str:
 
 def _hangers(data: BridgeReport) -> Table:
     unit = hangers_unit(data.hangers)
+    beside = {name: [_said(line, name, unit) for line in data.hangers] for name in _BESIDE}
+    shown = {name: cells for name, cells in beside.items() if any(cells)}
+    cells = list(zip(*shown.values(), strict=True)) or [()] * len(data.hangers)
     return Table(
         "Hangers",
         (
-            "hanger", "state", f"tension, {unit.name} (90 %)", "% of nominal (90 %)",
-            "open alerts", "latest test",
+            "hanger", "state", f"tension, {unit.name} (90 %)", *(_BESIDE[name] for name in shown),
+            "% of nominal (90 %)", "open alerts", "latest test",
         ),
-        tuple(_hanger(line, unit) for line in data.hangers),
-        note="With 90 % intervals. Alert: beyond a threshold. Watch: a change was called, or a "
+        tuple(_hanger(*each, unit) for each in zip(data.hangers, cells, strict=True)),
+        note="With absolute 90 % intervals. Repeatability: the standard deviation between tests of "
+        "one state. Alert: beyond a threshold. Watch: a change was called, or a "
         "shift beyond a threshold is likelier than not. More: shm report --hanger N.",
     )  # fmt: skip
 
 
-def _hanger(line: HangerLine, unit: ForceUnit) -> tuple[str, ...]:
+def _said(line: HangerLine, name: str, unit: ForceUnit) -> str:
+    """One of `_BESIDE` of a hanger; empty where it is not known."""
+    return str(getattr(stated(line.averaged, unit), name)) if line.averaged else ""
+
+
+def _hanger(line: HangerLine, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
     name = f"{line.hanger.id} {line.hanger.name}".strip()
     opened = str(line.open_alerts or "none")
     if line.tension_n is None or line.status is None:
-        return (name, "no test", "not known", "not known", opened, "none")
+        unknown = ["not known"] * (2 + len(beside))
+        return (name, "no test", *unknown, opened, "none")
     share = line.of_nominal
     return (
         name,
         line.status.value,
         words.with_span(line.tension_n.in_unit(unit)),
+        *(text or "not known" for text in beside),
         words.with_span(share) if share else "no nominal",
         opened,
         _day(line.latest),

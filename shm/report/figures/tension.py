@@ -34,7 +34,7 @@ def _draw(data: HangerReport) -> Figure:
 
 def _see(axes: Axes, data: HangerReport) -> None:
     """Shows the samples and the lines near them: a sharp posterior must stay readable."""
-    low, high = data.posterior.tension_n.min(), data.posterior.tension_n.max()
+    low, high = data.compared.tension_n.min(), data.compared.tension_n.max()
     lines = [data.hanger.nominal_tension_n]
     if (baseline := data.baseline_tension_n) is not None:
         lines += [baseline.low, baseline.high]
@@ -74,7 +74,7 @@ def _line(
 
 
 def _histogram(axes: Axes, data: HangerReport) -> None:
-    samples = data.tension_unit.of(data.posterior.tension_n)
+    samples = data.tension_unit.of(data.compared.tension_n)
     interval = data.tension_n.in_unit(data.tension_unit)
     heights, edges = np.histogram(samples, bins=min(40, 10 + len(samples) // 40), density=True)
     centres = (edges[:-1] + edges[1:]) / 2

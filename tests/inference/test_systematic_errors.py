@@ -1,0 +1,162 @@
+"""Errors that tests share, to first order, against the general model and against random draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.inference.systematic_errors import (
+    _GIVE_M_N,
+    _GIVE_SD_M_N,
+    _SENSOR_KG,
+    _SENSOR_SD_KG,
+    shared_loads,
+    systematic_errors,
+)
+from shm.models.hanger import PhysicalHanger, PointMass
+from shm.values import FloatArray, Hanger, Scatter
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.physical_hangers import frequencies_hz
+
+ORDERS = np.arange(1, 7)
+SLIM = replace(
+    HANGER_3,
+    area_m2=HANGER_3.area_m2 / 25,
+    second_moment_m4=HANGER_3.second_moment_m4 / 625,
+    mass_per_length_kg_m=HANGER_3.mass_per_length_kg_m / 25,
+    nominal_tension_n=60e3,
+)
+"""A 26 mm rod, on which 50 g matter."""
+
+
+def pinned(hanger: Hanger) -> PhysicalHanger:
+    one = np.ones(1)
+    bar = PhysicalHanger.clamped(hanger, hanger.nominal_tension_n * one)
+    compliance = np.zeros((1, 2, 2, 2))
+    compliance[..., [0, 1], [0, 1]] = np.inf
+    return replace(bar, rotational_compliance_rad_n_m=compliance)
+
+
+def lowered(hanger: Hanger, changed: PhysicalHanger) -> tuple[FloatArray, FloatArray]:
+    """ln of frequencies (orders,) over the bare bar's, and those."""
+    bare = frequencies_hz(pinned(hanger), len(ORDERS))[0, 0]
+    return np.log(frequencies_hz(changed, len(ORDERS))[0, 0] / bare), bare
+
+
+def found(hanger: Hanger, places_m: tuple[float, ...] = ()) -> tuple[FloatArray, FloatArray]:
+    """Mean and loads of one plane."""
+    bare = frequencies_hz(pinned(hanger), len(ORDERS))[0, 0]
+    plane = np.zeros(len(ORDERS), dtype=int)
+    return systematic_errors(hanger, plane, ORDERS, bare, places_m)
+
+
+@pytest.mark.parametrize("x_m", [0.9, 1.7, 3.1])
+def test_a_sensor_where_it_is_known_to_sit_lowers_each_mode_as_the_general_model_does(
+    x_m: float,
+) -> None:
+    """Its mean mass, and by one standard deviation of that what the load says."""
+    mean, loads = found(SLIM, (x_m,))
+    nowhere = found(SLIM)[0] - sensors_anywhere(SLIM).mean(axis=0)
+    for kg, size in ((_SENSOR_KG, mean - nowhere), (_SENSOR_SD_KG, loads[:, 0])):
+        mass = PointMass(np.array([x_m]), np.array([kg]))
+        shift, _ = lowered(SLIM, replace(pinned(SLIM), masses=(mass,)))
+        np.testing.assert_allclose(size, shift, atol=0.05 * np.abs(shift).max())
+        assert np.abs(shift).max() > 2e-4
+
+
+def sensors_anywhere(hanger: Hanger, draws: int = 40_000) -> FloatArray:
+    """What masses as uncertain, where a person reaches, lower modes by (draws, orders)."""
+    rng = np.random.default_rng(1)
+    x_m = rng.uniform(0.8, 2.5, (draws, 1))
+    kg = _SENSOR_KG + _SENSOR_SD_KG * rng.standard_normal((draws, 1))
+    whole_kg = hanger.mass_per_length_kg_m * hanger.length_m
+    return np.asarray(-kg / whole_kg * np.sin(np.pi * ORDERS * x_m / hanger.length_m) ** 2)
+
+
+def test_a_sensor_that_may_sit_anywhere_in_reach_has_the_moments_of_draws() -> None:
+    stiff = replace(SLIM, scatter=Scatter(along=0.0))
+    mean, loads = found(stiff)
+    drawn = sensors_anywhere(stiff)
+    # Without planes in common, supports add a rank of one: two loads, parallel.
+    bare = frequencies_hz(pinned(stiff), len(ORDERS))[0, 0]
+    whole_kg = stiff.mass_per_length_kg_m * stiff.length_m
+    give = 4 * whole_kg * (bare / ORDERS) ** 2
+    np.testing.assert_allclose(
+        mean + _GIVE_M_N * give, drawn.mean(axis=0), atol=0.02 * np.abs(drawn).mean()
+    )
+    covariance = loads @ loads.T - _GIVE_SD_M_N**2 * np.outer(give, give)
+    expected = np.cov(drawn.T)
+    np.testing.assert_allclose(covariance, expected, atol=0.03 * expected.max())
+
+
+@pytest.mark.parametrize("hanger", [HANGER_3, SLIM], ids=["thick", "slim"])
+def test_supports_that_give_way_lower_each_mode_as_the_general_model_does(hanger: Hanger) -> None:
+    """The compliance of both ends together; here all of it at one, then halved between both."""
+    mean, _ = found(hanger, (0.0,))  # a sensor at the end weighs nothing
+    for deck, arch in ((1.0, 0.0), (0.5, 0.5)):
+        give = np.zeros((1, 2, 2))
+        give[0, 0], give[0, 1] = deck * _GIVE_M_N, arch * _GIVE_M_N
+        shift, _ = lowered(hanger, replace(pinned(hanger), translational_compliance_m_n=give))
+        np.testing.assert_allclose(mean, shift, rtol=0.05, atol=1e-9)
+    assert np.abs(mean).max() > 1e-5
+
+
+def test_planes_share_half_of_the_supports_variance_and_all_of_the_sensors() -> None:
+    bare = frequencies_hz(pinned(HANGER_3), 1)[0, 0]
+    both = np.array([0, 1])
+    orders, frequency = np.array([1, 1]), np.repeat(bare, 2)
+    whole_kg = HANGER_3.mass_per_length_kg_m * HANGER_3.length_m
+    size = _GIVE_SD_M_N * 4 * whole_kg * bare[0] ** 2
+    steady = replace(HANGER_3, scatter=Scatter(along=0.0))
+    _, loads = systematic_errors(steady, both, orders, frequency, (0.0,))
+    covariance = loads @ loads.T
+    np.testing.assert_allclose(covariance, size**2 * np.array([[1, 0.5], [0.5, 1]]), rtol=1e-9)
+    _, loads = systematic_errors(steady, both, orders, frequency, (2.0,))
+    alike = loads[:, 0]
+    assert alike[0] == alike[1] < 0
+
+
+def test_a_section_that_wanders_moves_low_orders_as_drawn_ones_do() -> None:
+    """Mode n by half of the mean of -a(x) cos(2 n pi x/L): a drawn along the bar."""
+    rng, cells, sd = np.random.default_rng(2), 240, 0.001
+    x_m = (np.arange(cells) + 0.5) * HANGER_3.length_m / cells
+    covariance = np.exp(-(np.subtract.outer(x_m, x_m) ** 2) / 2) + 1e-9 * np.eye(cells)
+    area = sd * rng.standard_normal((20_000, cells)) @ np.linalg.cholesky(covariance).T
+    waves = np.cos(2 * np.pi * np.outer(ORDERS, x_m / HANGER_3.length_m))
+    expected = np.std(area @ waves.T / cells / 2, axis=0)
+    here = replace(HANGER_3, scatter=Scatter(along=sd))
+    there = replace(HANGER_3, scatter=Scatter(along=0.0))
+    own, none = (found(each, (0.0,))[1] for each in (here, there))
+    size = np.sqrt((own**2).sum(axis=1) - (none**2).sum(axis=1))
+    np.testing.assert_allclose(size[:3], expected[:3], rtol=0.15)
+    assert size[0] > 1.5 * size[-1]
+
+
+def test_a_diagnosis_has_the_same_errors_about_none_whatever_its_data() -> None:
+    """Second moments of sensor and supports are kept: their mean is a rival's to claim."""
+    bare = frequencies_hz(pinned(SLIM), len(ORDERS))[0, 0]
+    plane = np.zeros(len(ORDERS), dtype=int)
+    loads = shared_loads(SLIM, plane, ORDERS, bare)
+    few = shared_loads(SLIM, plane[:2], ORDERS[:2], bare[:2])
+    np.testing.assert_allclose(few, loads[:2])
+    steady = replace(SLIM, scatter=Scatter(along=0.0))
+    mean, centred = found(steady)
+    drawn = sensors_anywhere(steady)
+    whole = np.diag(loads @ loads.T)
+    exact = (
+        np.diag(centred @ centred.T) + drawn.mean(axis=0) ** 2 + (mean - drawn.mean(axis=0)) ** 2
+    )
+    np.testing.assert_allclose(whole, exact, rtol=0.15)
+
+
+def test_a_short_bar_has_its_sensor_not_beyond_its_middle() -> None:
+    short = replace(SLIM, length_m=2.0)
+    mean, _ = found(short)
+    kg = short.mass_per_length_kg_m * short.length_m
+    bare = frequencies_hz(pinned(short), len(ORDERS))[0, 0]
+    own = mean + _GIVE_M_N * 4 * kg * (bare / ORDERS) ** 2
+    x = np.linspace(0.1, 0.5, 2001)
+    expected = -_SENSOR_KG / kg * np.mean(np.sin(np.pi * np.outer(ORDERS, x)) ** 2, axis=1)
+    np.testing.assert_allclose(own, expected, rtol=0.02)

@@ -1,0 +1,173 @@
+"""The beam that shears against closed forms, its limit, and other models of the same physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+from scipy.linalg import block_diag, eigh
+
+from shm.models import described, tensioned_beam, timoshenko_beam
+from shm.models.hanger import PhysicalHanger
+from shm.values import FloatArray
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.physical_hangers import EI, LENGTH, MASS, TENSION, frequencies_hz, on_springs
+from tests.helpers.timoshenko import clamped_frequencies_hz
+
+NU = HANGER_3.poissons_ratio
+SHEAR = (
+    6 * (1 + NU) / (7 + 6 * NU) * HANGER_3.elastic_modulus_pa / (2 * (1 + NU)) * HANGER_3.area_m2
+)
+GYRATION = np.sqrt(HANGER_3.second_moment_m4 / HANGER_3.area_m2)
+
+
+def found_hz(
+    deck: object,
+    arch: object,
+    modes: int,
+    length_m: object = LENGTH,
+    tension_n: object = TENSION,
+    shear_n: object = SHEAR,
+    gyration_m: object = GYRATION,
+) -> FloatArray:
+    sets = (length_m, tension_n, EI, MASS, shear_n, gyration_m, deck, arch)
+    return timoshenko_beam.frequencies_hz(*map(np.asarray, sets), modes)
+
+
+@pytest.mark.parametrize("length_m", [2.0, 3.0, 12.0])
+@pytest.mark.parametrize("tension_n", [1e3, TENSION, 5 * TENSION])
+def test_pinned_ends_give_the_closed_form(length_m: float, tension_n: float) -> None:
+    """w = a sin qx and psi = b cos qx, q = n pi/L, satisfy the ends: two equations for a and b.
+
+    Of their energies the smaller eigenvalue is omega^2.
+    """
+    expected = []
+    for q in np.arange(1, 11) * np.pi / length_m:
+        stiffness = [[(SHEAR + tension_n) * q**2, -SHEAR * q], [-SHEAR * q, EI * q**2 + SHEAR]]
+        inertia = np.diag([MASS, MASS * GYRATION**2])
+        expected.append(np.sqrt(eigh(stiffness, inertia, eigvals_only=True)[0]) / (2 * np.pi))
+    found = found_hz(0.0, 0.0, 10, length_m, tension_n)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tension_n", [1.0, TENSION, 1e3 * TENSION])
+@pytest.mark.parametrize(
+    ("deck", "arch"), [(0, 0), (1e4, 1e7), (3e6, np.inf), (0, np.inf), (np.inf, np.inf)]
+)
+def test_without_shear_and_rotary_inertia_it_is_the_euler_bernoulli_beam(
+    tension_n: float, deck: float, arch: float
+) -> None:
+    found = found_hz(deck, arch, 12, tension_n=tension_n, shear_n=1e12 * SHEAR, gyration_m=0.0)
+    bar = (LENGTH, tension_n, EI, MASS, deck, arch)
+    expected = tensioned_beam.frequencies_hz(*map(np.asarray, bar), 12)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize(("length_m", "tension_n"), [(12.0, TENSION), (12.0, 1e4), (8.0, 1e6)])
+@pytest.mark.parametrize(
+    ("deck", "arch"), [(0.0, 0.0), (5e5, 4e7), (0.0, np.inf), (np.inf, np.inf)]
+)
+def test_the_general_model_with_shear_and_rotary_inertia_agrees(
+    length_m: float, tension_n: float, deck: float, arch: float
+) -> None:
+    """Of slender bars, for which the general model has functions of shear strain enough."""
+    one, springs = np.ones(1), np.ones((1, 2))
+    bar = replace(
+        PhysicalHanger.clamped(HANGER_3, tension_n * one),
+        arch_end_m=length_m * one,
+        shear_compliance_1_n=one / SHEAR,
+        rotary_inertia_kg_m=MASS * GYRATION**2 * one,
+    )
+    expected = frequencies_hz(on_springs(bar, deck * springs, arch * springs), 6)[0, 0]
+    np.testing.assert_allclose(found_hz(deck, arch, 6, length_m, tension_n), expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("length_m", [2.0, 12.0])
+def test_a_clamped_bar_is_that_of_another_discretisation(length_m: float) -> None:
+    expected = clamped_frequencies_hz(HANGER_3, length_m, TENSION, 8)
+    np.testing.assert_allclose(found_hz(np.inf, np.inf, 8, length_m), expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("tension_n", [1e4, 5 * TENSION])
+@pytest.mark.parametrize(("deck", "arch"), [(0.0, 1e5), (3e6, 3e6), (1e4, 1e8)])
+def test_a_short_bar_on_springs_is_that_of_another_discretisation(
+    tension_n: float, deck: float, arch: float
+) -> None:
+    expected = legendre_hz(2.0, tension_n, deck, arch, 6)
+    np.testing.assert_allclose(found_hz(deck, arch, 6, 2.0, tension_n), expected, rtol=1e-8)
+
+
+def legendre_hz(
+    length_m: float, tension_n: float, deck: float, arch: float, modes: int
+) -> FloatArray:
+    """Deflections that vanish at the ends, rotations that the springs there resist."""
+    x, weights = legendre.leggauss(80)
+    weights = weights * length_m / 2
+    unit = np.eye(36)
+    bubbles = unit[2:] - unit[:-2]
+    slope = legendre.legval(x, legendre.legder(bubbles.T)) * 2 / length_m
+    turn, bend = (legendre.legval(x, each) for each in (unit, legendre.legder(unit)))
+    bend = bend * 2 / length_m
+    deflection, ends = legendre.legval(x, bubbles.T), legendre.legval(np.array([-1.0, 1.0]), unit)
+
+    def integral(left: FloatArray, right: FloatArray) -> FloatArray:
+        return np.asarray((left * weights) @ right.T)
+
+    corner = -SHEAR * integral(slope, turn)
+    whole = EI * integral(bend, bend) + SHEAR * integral(turn, turn)
+    whole += (ends * np.array([deck, arch])) @ ends.T
+    stiffness = np.block(
+        [[(SHEAR + tension_n) * integral(slope, slope), corner], [corner.T, whole]]
+    )
+    mass = MASS * block_diag(integral(deflection, deflection), GYRATION**2 * integral(turn, turn))
+    return np.asarray(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:modes]) / (2 * np.pi))
+
+
+def test_each_of_shear_rotary_inertia_and_softer_springs_lowers_every_mode() -> None:
+    whole = found_hz(1e7, 1e7, 8, 3.0)
+    assert np.all(whole < found_hz(1e7, 1e7, 8, 3.0, shear_n=1e3 * SHEAR))
+    assert np.all(whole < found_hz(1e7, 1e7, 8, 3.0, gyration_m=0.0))
+    assert np.all(whole > found_hz(1e6, 1e7, 8, 3.0))
+
+
+@pytest.mark.parametrize("length_m", [2.0, 6.0])
+def test_no_mode_is_missed_or_doubled_in_a_short_thick_bar(length_m: float) -> None:
+    """Each spring raises a mode from the pinned bar's towards the clamped bar's, never beyond."""
+    springs = np.logspace(2, 11, 40)
+    found = found_hz(springs, springs, 10, length_m)
+    pinned, clamped = (found_hz(k, k, 10, length_m) for k in (0.0, np.inf))
+    assert np.all(np.diff(found, axis=0) > 0)
+    assert np.all((found > pinned) & (found < clamped))
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (7,), (4, 2), (1500, 2)])
+def test_the_answer_has_the_arguments_shape_and_a_row_of_each(shape: tuple[int, ...]) -> None:
+    """Blocks of a batch are solved each by itself; what is in a batch changes nothing."""
+    rng = np.random.default_rng(1)
+    length, tension = rng.uniform(2, 12, shape), rng.uniform(1e4, 1e6, shape)
+    springs = 10 ** rng.uniform(3, 9, shape)
+    found = found_hz(springs, np.inf, 5, length, tension)
+    assert found.shape == (*shape, 5)
+    last = (-1,) * len(shape)
+    alone = found_hz(springs[last], np.inf, 5, length[last], tension[last])
+    np.testing.assert_allclose(found[last], alone, rtol=1e-13)
+
+
+def test_sets_that_are_no_bar_end_and_leave_the_others_alone() -> None:
+    found = found_hz(1e6, 1e6, 4, tension_n=np.array([TENSION, np.nan]))
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[0], found_hz(1e6, 1e6, 4), rtol=1e-12)
+
+
+def test_beam_3_is_this_beam_and_beam_2_its_limit_for_slender_bars() -> None:
+    model = described("beam3", HANGER_3)
+    springs = {"log10_k1": 6.0, "log10_k2": 6.5, "log10_k3": 7.0, "log10_k4": 7.5}
+    theta = model.pack({"theta_F": 1.0, "theta_L": 0.9, **springs})[None]
+    found = model.frequencies_hz(theta, 6)[0]
+    expected = found_hz(np.array([1e6, 10**6.5]), np.array([1e7, 10**7.5]), 6, 0.9 * LENGTH)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    slender = replace(HANGER_3, length_m=120.0)
+    both = [described(name, slender).frequencies_hz(theta, 3) for name in ("beam2", "beam3")]
+    np.testing.assert_allclose(both[1], both[0], rtol=1e-4)
