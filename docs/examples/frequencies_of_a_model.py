@@ -1,8 +1,8 @@
 """The forward models by themselves: parameters in, frequencies out, beside a closed form.
 
 A clamped bar without bending stiffness is a string: f_n = n / (2 L) sqrt(T / m). A model class is a
-name; `build` makes it for a hanger. Its array of parameter sets (n, parameters) gives frequencies
-(n, planes, modes) in one call.
+name; `build` makes it for a hanger, with the thesis's priors of tension and length alone. Its array
+of parameter sets (n, parameters) gives frequencies (n, planes, modes) in one call.
 """
 
 from dataclasses import replace
@@ -25,8 +25,8 @@ order = np.arange(1, 5)
 closed_form_hz = order / (2 * bar.length_m) * np.sqrt(711e3 / bar.mass_per_length_kg_m)
 
 parameters = np.array([[1.0, 1.0], [1.1, 1.0]])  # theta_F, theta_L
-as_string = build("beam1", string).frequencies_hz(parameters, modes=4)
-as_bar = build("beam1", bar).frequencies_hz(parameters, modes=4)
+as_string = build("beam1", string, priors="thesis").frequencies_hz(parameters, modes=4)
+as_bar = build("beam1", bar, priors="thesis").frequencies_hz(parameters, modes=4)
 print("model classes:", ", ".join(MODELS))
 print("string, closed form (Hz):", closed_form_hz.round(3))
 print("string, beam1       (Hz):", as_string[0, 0].round(3))

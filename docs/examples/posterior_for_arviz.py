@@ -22,7 +22,7 @@ hanger = shm.round_bar(
 )
 recording = shm.simulate(hanger, hits=3, seconds_per_hit=10.0, seed=5)
 test = shm.identify(recording, hanger=hanger, cross_check="none")
-posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1)
+posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1, priors="thesis")
 
 with TemporaryDirectory() as folder:
     path = Path(folder) / "hanger3.nc"

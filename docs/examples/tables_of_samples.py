@@ -37,8 +37,8 @@ with TemporaryDirectory() as folder:
     back = pandas.read_csv(Path(folder) / "hanger3.csv")
     document = json.loads((Path(folder) / "hanger3.json").read_text())
 
-assert list(back.columns) == ["theta_F", "theta_L", "sigma", "tension_n", "log_likelihood"]
+assert list(back.columns) == [*posterior.names, "tension_n", "log_likelihood"]
 assert (back["tension_n"] == table["tension_n"]).all()
 assert document["draws"]["tension_n"] == table["tension_n"].tolist()
 assert modes.groupby("plane")["order"].max().to_dict() == {"longitudinal": 6, "transverse": 6}
-assert abs(table["stress_mpa"].mean() - 711e3 / hanger.area_m2 / 1e6) < 0.2
+assert abs(table["stress_mpa"].mean() / (711e3 / hanger.area_m2 / 1e6) - 1) < 0.03

@@ -36,12 +36,14 @@ posterior = shm.update(test, hanger, model="beam1", seed=1)
 low, high = np.quantile(posterior.tension_n, [0.05, 0.95])
 print(
     f"tension {posterior.tension_n.mean() / 1e3:.1f} kN, 90 % from {low / 1e3:.1f} to "
-    f"{high / 1e3:.1f} kN; planted {truth_n / 1e3:.1f} kN"
+    f"{high / 1e3:.1f} kN; planted {truth_n / 1e3:.1f} kN; the same test would repeat it within "
+    f"{posterior.repeatability_sd_n / 1e3:.2f} kN"
 )
 
 figure = shm.plot.frequency_response(test, hanger)
 
 assert len(test.test.modes) == 12  # six in each plane below 100 Hz
-assert abs(posterior.tension_n.mean() / truth_n - 1) < 0.002
-assert posterior.tension_n.std() / truth_n < 0.002
+assert abs(posterior.tension_n.mean() - truth_n) < 3 * posterior.tension_n.std()
+assert posterior.tension_n.std() / truth_n < 0.03  # the bar as made: mass, stiffness, length
+assert posterior.repeatability_sd_n / truth_n < 0.002
 assert figure.axes[0].get_ylabel().endswith("(m/s²/N)")

@@ -1,7 +1,8 @@
 """Frequencies from elsewhere: type them in, and see what they say of the tension.
 
 Table 1.1 of the thesis: twelve frequencies of a 12 m round bar, without standard deviations. What
-is not known (the deviations, the time, the temperature) is simply left out.
+is not known (the deviations, the time, the temperature) is simply left out. The thesis leaves the
+effective length open, and so do its priors.
 """
 
 import shm
@@ -28,7 +29,7 @@ test = shm.ModalTest(
         for order, frequency_hz in enumerate(measured_hz[plane], start=1)
     ),
 )
-posterior = shm.update(test, hanger, model="beam1", seed=1)
+posterior = shm.update(test, hanger, model="beam1", seed=1, priors="thesis")
 tension_kn = posterior.tension_n / 1e3
 print(f"tension {tension_kn.mean():.0f} ± {tension_kn.std():.0f} kN")
 print(f"model error {posterior.parameter('sigma').mean():.1%} of a frequency")

@@ -40,6 +40,9 @@ _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
 _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 """ln c and ln(mu l^2) by the deviations."""
 
+_TAKEN, _TAKEN_SD = 0.6, 0.35
+"""Of a fitting's length, what does not swing: mean and standard deviation."""
+
 _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
@@ -138,13 +141,14 @@ class Deviations:
 def _effective_length(hanger: Hanger) -> tuple[float, float]:
     """Mean and standard deviation of ln of the length that swings over the taped one.
 
-    A fitting that is stiffer than the bar takes from none to all of its own length.
+    A fitting that is stiffer than the bar takes from little to all of its own length; its mass
+    takes a little more.
     """
     stated = hanger.scatter.effective_length
     if math.isfinite(stated):
         return 0.0, math.hypot(hanger.scatter.length, stated)
     share = sum(hanger.fittings_m) / hanger.length_m
-    return -share / 2, math.hypot(hanger.scatter.length, share / math.sqrt(12))
+    return -_TAKEN * share, math.hypot(hanger.scatter.length, _TAKEN_SD * share)
 
 
 def _root(covariance: FloatArray) -> FloatArray:

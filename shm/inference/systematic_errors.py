@@ -17,6 +17,9 @@ _SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
 """Piezo-electric and MEMS accelerometers for structures with magnet, base and cable end: 20 to 90 g
 (makers' data sheets)."""
 
+_MOST_OF_BAR = 0.03
+"""Of the bar's own mass: what is lighter than that is measured without touching it."""
+
 _REACH_M = (0.8, 2.5)
 """From the deck, where a person mounts a sensor; never beyond the middle of the hanger."""
 
@@ -61,13 +64,19 @@ def shared_loads(
     For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
     theirs to claim.
     """
-    ratio = 1 / (hanger.mass_per_length_kg_m * hanger.length_m)
+    ratio = _per_sensor_kg(hanger)
     low, high = np.minimum(_REACH_M, np.array([0.1, 0.5]) * hanger.length_m)
     x_m = low + (high - low) * (np.arange(_FEW_PLACES) + 0.5) / _FEW_PLACES
     felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2
     sensor = np.hypot(_SENSOR_KG, _SENSOR_SD_KG) / np.sqrt(_FEW_PLACES) * felt
     size = np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
     return np.hstack([sensor, -size[:, None] * _by_plane(plane)])
+
+
+def _per_sensor_kg(hanger: Hanger) -> float:
+    """1/(m L), less where a usual sensor would be more than its share of a light bar."""
+    mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
+    return min(1.0, _MOST_OF_BAR * mass_kg / _SENSOR_KG) / mass_kg
 
 
 def _lowered(hanger: Hanger, order: IntArray, frequency_hz: FloatArray) -> FloatArray:
@@ -102,7 +111,7 @@ def _sensors(
     hanger: Hanger, order: IntArray, places_m: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """Mean (F,) and loads (F, k) of the sensors' mass."""
-    ratio = 1 / (hanger.mass_per_length_kg_m * hanger.length_m)
+    ratio = _per_sensor_kg(hanger)
     if places_m:
         x_m = np.array(places_m)
         felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2

@@ -66,7 +66,7 @@ def test_pairs_show_each_parameter_and_each_two(
     panels = drawn["pairs"].axes
     assert len(panels) == len(posterior.names) ** 2
     said = [text.get_text() for axes in panels for text in axes.texts]
-    force, length, _ = posterior.samples.T
+    force, length, *_ = posterior.samples.T
     assert said[0] == f"{np.corrcoef(force, length)[0, 1]:+.2f}"
 
 

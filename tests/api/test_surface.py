@@ -24,9 +24,9 @@ SIGNATURES = {
     "cross_check='frf', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
     "mains_hz=50.0, window_time_constant_s=inf)",
     "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, repeat=1, "
-    "method='noise-floor', progress)",
+    "method='noise-floor', priors='description', progress)",
     "select": "(tests, hanger, models=None, *, seed=1, samples=1000, repeat=1, "
-    "method='noise-floor', progress)",
+    "method='noise-floor', priors='description', progress)",
     "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
     "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "

@@ -17,8 +17,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.models import Model, build
 from shm.inference import UpdateOptions, refresh, update
+from shm.models import Model, build
 from shm.values import PLANES, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 

@@ -54,9 +54,9 @@ from scipy.stats import chisquare, cramervonmises
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.models import Model, build
 from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
+from shm.models import Model, build
 from shm.values import NAN, PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 

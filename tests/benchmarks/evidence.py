@@ -25,8 +25,8 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.models import build
 from shm.inference import NOISE_FLOOR, TEXTBOOK, BiasedEvidenceWarning, UpdateOptions, update
+from shm.models import build
 from shm.values import Posterior
 from tests.helpers import evidence_oracle
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test

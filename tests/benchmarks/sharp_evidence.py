@@ -20,8 +20,8 @@ from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.models import Model, build
 from shm.inference import UpdateOptions, update
+from shm.models import Model, build
 from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 

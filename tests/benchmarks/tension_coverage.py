@@ -16,9 +16,9 @@ import numpy as np
 from rich.progress import track
 
 from shm.identify import IdentifyOptions, identify
+from shm.inference import UpdateOptions, update
 from shm.models import build
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.inference import UpdateOptions, update
 from shm.values import Hanger, Posterior
 
 DIAMETER_M = 0.130

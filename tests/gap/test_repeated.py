@@ -10,10 +10,19 @@ import pytest
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.repeated import GAIN_SD, PLACE_SD_M, TURN_SD_RAD, Repeated, section_ways
+from shm.gap.repeated import (
+    GAIN_SD,
+    PLACE_SD_M,
+    STRETCHES,
+    TURN_SD_RAD,
+    Repeated,
+    section_loads,
+    section_ways,
+)
 from shm.gap.shapes import ShapeScaling
+from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline
-from shm.models.hanger import Zone, solve
+from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.simulate import CampaignPlan, HangerState, campaign
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
@@ -121,12 +130,17 @@ def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m
     np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
 
 
-def test_a_bar_of_one_section_has_no_loads() -> None:
+def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
     scatter = replace(HANGER_3.scatter, along=0.0)
     tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
     hanger = replace(HANGER_3, scatter=scatter)
-    found = GapProblem(hanger, "beam1", observed(tests, hanger)).repeated
-    assert not found.frequency.any()
+    found = GapProblem(hanger, "beam1", observed(tests, hanger))
+    design = found.design
+    bars = PhysicalHanger.clamped(hanger, np.full(STRETCHES + 1, TENSION_N))
+    assert not section_loads(design, bars, hanger).any()
+    frequency_hz = np.exp(found.observations.value[: design.frequencies])
+    own = shared_loads(hanger, design.frequency_plane, design.frequency_order, frequency_hz)
+    np.testing.assert_allclose(found.repeated.frequency, own @ own.T, rtol=0.1, atol=1e-12)
 
 
 def test_without_shapes_sensors_have_no_loads() -> None:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, NothingThere, UsageError
+from shm.inference import UpdateOptions
 from shm.models import Model, build
 from shm.pipeline import adopting, steps
 from shm.pipeline.adopting import Wish, adopt, gap_watch
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.reporting import hanger_report
 from shm.store import Lineage, Store, StoredAdoption, Workspace
-from shm.inference import UpdateOptions
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from shm.errors import NothingThere
+from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import rebaselining
 from shm.pipeline.rebaselining import Order, rebaseline
 from shm.store import Baseline, Stage, Workspace
-from shm.inference import UpdateOptions
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, a_flow, ingest, receive_all

@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 
 from shm.errors import BadInput, ShmError
+from shm.inference import UpdateOptions
 from shm.models import build
 from shm.pipeline import steps
 from shm.pipeline.steps import identify_file, watch_test
 from shm.pipeline.terms import reason_document, seed_of
 from shm.read import Limits
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
-from shm.inference import UpdateOptions
 from shm.values import Alert, Hanger, ModalTest, Recording, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.nouns import NOW, a_check, a_foreign_mode, a_response, a_test

@@ -101,7 +101,8 @@ def test_admitted_models_plate_and_turnbuckles_are_read(tmp_path: Path) -> None:
 
 def test_a_described_hanger_survives_the_way_to_another_process(tmp_path: Path) -> None:
     hanger = load_hanger(written(tmp_path, ROUND + PLATE + TURNBUCKLE))
-    assert pickle.loads(pickle.dumps(hanger)) == hanger
+    # By their texts: unknown numbers are NaN, which equals itself in one process alone.
+    assert repr(pickle.loads(pickle.dumps(hanger))) == repr(hanger)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.models import DESCRIPTION, THESIS, build
 from shm.inference import UpdateOptions, update
+from shm.models import DESCRIPTION, THESIS, build
 from shm.values import PLANES, ModalTest, Mode, Posterior, Thresholds
 from shm.watch import (
     Newest,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.models import build
 from shm.inference import UpdateOptions, update
+from shm.models import build
 from shm.values import TENSION, ModalTest, Reading, WatchedQuantity, WatchedTest
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader

@@ -17,8 +17,8 @@ from importlib.metadata import version
 
 import numpy as np
 
-from shm.models import build
 from shm.inference.likelihood import Likelihood
+from shm.models import build
 from shm.values import FloatArray
 from tests.helpers.evidence_oracle import TABLES, modal_test
 from tests.helpers.hangers import HANGER_3
