@@ -110,7 +110,11 @@ def examples() -> str:
     return "\n" + "\n\n".join(parts) + "\n"
 
 
-_BEAMS = {"beam1": "beam1-clamped-ends", "beam2": "beam2-ends-on-rotational-springs"}
+_BEAMS = {
+    "beam1": "beam1-clamped-ends",
+    "beam2": "beam2-ends-on-rotational-springs",
+    "beam3": "beam3-shear-and-rotary-inertia",
+}
 _HEADINGS = defaultdict(lambda: "s1-s2-solid0-solid1-solid2-three-dimensional", _BEAMS)
 
 

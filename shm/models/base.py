@@ -45,9 +45,7 @@ class Model:
 
     `bounds` are the uniform priors of the parameters; `swaps` lists pairs of end springs (log10)
     that can be exchanged without changing any frequency, so that sampling may keep to one copy.
-    `expensive` says that an evaluation costs much more than a beam's, `sees_section` that the
-    area matters beyond mass and bending stiffness (see `shm.models.as_made`); `priors` is one of
-    `PRIORS`.
+    `expensive` says that an evaluation costs much more than a beam's; `priors` is one of `PRIORS`.
     """
 
     name: str
@@ -55,7 +53,6 @@ class Model:
     bounds: Mapping[str, tuple[float, float]]
     swaps: Sequence[Swap] = ()
     expensive: ClassVar[bool] = False
-    sees_section: ClassVar[bool] = False
     priors: str = THESIS
 
     def __init__(self, hanger: Hanger):

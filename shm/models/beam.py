@@ -129,7 +129,6 @@ class Beam3(Beam2):
 
     name = "beam3"
     title = "Beam 3: rotational end springs, shear and rotary inertia"
-    sees_section = True
 
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:

@@ -55,11 +55,12 @@ class Scatter:
     """Standard deviations, as fractions, by which a bar as made differs from its description.
 
     Defaults: `section` (area) 1 %: EN 10060 allows a hot-rolled round of 50 mm +-0.8 mm, 3.2 % of
-    the area, which three standard deviations make 1.1 %. `density` 0.3 %: by their
-    composition carbon steels lie between 7,830 and 7,870 kg/m3 (ASM Handbook 1). `length` 0.05 %: a tape of class
-    II (OIML R 35) and its reading between two ends, 5 mm in 10 m. `modulus` 1.5 %: between heats
-    of one kind of steel, half of the 3 % that the JCSS Probabilistic Model Code (3.2) gives with
-    the tests' own scatter. `along` is by which the section varies along the bar about its own mean.
+    the area, which three standard deviations make 1.1 %. `density` 0.3 %: by their composition
+    carbon steels lie between 7,830 and 7,870 kg/m3 (ASM Handbook 1). `length` 0.05 %: a tape of
+    class II (OIML R 35) and its reading between two ends, 5 mm in 10 m. `modulus` 1.5 %: between
+    heats of one kind of steel, half of the 3 % that the JCSS Probabilistic Model Code (3.2) gives
+    with the tests' own scatter. `along` is by which the section varies along the bar about its own
+    mean.
     `tension` is how far the tension may be from the nominal one where that was weighed or measured;
     infinite where the nominal one says next to nothing. `bending_factor` is that of a strand's
     stated `bending_stiffness_factor`; NaN: anything from 0.3 to 1 (Papailiou 1997).

@@ -56,7 +56,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
-from shm.models import Model, build
+from shm.models import THESIS, Model, build
 from shm.values import NAN, PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 
@@ -165,7 +165,7 @@ def values(model: Model, samples: FloatArray, log_likelihood: FloatArray) -> Flo
 def case_of(terms: Terms, number: int) -> Case:
     """One draw from the prior, its data, its posterior and its ranks."""
     rng = np.random.default_rng([terms.seed, number])
-    model = build(terms.model, HANGER_3)
+    model = build(terms.model, HANGER_3, THESIS)
     prior = model.prior
     theta = rng.uniform(prior.lower, prior.upper)
     sigma = draw_sigma(terms, rng)
@@ -283,7 +283,7 @@ def run(name: str, arguments: argparse.Namespace, executor: Executor | None) -> 
     terms = Terms(name, low, high, error, samples, arguments.thinning, arguments.seed)
     mapped = (executor.map if executor else map)(partial(case_of, terms), range(arguments.draws))
     cases = list(track(mapped, name, total=arguments.draws))
-    labels = quantities(build(name, HANGER_3))
+    labels = quantities(build(name, HANGER_3, THESIS))
     passed = report(name, labels, cases)
     report_soft_ends(labels, cases)
     if arguments.figure:

@@ -26,7 +26,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import NOISE_FLOOR, TEXTBOOK, BiasedEvidenceWarning, UpdateOptions, update
-from shm.models import build
+from shm.models import THESIS, build
 from shm.values import Posterior
 from tests.helpers import evidence_oracle
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
@@ -97,7 +97,8 @@ def runs(table: str, repeat: int, model: str, method: str, seeds: int) -> Runs:
     for seed in track(range(seeds), f"{method} {table} N_D {repeat} {model}", transient=True):
         started = time.process_time()
         options = UpdateOptions(1000, seed, repeat, method)
-        posteriors.append(update([modal_test(TABLES[table])], build(model, HANGER_3), options))
+        built = build(model, HANGER_3, THESIS)
+        posteriors.append(update([modal_test(TABLES[table])], built, options))
         seconds.append(time.process_time() - started)
     return Runs(table, repeat, model, method, posteriors, seconds)
 

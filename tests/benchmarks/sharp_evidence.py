@@ -21,7 +21,7 @@ from rich.progress import track
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
-from shm.models import Model, build
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 
@@ -67,7 +67,7 @@ def modal_test(
 
 def pair(case: int, error: float) -> Pair:
     """One random hanger, updated twice."""
-    rng, model = np.random.default_rng(case), build("beam2", HANGER_3)
+    rng, model = np.random.default_rng(case), build("beam2", HANGER_3, THESIS)
     theta = np.array([rng.uniform(0.6, 1.8), rng.uniform(0.97, 1.03), *rng.uniform(6, 9, 4)])
     test, started = modal_test(model, theta, error, rng), time.process_time()
     one, other = (update([test], model, UpdateOptions(1000, seed)) for seed in (1, 2))

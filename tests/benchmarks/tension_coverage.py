@@ -17,7 +17,7 @@ from rich.progress import track
 
 from shm.identify import IdentifyOptions, identify
 from shm.inference import UpdateOptions, update
-from shm.models import build
+from shm.models import THESIS, build
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import Hanger, Posterior
 
@@ -48,7 +48,7 @@ def posterior_of(case: int, samples: int) -> tuple[HangerState, Posterior]:
     recording = hammer_test(HANGER, state, plan, rng)
     found = identify([recording], IdentifyOptions(), test_id=str(case), hanger=HANGER)
     options = UpdateOptions(samples=samples, seed=case)
-    return state, update([found.test], build("beam2", HANGER), options)
+    return state, update([found.test], build("beam2", HANGER, THESIS), options)
 
 
 def main() -> None:

@@ -33,7 +33,7 @@ from scipy.stats import ks_2samp
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, refresh, update
-from shm.models import Model, build
+from shm.models import THESIS, Model, build
 from shm.values import PLANES, FloatArray, ModalTest, Mode, Posterior
 from tests.helpers.hangers import HANGER_3
 
@@ -86,7 +86,7 @@ def planted(case: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray
 def compared(samples: int, case: int) -> Comparison:
     """One case."""
     rng = np.random.default_rng([7, case])
-    model, error = build("beam2", HANGER_3), ERRORS[case // 2 % len(ERRORS)]
+    model, error = build("beam2", HANGER_3, THESIS), ERRORS[case // 2 % len(ERRORS)]
     before, after = planted(case, rng)
     first, second = (modal_test(model, theta, error, rng) for theta in (before, after))
     known = update([first], model, UpdateOptions(samples, seed=3 * case))

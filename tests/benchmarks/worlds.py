@@ -124,7 +124,7 @@ def share(hits: int, count: int) -> str:
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """Coverage by world and by group, as Markdown."""
     lines = [
-        "| hangers | cases | 90 % interval covers | median error | median half width | worst error |",
+        "| hangers | cases | 90 % interval covers | median error | median half width | worst |",
         "|---|---|---|---|---|---|",
     ]
     kinds = [("all", rows)]

@@ -52,7 +52,7 @@ def test_the_planted_effect_is_named_with_its_size() -> None:
     found, _ = _found("point_mass")
     assert found.leading is not None
     assert found.leading.effect == "point_mass"
-    assert found.leading.probability > 0.85
+    assert found.leading.probability > 0.7
     assert found.p_value > 0.01
 
 
@@ -94,6 +94,7 @@ def test_evidence_is_what_the_fit_gains_less_what_freedom_costs() -> None:
     found, _ = _found("point_mass")
     for each in found.explanations:
         assert each.log_bayes_factor == pytest.approx(each.log_fit + each.log_occam)
+        assert each.log_occam <= 1e-9
     assert found.explanations[0].log_occam < 0
 
 

@@ -86,7 +86,7 @@ def test_of_right_orders_nothing_is_said() -> None:
 
 
 def test_a_diagnosis_says_so_among_the_first() -> None:
-    """After the states that keep the answer from being taken at its word: here a bound, a misfit."""
+    """After what keeps the answer from being taken at its word: here a bound, a misfit."""
     found = diagnose(_numbered({"transverse": -1, "longitudinal": -1}), HANGER_3, OPTIONS)
     wrong = "The orders look wrong: were the modes of both planes"
     first = next(k for k, each in enumerate(found.remarks) if each.startswith(wrong))

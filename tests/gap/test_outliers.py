@@ -48,7 +48,9 @@ def spoiled(tests: Sequence[ModalTest], plane: str, order: int, factor: float) -
 
 @pytest.fixture(scope="module")
 def one_wrong() -> Diagnosis:
-    return diagnose(spoiled(measured(), "longitudinal", 3, 1.03), PLAIN, QUICK)
+    # A support that swings along could move this frequency alone: it is not among the causes.
+    few = GapOptions(without=all_but(*TRIED - {"support_motion"}))
+    return diagnose(spoiled(measured(), "longitudinal", 3, 1.03), PLAIN, few)
 
 
 def test_one_wrong_frequency_is_set_aside_and_nothing_else_is_the_matter(
@@ -78,7 +80,7 @@ def test_what_is_set_aside_is_told_in_a_remark_and_kept_in_the_list_of_residuals
 
 
 def test_an_effect_that_moves_one_frequency_only_is_not_forgotten() -> None:
-    found = diagnose(spoiled(measured(), "longitudinal", 1, 1.1), PLAIN, QUICK)
+    found = diagnose(spoiled(measured(), "longitudinal", 1, 1.2), PLAIN, QUICK)
     assert [(each.plane, each.order) for each in found.outliers] == [("longitudinal", 1)]
     assert "Should it prove right, sag (longitudinal) is the likeliest cause" in found.remarks[1]
 
@@ -95,7 +97,7 @@ def test_an_effect_whose_law_is_off_at_one_mode_is_no_gross_error_there() -> Non
     moving = PlantedEffect(
         "support_motion",
         "deck end, longitudinal",
-        {"support_mass_kg": 850.0, "support_frequency_hz": 9.0},
+        {"support_mass_kg": 850.0, "support_frequency_hz": 12.0},
     )
     plan = replace(ONE_TEST, modes=8, reality=Reality())
     tests = campaign(PLAIN, HangerState(711e3), (moving,), plan, np.random.default_rng(101))

@@ -220,7 +220,7 @@ def test_a_weighed_load_has_a_normal_prior_about_the_nominal_tension() -> None:
     np.testing.assert_allclose(tension.value(share), [1.0, 1.02], atol=1e-8)
     np.testing.assert_allclose(tension.share(tension.value(share)), share)
     (usual,) = Baseline("beam1", HANGER_3).parameters
-    assert (usual.lower, usual.upper) == (0.5, 5.0)
+    assert (usual.lower, usual.upper, usual.spread) == (0.02, 5.0, "logarithmic")
     assert np.isinf(HANGER_3.scatter.tension)
 
 

@@ -2,7 +2,7 @@
 
 Beam 2 on hanger 3 of the thesis with table 1.1: six parameters with uniform priors and the model
 error sigma, uniform on [0, 1], as a seventh ("sampled") or integrated out ("integrated"). The
-frequencies and the likelihood are those of the package, `shm.models` and `shm.inference.likelihood`.
+frequencies and the likelihood are the package's, `shm.models` and `shm.inference.likelihood`.
 """
 
 from __future__ import annotations

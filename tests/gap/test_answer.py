@@ -1,0 +1,84 @@
+"""What is claimed and what is left possible, where some of it was never fitted."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shm.gap.answer import answered, possible
+from shm.gap.attribution import Attribution, Explanation
+from shm.gap.chances import Tried
+from shm.gap.contract import Fit, Hypothesis
+from shm.models.effects import Variant
+from tests.gap import linear_toy as toy
+
+
+def a_fit(name: str) -> Fit:
+    return toy.fit(np.zeros(toy.design().size), toy.tension(), name)
+
+
+BASELINE, UNEXPLAINED = a_fit("baseline"), a_fit("unexplained")
+
+
+def cause(
+    effect: str, probability: float, fit: Fit | None, group: int | None = None
+) -> Explanation:
+    """Of one place, screened where there is no fit."""
+    tried = Tried(Hypothesis(((effect, Variant()),)), 5.0, 8.0, fit)
+    return Explanation(tried, (tried,), probability, 5.0, 8.0, group)
+
+
+def attribution(
+    *causes: Explanation, no_gap: float = 0.05, unexplained: float = 0.05
+) -> Attribution:
+    return Attribution(
+        baseline=BASELINE,
+        no_gap_probability=no_gap,
+        unexplained_probability=unexplained,
+        unexplained=UNEXPLAINED,
+        explanations=causes,
+        groups=(tuple(each.effect for each in causes),),
+        invisible=(),
+        p_value=0.5,
+        search=SimpleNamespace(),  # type: ignore[arg-type]
+        tried=(),
+    )
+
+
+def test_a_group_of_causes_that_were_only_screened_is_answered_by_what_is_unexplained() -> None:
+    found = attribution(cause("point_mass", 0.5, None, 0), cause("sag", 0.4, None, 0))
+    assert found.leading is not None
+    assert answered(found) == [(1.0, UNEXPLAINED)]
+
+
+def test_a_leading_group_is_answered_by_those_of_its_members_that_were_fitted() -> None:
+    fit = a_fit("sag")
+    found = attribution(cause("point_mass", 0.5, None, 0), cause("sag", 0.4, fit, 0))
+    assert answered(found) == [(0.4, fit)]
+
+
+def test_a_cause_alone_is_answered_by_its_own_fit_and_not_by_another_ungrouped_one() -> None:
+    mass, sag = a_fit("mass"), a_fit("sag")
+    found = attribution(cause("point_mass", 0.8, mass), cause("sag", 0.1, sag))
+    assert answered(found) == [(0.8, mass)]
+
+
+@pytest.mark.parametrize(
+    ("no_gap", "unexplained", "fit"), [(0.9, 0.1, BASELINE), (0.1, 0.9, UNEXPLAINED)]
+)
+def test_where_no_cause_leads_it_is_no_gap_or_something_unknown(
+    no_gap: float, unexplained: float, fit: Fit
+) -> None:
+    found = attribution(no_gap=no_gap, unexplained=unexplained)
+    assert found.leading is None
+    assert answered(found) == [(1.0, fit)]
+
+
+def test_all_that_was_fitted_is_possible_with_its_probability() -> None:
+    """A tension is averaged over them; what was only screened has no draws to add."""
+    sag = a_fit("sag")
+    found = possible(attribution(cause("point_mass", 0.5, None), cause("sag", 0.4, sag)))
+    assert [weight for weight, _ in found] == pytest.approx([0.05, 0.05, 0.4])
+    assert [fit for _, fit in found] == [BASELINE, UNEXPLAINED, sag]
