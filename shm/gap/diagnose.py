@@ -81,8 +81,7 @@ def diagnose(
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
-    tension_before = _tension(problem, [(1.0, before)], rng)
-    tension_after = _tension(problem, possible(attribution), rng)
+    tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
     return Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
@@ -99,11 +98,11 @@ def diagnose(
         fit_p_value=attribution.p_value,
         model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
-        tension_before_n=tension_before,
-        tension_after_n=tension_after,
+        tension_before_n=tensions[0],
+        tension_after_n=tensions[1],
         next_measurements=following,
         remarks=(
-            *_states(problem, before, after, tension_after),
+            *_states(problem, before, after, tensions[1]),
             *found.remarks,
             *clear.misnumbered,
             *set_aside(aside, clear.otherwise),

@@ -15,202 +15,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from shm.inference.coordinates import Coordinates, log_normal
+from shm.inference.priors import (
+    DEVIATIONS,
+    Calibration,
+    Deviations,
+    EndDetails,
+    TensionReading,
+    reading_of,
+)
 from shm.models.as_made import (
     BENDING,
     BENDING_FACTOR,
     DENSITY,
     LENGTH,
     MODULUS,
-    RESTRAINT,
     SECTION,
     SHEAR,
     TENSION,
     AsMade,
 )
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
 
-_DEVIATIONS = (SECTION, DENSITY, MODULUS)
 _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
 _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 """ln c and ln(mu l^2) by the deviations."""
 
-_TAKEN, _TAKEN_SD = 0.6, 0.35
-"""Of a fitting's length, what does not swing: mean and standard deviation."""
-
 _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
-_ALIKE_WITHIN, _MIDDLES = 0.09, 32
-_STIFFEST = 1 / math.log10(RESTRAINT[1] / RESTRAINT[0])
 _MOST_REDRAWN = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """What measured tensions have taught of the deviations of a bar as made.
-
-    `names` are among `section`, `density`, `modulus`, `theta_L` and `bending_factor` (as logarithms
-    of true over described); `mean` (k,) and `covariance` (k, k).
-    """
-
-    names: tuple[str, ...]
-    mean: FloatArray
-    covariance: FloatArray
-
-
-@dataclass(frozen=True)
-class TensionReading:
-    """The tension that load cells, lift-offs or weights showed, all tests together."""
-
-    tension_n: float
-    sd: float
-    """As a fraction of it."""
-
-
-UNKNOWN_READING_SD = 0.03
-"""Of a reading whose standard deviation is not stated: lift-offs repeat within 2 to 5 % (fib
-Bulletin 30, Acceptance of stay cable systems)."""
-
-
-def reading_of(tests: Sequence[ModalTest]) -> TensionReading | None:
-    """The readings of all tests as one, weighted by their precision; None where there is none."""
-    values = [
-        (test.tension_read_n, _sd_of(test)) for test in tests if math.isfinite(test.tension_read_n)
-    ]
-    if not values:
-        return None
-    read, sd = np.array(values).T
-    weight = sd**-2
-    mean = float((weight * read).sum() / weight.sum())
-    return TensionReading(mean, float(weight.sum() ** -0.5) / mean)
-
-
-def _sd_of(test: ModalTest) -> float:
-    known = math.isfinite(test.tension_read_sd_n) and test.tension_read_sd_n > 0
-    return test.tension_read_sd_n if known else UNKNOWN_READING_SD * test.tension_read_n
-
-
-class Deviations:
-    """Normal prior of the deviations d = mean + factor n, n standard normal: `names` (k,).
-
-    The length is one where it is taped, a strand's bending factor where it is stated or calibrated
-    (its logarithm, to the stated one).
-    """
-
-    def __init__(self, model: AsMade, calibration: Calibration | None):
-        scatter = model.hanger.scatter
-        sds = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
-        means: dict[str, float] = {}
-        if not model.length_is_open:
-            means[LENGTH], sds[LENGTH] = _effective_length(model.hanger)
-        stated = model.is_strand and math.isfinite(scatter.bending_factor)
-        taught = calibration is not None and BENDING in calibration.names
-        if stated or (model.is_strand and taught):
-            sds[BENDING] = scatter.bending_factor if stated else 0.3
-        self.names = tuple(sds)
-        self.mean: FloatArray = np.array([means.get(name, 0.0) for name in self.names])
-        covariance = np.diag(np.array(list(sds.values())) ** 2)
-        if calibration is not None:
-            rows = [self.names.index(n) for n in calibration.names if n in self.names]
-            kept = [k for k, n in enumerate(calibration.names) if n in self.names]
-            self.mean[rows] = calibration.mean[kept]
-            covariance[np.ix_(rows, rows)] = calibration.covariance[np.ix_(kept, kept)]
-        self.factor: FloatArray = _root(covariance)
-
-    def row(self, **shares: float) -> FloatArray:
-        """How a combination of the deviations goes with n (k,)."""
-        return np.asarray(np.array([shares.get(name, 0.0) for name in self.names]) @ self.factor)
-
-    def mean_of(self, name: str) -> float:
-        """The mean of one of them; 0 where it is none."""
-        return float(self.mean[self.names.index(name)]) if name in self.names else 0.0
-
-    def column(self, deviations: FloatArray, name: str) -> FloatArray:
-        """One of them (n,) of (n, k); 0 where it is none."""
-        if name not in self.names:
-            return np.zeros(len(deviations))
-        return np.asarray(deviations[:, self.names.index(name)])
-
-
-def _effective_length(hanger: Hanger) -> tuple[float, float]:
-    """Mean and standard deviation of ln of the length that swings over the taped one.
-
-    A fitting that is stiffer than the bar takes from little to all of its own length; its mass
-    takes a little more.
-    """
-    stated = hanger.scatter.effective_length
-    if math.isfinite(stated):
-        return 0.0, math.hypot(hanger.scatter.length, stated)
-    share = sum(hanger.fittings_m) / hanger.length_m
-    return -_TAKEN * share, math.hypot(hanger.scatter.length, _TAKEN_SD * share)
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """A square root, also of a covariance in which some deviation is known."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(values.clip(0)))
-
-
-class EndDetails:
-    """The prior of springs together: the ends of one hanger are rarely each of another kind.
-
-    They are independent, or all alike, or alike in each plane (a fork turns about one axis), or
-    made to clamp (welded, or a nut on a thick plate): all in the stiffest decade. A quarter each,
-    every spring's log10 k uniform over its range, or over that decade; alike is within
-    `_ALIKE_WITHIN` of the range, 0.4 decades. `columns` are those of the box's `names`.
-    """
-
-    def __init__(self, names: Sequence[str], springs: Sequence[str]):
-        self.columns: IntArray = np.array(
-            [k for k, name in enumerate(names) if name in springs], dtype=int
-        )
-        planes = [names[k] in ("log10_k1", "log10_k3") for k in self.columns]
-        whole = np.arange(len(planes))
-        by_plane = [whole[np.equal(planes, side)] for side in (True, False)]
-        self._kinds: list[list[IntArray]] = [
-            [whole[[k]] for k in whole],
-            [whole],
-            [group for group in by_plane if len(group)],
-        ]
-
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Shares of the springs' ranges (n, springs)."""
-        shares = rng.random((n, len(self.columns)))
-        kind = rng.integers(len(self._kinds) + 1, size=n)
-        stiff = kind == len(self._kinds)
-        shares[stiff] = 1 - _STIFFEST * shares[stiff]
-        for index, groups in enumerate(self._kinds[1:], start=1):
-            rows = np.flatnonzero(kind == index)
-            for group in groups:
-                middle = rng.random((len(rows), 1))
-                away = _ALIKE_WITHIN * rng.standard_normal((len(rows), len(group)))
-                shares[np.ix_(rows, group)] = _reflected(middle + away)
-        return shares
-
-    def log_density(self, shares: FloatArray) -> FloatArray:
-        """Log density (n,) of shares (n, springs), over that of independent springs."""
-        middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
-        images = np.stack([shares, -shares, 2 - shares])
-        away = (images[..., None] - middles) / _ALIKE_WITHIN
-        own = np.exp(-0.5 * away**2).sum(axis=0) / (_ALIKE_WITHIN * math.sqrt(2 * math.pi))
-        total = np.ones(len(shares))
-        for groups in self._kinds[1:]:
-            parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
-            total = total + np.prod(parts, axis=0)
-        stiff = (shares > 1 - _STIFFEST).all(axis=1)
-        total = total + stiff * _STIFFEST ** -float(shares.shape[1])
-        return np.asarray(np.log(total / (len(self._kinds) + 1)))
-
-
-def _reflected(shares: FloatArray) -> FloatArray:
-    folded = np.abs(shares) % 2
-    return np.where(folded > 1, 2 - folded, folded)
 
 
 class DescribedCoordinates:
@@ -337,7 +175,7 @@ class DescribedCoordinates:
         """Parameters (n, parameters) of the box's and of deviates n (n, k)."""
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
         deviations = own.mean + n @ own.factor.T
-        section, density, modulus = (own.column(deviations, name) for name in _DEVIATIONS)
+        section, density, modulus = (own.column(deviations, name) for name in DEVIATIONS)
         taped = np.exp(own.column(deviations, LENGTH))
         box = dict(zip(self.box.names, inner.T, strict=True))
         if self._slips:
@@ -369,7 +207,7 @@ class DescribedCoordinates:
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
         taped = np.ones(len(theta)) if self._open else values[LENGTH]
         slip = values.get(BENDING, np.full(len(theta), stated))
-        logs = {name: values[name] for name in _DEVIATIONS}
+        logs = {name: values[name] for name in DEVIATIONS}
         logs |= {BENDING: np.log(slip / stated), LENGTH: np.log(taped)}
         deviations = np.column_stack(
             [logs.get(name, np.full(len(theta), own.mean_of(name))) for name in own.names]
@@ -460,13 +298,3 @@ def _is_felt(model: AsMade, spring: str, planes: set[Plane]) -> bool:
         return True
     plane = PLANES[0] if spring in ("log10_k1", "log10_k3") else PLANES[1]
     return plane in planes
-
-
-def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:
-    """What draws (n, parameters) of a posterior say of the bar's deviations."""
-    values = dict(zip(names, samples.T, strict=True))
-    kept = [n for n in (*_DEVIATIONS, LENGTH, BENDING) if n in values]
-    stated = hanger.bending_stiffness_factor
-    logs = {LENGTH: lambda v: np.log(v), BENDING: lambda v: np.log(v / stated)}
-    table = np.column_stack([logs.get(n, np.asarray)(values[n]) for n in kept])
-    return Calibration(tuple(kept), table.mean(axis=0), np.atleast_2d(np.cov(table.T)))

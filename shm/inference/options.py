@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from shm.errors import UsageError
-from shm.inference.described import Calibration
+from shm.inference.priors import Calibration
 
 Progress = Callable[[str, float], None]
 

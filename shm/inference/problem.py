@@ -9,10 +9,11 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.inference.coordinates import Coordinates
-from shm.inference.described import Calibration, DescribedCoordinates, reading_of
+from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import Likelihood
 from shm.inference.options import Progress
+from shm.inference.priors import Calibration, reading_of
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import BoolArray, FloatArray, IntArray, ModalTest

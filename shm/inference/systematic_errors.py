@@ -94,9 +94,9 @@ def _by_plane(plane: IntArray) -> FloatArray:
 def _section(hanger: Hanger, order: IntArray) -> FloatArray:
     """Loads (F, orders) of a section that wanders along the bar about its mean.
 
-    Of an area 1 + a(x), mode n changes by half of the mean of -a(x) cos(2 n pi x/L), to first order
-    and as a string (stiffness goes with the square of the area and adds as much where it counts);
-    the variance of that mean over a with correlation exp(-(s/r)^2 / 2) is
+    Of an area 1 + a(x), mode n changes by half of the mean of a(x) cos(2 n pi x/L) in a string, by
+    up to 1.5 times it between clamped ends, and is taken to change by once it; the variance of the
+    mean over a with correlation exp(-(s/r)^2 / 2) is
     sd^2 sqrt(2 pi) (r/L) exp(-(2 n pi r/L)^2 / 2) / 2. Both planes have it alike.
     """
     reach = min(_SECTION_REACH_M / hanger.length_m, 0.2)

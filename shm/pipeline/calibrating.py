@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.inference import UpdateOptions
-from shm.inference.described import Calibration, calibration_of
+from shm.inference.priors import Calibration, calibration_of
 from shm.models import DESCRIPTION
 from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.pipeline.terms import Taught, Terms

@@ -14,7 +14,7 @@ import pytest
 
 from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
 from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
-from shm.values import NAN, FloatArray, Summary
+from shm.values import NAN, Averaged, FloatArray, Summary
 from shm.watch.history import Band
 from shm_daemon.web.hanger_figures.over_time import MOST_POINTS, places
 from shm_daemon.web.hanger_figures.stiffness import FIGURE as STIFFNESS
@@ -39,6 +39,7 @@ def a_point(number: int, tension_n: float = 700e3) -> TrendPoint:
         stiffness=stiffness,
         parameters={},
         most_probable_tension_n=tension_n,
+        averaged=Averaged(summed_up(tension_n, 2e3), 1e3),
         test_id=number,
         test=f"t{number}",
         hanger=3,
@@ -56,6 +57,7 @@ BASELINE = BaselineGlance(
     stiffness={f"{plane}_end_stiffness": summed_up(6.5, 0.1) for plane in PLANES},
     parameters={},
     most_probable_tension_n=700e3,
+    averaged=Averaged(summed_up(700e3, 2e3), 1e3),
     id=1,
     hanger=3,
     set_at=START,

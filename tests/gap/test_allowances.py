@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap import diagnose
+from shm.gap import GapOptions, diagnose
 from shm.gap.allowances import allowances, exactly
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
@@ -17,6 +17,7 @@ from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.simulate.reality import Reality
 from shm.values import ModalTest
+from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
 SWUNG = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.006})
@@ -68,6 +69,9 @@ def test_beside_another_effect_only_the_one_that_goes_with_the_level_is_roughly_
 
 def test_a_tension_that_rises_with_the_level_is_told_though_each_mode_sees_its_own_share() -> None:
     """As simulated, the wide swing dies away while the other modes still ring."""
-    found = diagnose(_tests(), HANGER_3)
+    plan = CampaignPlan(modes=6, mass_share=0.0, shapes=False, reality=Reality())
+    tests = campaign(HANGER_3, HangerState(711e3), [SWUNG], plan, np.random.default_rng(3))
+    few = GapOptions(without=all_but("geometric_hardening", "timebase"))
+    found = diagnose(tests, HANGER_3, few)
     assert found.causes[0].effect == "geometric_hardening"
     assert found.causes[0].probability > 0.6

@@ -31,7 +31,7 @@ def cause(
 
 
 def attribution(
-    *causes: Explanation, no_gap: float = 0.05, unexplained: float = 0.05
+    *causes: Explanation, no_gap: float = 0.01, unexplained: float = 0.05
 ) -> Attribution:
     return Attribution(
         baseline=BASELINE,
@@ -66,7 +66,7 @@ def test_a_cause_alone_is_answered_by_its_own_fit_and_not_by_another_ungrouped_o
 
 
 @pytest.mark.parametrize(
-    ("no_gap", "unexplained", "fit"), [(0.9, 0.1, BASELINE), (0.1, 0.9, UNEXPLAINED)]
+    ("no_gap", "unexplained", "fit"), [(0.9, 0.1, BASELINE), (0.01, 0.99, UNEXPLAINED)]
 )
 def test_where_no_cause_leads_it_is_no_gap_or_something_unknown(
     no_gap: float, unexplained: float, fit: Fit
@@ -80,5 +80,5 @@ def test_all_that_was_fitted_is_possible_with_its_probability() -> None:
     """A tension is averaged over them; what was only screened has no draws to add."""
     sag = a_fit("sag")
     found = possible(attribution(cause("point_mass", 0.5, None), cause("sag", 0.4, sag)))
-    assert [weight for weight, _ in found] == pytest.approx([0.05, 0.05, 0.4])
+    assert [weight for weight, _ in found] == pytest.approx([0.01, 0.05, 0.4])
     assert [fit for _, fit in found] == [BASELINE, UNEXPLAINED, sag]

@@ -207,7 +207,7 @@ def test_draws_of_several_proposals_count_as_draws_of_their_mixture() -> None:
         peak = Peak(signs, centre, 0.3 * np.eye(2), 0.0)
         proposal = Proposal.about([peak], [Branch(signs)], np.arange(2))
         points = proposal.draw(count, rng)
-        log = stats.multivariate_normal(near, 0.2 * np.eye(2)).logpdf(points.w)
+        log = np.asarray(stats.multivariate_normal(near, 0.2 * np.eye(2)).logpdf(points.w))
         settled = Settled(points.w, np.zeros((count, 0, 0)), log)
         pool.add(proposal, _Draws(points, settled, log))
     found = pool.draws()

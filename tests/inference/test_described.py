@@ -9,14 +9,9 @@ import pytest
 from scipy.stats import kstest, norm
 
 from shm.inference import UpdateOptions, refresh, select, update
-from shm.inference.described import (
-    Calibration,
-    DescribedCoordinates,
-    EndDetails,
-    calibration_of,
-    reading_of,
-)
+from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
+from shm.inference.priors import Calibration, EndDetails, calibration_of, reading_of
 from shm.inference.problem import Problem
 from shm.models import AsMade, build
 from shm.models.as_made import RESTRAINT
@@ -50,7 +45,8 @@ def a_test(
     modes: int = 5,
     mass: AddedMass | None = None,
     log10_k: float = NAN,
-    **read: float,
+    tension_read_n: float = NAN,
+    tension_read_sd_n: float = NAN,
 ) -> ModalTest:
     """Frequencies to 0.01 % of a bar as it is described, clamped or on springs all alike."""
     model = build("beam1" if np.isnan(log10_k) else "beam2", hanger)
@@ -64,7 +60,14 @@ def a_test(
         for plane in planes
         for order, f in enumerate(exact[PLANES.index(plane)])
     )
-    return ModalTest("t1", rows, hanger=3, added_mass=mass, **read)
+    return ModalTest(
+        "t1",
+        rows,
+        hanger=3,
+        added_mass=mass,
+        tension_read_n=tension_read_n,
+        tension_read_sd_n=tension_read_sd_n,
+    )
 
 
 def coordinates_of(
@@ -182,6 +185,16 @@ def test_ends_alike_are_likelier_than_ends_of_different_kind() -> None:
 # ------------------------------------------------ what the tension rests on
 
 
+def test_fittings_make_the_length_that_swings_shorter_and_less_sure_than_the_tape() -> None:
+    both = [coordinates_of("beam2", each).deviations for each in (ROD, FITTED, HANGER_3)]
+    sd = [float(np.linalg.norm(each.row(theta_L=1.0))) for each in both]
+    mean = [each.mean_of("theta_L") for each in both]
+    assert sd[0] == pytest.approx(0.0005)
+    assert 0.1 * 0.5 / 12 < sd[1] < 0.5 / 12
+    assert sd[2] == 0  # plates leave it open instead
+    assert -0.5 / 12 < mean[1] < 0 == mean[0]
+
+
 @pytest.mark.parametrize(
     "hanger", [ROD, FITTED, STATED, HANGER_3], ids=["rod", "fit", "strand", "plate"]
 )
@@ -196,11 +209,11 @@ def test_the_tension_is_as_uncertain_beyond_the_apparent_one_as_mass_and_length(
     low, high = np.log((0.02, 5.0))
     apparent = low + (high - low) * shares[:, 0]
     beyond = np.log(coordinates.finished(z, rng)[:, 0]) - apparent
-    fitting = sum(hanger.fittings_m) / hanger.length_m / np.sqrt(12)
-    length = 0.0 if hanger.plate else 2 * np.hypot(0.0005, fitting)
-    expected = np.sqrt(0.01**2 + 0.003**2 + length**2)
+    length = float(np.linalg.norm(coordinates.deviations.row(theta_L=1.0)))
+    expected = np.sqrt(0.01**2 + 0.003**2 + (2 * length) ** 2)
     assert beyond.std() == pytest.approx(expected, rel=0.03)
-    assert beyond.mean() == pytest.approx(-sum(hanger.fittings_m) / 12.0, abs=3e-4)
+    mean = 2 * coordinates.deviations.mean_of("theta_L")
+    assert beyond.mean() == pytest.approx(mean, abs=5 * expected / np.sqrt(20_000))
     assert abs(np.corrcoef(apparent, beyond)[0, 1]) < 0.03
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -112,7 +113,7 @@ def legendre_hz(
     bend = bend * 2 / length_m
     deflection, ends = legendre.legval(x, bubbles.T), legendre.legval(np.array([-1.0, 1.0]), unit)
 
-    def integral(left: FloatArray, right: FloatArray) -> FloatArray:
+    def integral(left: Any, right: Any) -> FloatArray:
         return np.asarray((left * weights) @ right.T)
 
     corner = -SHEAR * integral(slope, turn)

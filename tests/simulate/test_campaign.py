@@ -131,8 +131,9 @@ def test_tension_and_deviations_scatter_as_stated(hanger: Hanger) -> None:
     assert spread == pytest.approx(0.1, rel=4 / math.sqrt(300))
     for name in ("section", "density", "length", "modulus"):
         drawn = np.array([getattr(each.deviations, name) for each in truths])
-        assert drawn.std() == pytest.approx(0.005, rel=4 / math.sqrt(300))
-        assert abs(drawn.mean()) < 4 * 0.005 / math.sqrt(150)
+        stated = getattr(hanger.scatter, name)
+        assert drawn.std() == pytest.approx(stated, rel=4 / math.sqrt(300))
+        assert abs(drawn.mean()) < 4 * stated / math.sqrt(150)
 
 
 def test_poorer_campaigns_leave_out_what_they_do_not_measure(hanger: Hanger) -> None:
@@ -191,7 +192,9 @@ def test_the_size_is_the_square_root_of_the_least_chi_square(hanger: Hanger) -> 
     data = logs((clamp,), 0.0, Deviations())
 
     def misfit(z: FloatArray) -> FloatArray:
-        plain = logs((), 0.01 * z[0], Deviations(*(0.005 * z[1:])))
+        scatter = hanger.scatter
+        sds = np.array([scatter.section, scatter.density, scatter.length, scatter.modulus])
+        plain = logs((), 0.01 * z[0], Deviations(*(sds * z[1:])))
         return np.concatenate([(plain - data) / 1e-4, z[1:]])
 
     best = least_squares(misfit, np.zeros(5), diff_step=np.full(5, 1e-3), max_nfev=6)

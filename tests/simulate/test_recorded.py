@@ -59,7 +59,7 @@ def test_both_planes_of_a_round_bar_come_back_with_order_and_shape(hanger: Hange
     for true in campaign.truth.frequencies:
         mode = found[true.plane, true.order]
         errors.append((mode.frequency_hz - true.frequency_hz) / mode.frequency_sd_hz)
-        assert max(abs(point.cross) / point.sd for point in mode.shape) < 3
+        assert max(abs(point.cross) / point.sd for point in mode.shape) < 5
         assert max(abs(point.cross) for point in mode.shape) < 0.1
         assert max(abs(point.value) for point in mode.shape) == pytest.approx(1)
     assert len(errors) == 16

@@ -67,7 +67,17 @@ def test_no_function_is_longer_than_50_lines() -> None:
     assert not long
 
 
-ROOMS = ("read", "identify", "models", "update", "watch", "store", "report", "simulate", "pipeline")
+ROOMS = (
+    "read",
+    "identify",
+    "models",
+    "inference",
+    "watch",
+    "store",
+    "report",
+    "simulate",
+    "pipeline",
+)
 
 
 @pytest.mark.parametrize("room", ROOMS)

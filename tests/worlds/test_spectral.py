@@ -359,7 +359,9 @@ def test_switching_nuisances_off_leaves_the_rest(quick: None) -> None:
     for real, plain in zip(
         sound_hangers(3, 40), sound_hangers(3, 40, Nuisances.none()), strict=True
     ):
-        assert real.hanger_toml == plain.hanger_toml
+        said, bare = (tomllib.loads(each.hanger_toml)["hanger"][0] for each in (real, plain))
+        said.pop("fittings_m", None)
+        assert said == bare
         for key in ("tension_n", "planes", "tests"):
             assert real.truth[key] == plain.truth[key]
         assert min(plain.truth["end_kl_over_ei"].values()) >= 0.0299
