@@ -74,9 +74,7 @@ def diagnose(
     answer = answered(attribution)
     before, leading = attribution.baseline, attribution.leading
     after = leading.best.fit if leading else None
-    aside, doubted = (
-        outliers(clear, errors, answer[0][1]) for errors in (clear.aside, clear.doubted)
-    )
+    aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))

@@ -64,7 +64,7 @@ def test_nothing_is_offered_where_there_is_no_workspace(tmp_path: Path) -> None:
 def test_model_classes_are_offered_after_a_comma_too() -> None:
     assert offered("update", "--model", incomplete="be") == ["beam1", "beam2", "beam3"]
     assert offered("predict") == list(MODELS)
-    assert offered("select", "--models", incomplete="beam1,be") == ["beam1,beam2"]
+    assert offered("select", "--models", incomplete="beam1,be") == ["beam1,beam2", "beam1,beam3"]
 
 
 def test_effects_are_offered() -> None:

@@ -82,8 +82,8 @@ def test_without_a_reality_a_campaign_is_what_it_was(hanger: Hanger) -> None:
     assert made.truth.tension_n == pytest.approx(667584.2752395038, rel=1e-12)
     assert not made.truth.sensors
     assert not made.truth.deviations.section_waves
-    assert size_of(hanger, STATE, (LOSS, SLIP), plan) == pytest.approx(8.657414726186591, rel=1e-6)
-    scaled = scaled_to(9.0, hanger, STATE, LOSS, plan)
+    assert size_of(then, STATE, (LOSS, SLIP), plan) == pytest.approx(8.657414726186591, rel=1e-6)
+    scaled = scaled_to(9.0, then, STATE, LOSS, plan)
     assert scaled is not None
     assert scaled.values["loss"] == pytest.approx(0.51151942327146, rel=1e-6)
 
