@@ -114,7 +114,9 @@ class Change:
         """The likeliest sizes (n,), from 0 to the largest, the baseline's parameters free."""
         square = misfit.products(self.per_size, self.per_size)
         along = misfit.products(self.per_size, self.deviation)
-        return np.clip(along / np.maximum(square, np.finfo(float).tiny), 0.0, self.largest)
+        with np.errstate(over="ignore"):  # a cause that does nothing has no size
+            sizes = along / np.maximum(square, np.finfo(float).tiny)
+        return np.clip(sizes, 0.0, self.largest)
 
     def left(self, misfit: Misfit) -> FloatArray:
         """The chi-square (n,) that the likeliest sizes leave."""
