@@ -12,7 +12,7 @@ from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch
 from shm.gap.landscape import log_normal
 from shm.inference.mixture import Normal, TMixture
-from shm.inference.tmcmc import normalised, systematic
+from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray, IntArray
 
 _FROM_PRIOR = 0.1
@@ -105,7 +105,7 @@ def _refitted(
     if weights.sum() <= 0 or not w.shape[1]:  # all of it is integrated out
         return mixture
     share = weights / weights.sum()
-    if 1 / (share**2).sum() >= _TO_CLUSTER * w.shape[1]:
+    if effective(share) >= _TO_CLUSTER * w.shape[1]:
         population = w[systematic(share, _POPULATION, rng)]
         # Equal copies of a point would make a cluster of no extent.
         spread = _JITTER * population.std(axis=0)
@@ -137,8 +137,7 @@ def _moved(part: Normal, w: FloatArray, owned: FloatArray) -> Normal:
         return part
     share = owned / total
     mean = share @ w
-    effective = 1 / (share**2).sum()
-    kept = (w.shape[1] + 2) / (effective + w.shape[1] + 2)
+    kept = (w.shape[1] + 2) / (effective(share) + w.shape[1] + 2)
     own = (share[:, None] * (w - mean)).T @ (w - mean)
     centre = (1 - kept) * mean + kept * part.mean
     return Normal(centre, _INFLATION * ((1 - kept) * own + kept * part.covariance))
@@ -148,7 +147,7 @@ def _tempered(log_weight: FloatArray, fewest: float) -> FloatArray:
     """Weights to fit to, raised to a power below 1 where too few points carry them."""
     power, weights = 1.0, normalised(log_weight)
     fewest = min(fewest, len(weights) / 2)
-    while 1 / np.sum(weights**2) < fewest:
+    while effective(weights) < fewest:
         power *= 0.8
         weights = normalised(power * log_weight)
     return weights

@@ -22,7 +22,7 @@ from shm.gap.coordinates import Branch
 from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
-from shm.inference.tmcmc import normalised, systematic
+from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 _TRIAL, _MOST_TRIALS = 150, 10
@@ -44,7 +44,7 @@ class _Draws:
     @property
     def effective(self) -> float:
         """Kish's effective number of draws."""
-        return float(1 / np.sum(normalised(self.log_weight) ** 2))
+        return effective(normalised(self.log_weight))
 
     def joined(self, other: _Draws) -> _Draws:
         return _Draws(

@@ -24,7 +24,6 @@ from shm.inference.priors import (
     Calibration,
     Deviations,
     EndDetails,
-    TensionReading,
     reading_of,
 )
 from shm.models.as_made import (
@@ -112,10 +111,6 @@ class DescribedCoordinates:
         return np.asarray(self._row_mass - self._seen @ (self._seen.T @ self._row_mass))
 
     @property
-    def reading(self) -> TensionReading | None:
-        return self._reading
-
-    @property
     def reading_sd(self) -> float:
         """Of a measured tension about the one predicted at the middle of what is not seen."""
         unseen = float(np.linalg.norm(self._unseen_mass))
@@ -134,10 +129,10 @@ class DescribedCoordinates:
         along = along / size
         nominal = math.log(self._hanger.nominal_tension_n) + self._mean_mass
         off = math.log(self._reading.tension_n) - nominal - inner[:, 0] - n @ self._row_mass
-        off = off + size * (n @ along) - (self._reading.sd * rng.standard_normal(len(n)))
+        off = off - self._reading.sd * rng.standard_normal(len(n))
         # Matheron's rule: the prior draw moved by what the noisy reading misses it by.
         gain = size / (size**2 + self._reading.sd**2)
-        return np.asarray(n + (gain * (off - size * (n @ along)))[:, None] * along)
+        return np.asarray(n + (gain * off)[:, None] * along)
 
     @property
     def _mean_mass(self) -> float:

@@ -26,9 +26,9 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from shm.errors import BadInput
+from shm.inference.likelihood import conditions_of, predicted_hz
 from shm.inference.systematic_errors import systematic_errors
 from shm.models import Model
-from shm.models.conditions import Conditions
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
 TAU_LOWER, TAU_USUAL, TAU_UPPER = 1e-5, 3e-3, 0.3
@@ -70,7 +70,7 @@ class FieldLikelihood:
             raise BadInput(
                 "no measured frequency to update with.", remedy="Give a test with modes."
             )
-        conditions = [model.conditions(test) for test in tests for _ in test.regular_modes]
+        conditions = conditions_of(tests, model)
         keys = [(m.plane, m.order, c) for m, c in zip(self.modes, conditions, strict=True)]
         distinct = list(dict.fromkeys(keys))
         self.of_mode: IntArray = np.array([distinct.index(key) for key in keys])
@@ -106,17 +106,7 @@ class FieldLikelihood:
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
         """The model's frequency for each datum (n, frequencies), in Hz."""
-        predicted = np.empty((self.frequencies, len(theta))).T
-        for conditions, rows in self._by_conditions().items():
-            found = model.frequencies_at(theta, self.highest_order, conditions)
-            predicted[:, rows] = found[:, self._plane[rows], self._order[rows]]
-        return predicted
-
-    def _by_conditions(self) -> dict[Conditions, list[int]]:
-        rows: dict[Conditions, list[int]] = {}
-        for index, each in enumerate(self._conditions):
-            rows.setdefault(each, []).append(index)
-        return rows
+        return predicted_hz(model, theta, self._conditions, self._plane, self._order)
 
     def _systematic(self, model: Model) -> tuple[FloatArray, FloatArray]:
         places = {point.x_m for mode in self.modes for point in mode.shape}

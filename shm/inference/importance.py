@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 from shm.inference.mixture import TMixture
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors
-from shm.inference.tmcmc import normalised, systematic
+from shm.inference.tmcmc import effective, normalised, systematic
 from shm.inference.valley import along
 from shm.values import FloatArray
 
@@ -72,7 +72,7 @@ class Weighted:
     @property
     def effective_sample_size(self) -> float:
         """Kish's effective number of draws."""
-        return float(1 / np.sum(normalised(self.log_weights) ** 2))
+        return effective(normalised(self.log_weights))
 
     @property
     def r_hat(self) -> float:
@@ -185,7 +185,7 @@ def _to_fit(weighted: Weighted) -> FloatArray:
     fewest = min(_FEWEST_TO_FIT * weighted.points.z.shape[1], len(weighted.log_weights) / 2)
     power = 1.0
     weights = normalised(weighted.log_weights)
-    while 1 / np.sum(weights**2) < fewest:
+    while effective(weights) < fewest:
         power *= 0.8
         weights = normalised(power * weighted.log_weights)
     return weights

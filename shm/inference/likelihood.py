@@ -21,7 +21,7 @@ from scipy.special import logsumexp
 from shm.errors import BadInput
 from shm.models import Model
 from shm.models.conditions import Conditions
-from shm.values import PLANES, FloatArray, ModalTest, Mode
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2
 _STEP_IN_SD_TO_DRAW = 0.2
@@ -62,22 +62,9 @@ class Likelihood:
 
         Tests that the model sees under equal conditions are one evaluation.
         """
-        # One measurement after the other, as indexing lays them: sums round alike, to the last bit.
-        predicted = np.empty((len(self.modes), len(theta))).T
-        for conditions, rows in self._by_conditions(model).items():
-            found = model.frequencies_at(theta, self.highest_order, conditions)
-            predicted[:, rows] = found[:, self._plane[rows], self._order[rows]]
-        return predicted
-
-    def _by_conditions(self, model: Model) -> dict[Conditions, list[int]]:
-        """The measurements made under each of the conditions that the model takes notice of."""
-        rows: dict[Conditions, list[int]] = {}
-        first = 0
-        for test in self.tests:
-            measured = range(first, first + len(test.regular_modes))
-            rows.setdefault(model.conditions(test), []).extend(measured)
-            first = measured.stop
-        return rows
+        return predicted_hz(
+            model, theta, conditions_of(self.tests, model), self._plane, self._order
+        )
 
     @property
     def fit_error(self) -> FloatArray:
@@ -139,3 +126,30 @@ class Likelihood:
         share[[0, -1]] -= np.log(2)
         share[0] = np.logaddexp(share[0], lowest)
         return nodes, share
+
+
+def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:
+    """The conditions of each measured mode, as far as the model takes notice of them."""
+    return [each for test in tests for each in [model.conditions(test)] * len(test.regular_modes)]
+
+
+def predicted_hz(
+    model: Model,
+    theta: FloatArray,
+    conditions: Sequence[Conditions],
+    plane: IntArray,
+    order: IntArray,
+) -> FloatArray:
+    """The model's frequencies (n, data) of data each with its conditions, plane and order from 0.
+
+    Data under equal conditions are one evaluation.
+    """
+    rows: dict[Conditions, list[int]] = {}
+    for index, each in enumerate(conditions):
+        rows.setdefault(each, []).append(index)
+    # One measurement after the other, as indexing lays them: sums round alike, to the last bit.
+    predicted, highest = np.empty((len(plane), len(theta))).T, int(order.max()) + 1
+    for each, own in rows.items():
+        found = model.frequencies_at(theta, highest, each)
+        predicted[:, own] = found[:, plane[own], order[own]]
+    return predicted

@@ -64,19 +64,26 @@ def shared_loads(
     For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
     theirs to claim.
     """
-    ratio = _per_sensor_kg(hanger)
-    low, high = np.minimum(_REACH_M, np.array([0.1, 0.5]) * hanger.length_m)
-    x_m = low + (high - low) * (np.arange(_FEW_PLACES) + 0.5) / _FEW_PLACES
-    felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2
+    felt = _felt(hanger, order, _within_reach_m(hanger, _FEW_PLACES))
     sensor = np.hypot(_SENSOR_KG, _SENSOR_SD_KG) / np.sqrt(_FEW_PLACES) * felt
     size = np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
     return np.hstack([sensor, -size[:, None] * _by_plane(plane)])
 
 
-def _per_sensor_kg(hanger: Hanger) -> float:
-    """1/(m L), less where a usual sensor would be more than its share of a light bar."""
+def _felt(hanger: Hanger, order: IntArray, x_m: FloatArray) -> FloatArray:
+    """What a kilogram at each place does to ln of each frequency (F, places).
+
+    Less where a usual sensor would be more than its share of a light bar.
+    """
     mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
-    return min(1.0, _MOST_OF_BAR * mass_kg / _SENSOR_KG) / mass_kg
+    ratio = min(1.0, _MOST_OF_BAR * mass_kg / _SENSOR_KG) / mass_kg
+    return np.asarray(-ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2)
+
+
+def _within_reach_m(hanger: Hanger, count: int) -> FloatArray:
+    """Places (count,) spread evenly over where a sensor may be."""
+    low, high = np.minimum(_REACH_M, np.array([0.1, 0.5]) * hanger.length_m)
+    return np.asarray(low + (high - low) * (np.arange(count) + 0.5) / count)
 
 
 def _lowered(hanger: Hanger, order: IntArray, frequency_hz: FloatArray) -> FloatArray:
@@ -111,14 +118,10 @@ def _sensors(
     hanger: Hanger, order: IntArray, places_m: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """Mean (F,) and loads (F, k) of the sensors' mass."""
-    ratio = _per_sensor_kg(hanger)
     if places_m:
-        x_m = np.array(places_m)
-        felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2
+        felt = _felt(hanger, order, np.array(places_m))
         return _SENSOR_KG * felt.sum(axis=1), np.asarray(_SENSOR_SD_KG * felt)
-    low, high = np.minimum(_REACH_M, np.array([0.1, 0.5]) * hanger.length_m)
-    x_m = low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES
-    felt = -ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2
+    felt = _felt(hanger, order, _within_reach_m(hanger, _PLACES))
     mean = _SENSOR_KG * felt.mean(axis=1)
     square = (_SENSOR_KG**2 + _SENSOR_SD_KG**2) * felt @ felt.T / _PLACES
     variance, ways = np.linalg.eigh(square - np.outer(mean, mean))

@@ -83,6 +83,11 @@ def normalised(log_weights: FloatArray) -> FloatArray:
     return np.asarray(weights / weights.sum())
 
 
+def effective(weights: FloatArray) -> float:
+    """Kish's effective number of draws with weights (n,) that add to 1."""
+    return float(1 / np.sum(weights**2))
+
+
 def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArray:
     """Indices (n,) drawn with `weights` by systematic resampling."""
     positions = (np.arange(n) + rng.random()) / n
