@@ -27,8 +27,9 @@ from scipy.special import logsumexp
 
 from shm.errors import BadInput
 from shm.inference.likelihood import conditions_of, predicted_hz
-from shm.inference.systematic_errors import systematic_errors
-from shm.models import Model
+from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
+from shm.models import AsMade
+from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
 TAU_LOWER, TAU_USUAL, TAU_UPPER = 1e-5, 3e-3, 0.3
@@ -61,7 +62,7 @@ class FieldLikelihood:
     def __init__(
         self,
         tests: Sequence[ModalTest],
-        model: Model,
+        model: AsMade,
         reading: tuple[float, float] | None = None,
     ):
         self.tests = tuple(tests)
@@ -96,7 +97,8 @@ class FieldLikelihood:
         if reading is not None:
             self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
         self._same = self._same_modes()
-        self._shift, self._loads = self._systematic(model)
+        self._settled = False
+        self._shift, self._loads = self._systematic(model, self._typical(model))
         self._tau, self._log_tau = self._grid(_STEP_IN_SD)
 
     @property
@@ -104,19 +106,38 @@ class FieldLikelihood:
         """The highest order of a measured mode, which a model has to reach in each plane."""
         return int(self._order.max()) + 1
 
-    def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequency for each datum (n, frequencies), in Hz."""
-        return predicted_hz(model, theta, self._conditions, self._plane, self._order)
+    def predict(self, model: AsMade, theta: FloatArray) -> FloatArray:
+        """The model's frequency for each datum (n, frequencies), in Hz, its ends as they usually
+        are.
+        """
+        bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
+        ends = model.end_waves(theta, bare, self._plane)
+        return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m))
 
-    def _systematic(self, model: Model) -> tuple[FloatArray, FloatArray]:
-        places = {point.x_m for mode in self.modes for point in mode.shape}
-        mean, loads = systematic_errors(
-            model.hanger,
-            self._plane,
-            self._order + 1,
-            self.frequency_hz[: self.frequencies],
-            tuple(sorted(places)),
-        )
+    def settle(self, model: AsMade, theta: FloatArray) -> None:
+        """Takes what is systematic from `theta` (parameters,), once: near the optimum, so that all
+        draws are judged by one covariance.
+        """
+        if not self._settled:
+            self._shift, self._loads = self._systematic(model, theta)
+        self._settled = True
+
+    def _typical(self, model: AsMade) -> FloatArray:
+        """Parameters (parameters,) in the middle of the prior, the tension as of a string."""
+        hanger, theta = model.hanger, np.add(model.prior.lower, model.prior.upper) / 2
+        first = self._order.argmin()
+        speed_m_s = 2 * hanger.length_m * self.frequency_hz[first] / (self._order[first] + 1)
+        ratio = hanger.mass_per_length_kg_m * speed_m_s**2 / hanger.nominal_tension_n
+        theta[model.parameter_names.index(TENSION)] = np.clip(ratio, *model.bounds[TENSION])
+        return np.asarray(theta)
+
+    def _systematic(self, model: AsMade, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The mean (data,) and those loads (frequencies, k) that are felt."""
+        measured = self.frequency_hz[None, : self.frequencies]
+        ends = model.end_waves(theta[None], measured, self._plane)
+        places = tuple(sorted({point.x_m for mode in self.modes for point in mode.shape}))
+        mean, loads = errors_of_bar(model.hanger, self._order + 1, felt_by(ends[0]), places)
+        loads = np.hstack([loads, loads_of_ends(ends, model.stiff_ends_m, self._plane)])
         least = max(self.identification_error[: self.frequencies].min(), TAU_LOWER)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
         kept = size > _UNFELT * least
@@ -131,7 +152,7 @@ class FieldLikelihood:
         return own
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
-        """Logarithms of predictions, with mean systematic errors, over measurements (n, data)."""
+        """Logarithms of predictions, with mean errors of the bar, over measurements (n, data)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(predicted / self.frequency_hz) + self._shift
 

@@ -25,9 +25,6 @@ from shm.values import FloatArray, Hanger, IntArray, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)
 
-_TAKEN, _TAKEN_SD = 0.6, 0.35
-"""Of a fitting's length, what does not swing: mean and standard deviation."""
-
 _ALIKE_WITHIN, _MIDDLES = 0.09, 32
 _STIFFEST = 1 / math.log10(RESTRAINT[1] / RESTRAINT[0])
 
@@ -87,15 +84,15 @@ class Deviations:
     def __init__(self, model: AsMade, calibration: Calibration | None):
         scatter = model.hanger.scatter
         sds = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
-        means: dict[str, float] = {}
         if not model.length_is_open:
-            means[LENGTH], sds[LENGTH] = _effective_length(model.hanger)
+            effective = scatter.effective_length if math.isfinite(scatter.effective_length) else 0.0
+            sds[LENGTH] = math.hypot(scatter.length, effective)
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
         taught = calibration is not None and BENDING in calibration.names
         if stated or (model.is_strand and taught):
             sds[BENDING] = scatter.bending_factor if stated else 0.3
         self.names = tuple(sds)
-        self.mean: FloatArray = np.array([means.get(name, 0.0) for name in self.names])
+        self.mean: FloatArray = np.zeros(len(self.names))
         covariance = np.diag(np.array(list(sds.values())) ** 2)
         if calibration is not None:
             rows = [self.names.index(n) for n in calibration.names if n in self.names]
@@ -117,19 +114,6 @@ class Deviations:
         if name not in self.names:
             return np.zeros(len(deviations))
         return np.asarray(deviations[:, self.names.index(name)])
-
-
-def _effective_length(hanger: Hanger) -> tuple[float, float]:
-    """Mean and standard deviation of ln of the length that swings over the taped one.
-
-    A fitting that is stiffer than the bar takes from little to all of its own length; its mass
-    takes a little more.
-    """
-    stated = hanger.scatter.effective_length
-    if math.isfinite(stated):
-        return 0.0, math.hypot(hanger.scatter.length, stated)
-    share = sum(hanger.fittings_m) / hanger.length_m
-    return -_TAKEN * share, math.hypot(hanger.scatter.length, _TAKEN_SD * share)
 
 
 def _root(covariance: FloatArray) -> FloatArray:

@@ -97,7 +97,7 @@ class Problem:
     def run(self, theta: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
         self.evaluations += len(theta)
-        found = self.likelihood.predict(self.model, theta)
+        found = self.likelihood.predict(self.model, theta)  # type: ignore[arg-type]
         if isinstance(self.likelihood, FieldLikelihood) and self.likelihood.has_reading:
             ratio = theta[:, self.model.parameter_names.index(TENSION)]
             tension_n = ratio * self.model.hanger.nominal_tension_n
@@ -107,6 +107,11 @@ class Problem:
     def evaluate(self, z: FloatArray) -> Points:
         """Runs the model at `z` (n, d)."""
         return Points(z, self.predict(z))
+
+    def settle(self, z: FloatArray) -> None:
+        """Takes what the covariance of the noise has of the model from `z` (d,), once."""
+        if isinstance(self.likelihood, FieldLikelihood) and isinstance(self.model, AsMade):
+            self.likelihood.settle(self.model, self.coordinates.theta(z[None])[0])
 
     def slopes(self, z: FloatArray) -> FloatArray:
         """Derivatives of the fractional misfit by z (m, d): (m, measurements, d)."""
@@ -132,10 +137,13 @@ def _likelihood(
             f"a data set that counts {repeat} times is the thesis's: real tests count once.",
             remedy="Leave repeat out, or take the priors of the thesis.",
         )
+    if not isinstance(model, AsMade):
+        raise UsageError(
+            f"model class {model.name} knows no priors but its own.",
+            remedy="Build it with `shm.models.build`.",
+        )
     reading = reading_of(tests)
     if reading is None:
         return FieldLikelihood(tests, model)
-    sd = reading.sd
-    if isinstance(model, AsMade):
-        sd = DescribedCoordinates(model, tests, 1.0, calibration).reading_sd
+    sd = DescribedCoordinates(model, tests, 1.0, calibration).reading_sd
     return FieldLikelihood(tests, model, (reading.tension_n, sd))

@@ -64,9 +64,11 @@ def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None)
     z = np.vstack([z, felt])
     for _ in range(_PHASES):
         z, sigma = _descend(problem, z, sigma, _STEPS)
-    promising = _distinct(problem, problem.coordinates.fold(z))
+    z = problem.coordinates.fold(z)
+    problem.settle(z[_distinct(problem, z)[0]])
+    promising = _distinct(problem, z)
     ends, _ = _descend(problem, z[promising], sigma[promising], _LAST_STEPS)
-    z = problem.coordinates.fold(np.vstack([z, ends]))
+    z = np.vstack([z, problem.coordinates.fold(ends)])
     z = z[_distinct(problem, z)]
     return Anchors(z, _model_error(problem, z), problem.slopes(z), problem)
 

@@ -1,17 +1,24 @@
 """Errors that every test of a hanger has alike and that physics says the shape of.
 
-The accelerometer's own mass lowers each mode by where it sits, both planes alike; supports give way
-sideways and lower high orders of stiff bars; the section wanders. All are small, known to first
-order and of uncertain size, so that their mean shifts a prediction and what is uncertain is a few
-normal errors ("loads": what one standard deviation of each does). The remaining errors of a mode
-are tau's (`shm.inference.field`).
+The accelerometer's own mass lowers each mode by where it sits, both planes alike; the section
+wanders; supports give way sideways and lower high orders of stiff bars; fittings stiffen the ends
+(`shm.models.end_effects`). All are small, known to first order and of uncertain size, so that their
+mean shifts a prediction and what is uncertain is a few normal errors ("loads": what one standard
+deviation of each does). The remaining errors of a mode are tau's (`shm.inference.field`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
+from shm.models.end_effects import EndWaves
 from shm.values import FloatArray, Hanger, IntArray
+
+Ends: TypeAlias = tuple[EndWaves, EndWaves]
+"""The deck's and the arch's."""
 
 _SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
 """Piezo-electric and MEMS accelerometers for structures with magnet, base and cable end: 20 to 90 g
@@ -23,11 +30,18 @@ _MOST_OF_BAR = 0.03
 _REACH_M = (0.8, 2.5)
 """From the deck, where a person mounts a sensor; never beyond the middle of the hanger."""
 
-_GIVE_M_N, _GIVE_SD_M_N = 4e-9, 4e-9
-"""Of both supports of a plane together: gussets and chords of 1e8 to 1e9 N/m a side."""
+_GIVE_M_N, _GIVE_SD_M_N = 3.5e-9, 4e-9
+"""Of one support: gussets and chords of 1e8 to 1e9 N/m, or next to nothing."""
 
 _ALIKE = 0.5
-"""Of the variance of the supports' give, what both planes share."""
+"""Of the variance of an end's details, what both planes share: a fork or a gusset has two faces."""
+
+_RIGID, _RIGID_SD = 0.6, 0.3
+"""Of the effect of a fitting without curvature: a thread in a nut has a fifth of it, a socket or a
+fork nearly all."""
+
+_HEAVIER, _HEAVIER_SD = 0.7, 0.6
+"""Mass of a fitting beyond the bar's over its length, as a share of that: threads to sockets."""
 
 _SECTION_REACH_M = 1.0
 """Over which a rolled section goes together; a fifth of a short bar."""
@@ -36,24 +50,58 @@ _PLACES, _FEW_PLACES = 64, 5
 _LEAST_SHARE = 1e-3
 
 
-def systematic_errors(
+def mean_of_ends(ends: Ends, fittings_m: tuple[float, float]) -> FloatArray:
+    """What the supports and fittings of both ends do on average to ln of frequencies (n, F)."""
+    found = _GIVE_M_N * (ends[0].give() + ends[1].give())
+    for end, fitting_m in zip(ends, fittings_m, strict=True):
+        if fitting_m:
+            stiffened, weighed = end.fitting(fitting_m)
+            found = found + _RIGID * stiffened + _HEAVIER * weighed
+    return np.asarray(found)
+
+
+def loads_of_ends(ends: Ends, fittings_m: tuple[float, float], plane: IntArray) -> FloatArray:
+    """Loads (F, k) of the same, of one parameter set: each end by itself.
+
+    What the first order leaves of a soft support is its square.
+    """
+    shares, loads = _by_plane(plane), []
+    for end, fitting_m in zip(ends, fittings_m, strict=True):
+        give = end.give()[0]
+        loads.append(_GIVE_SD_M_N * give[:, None] * shares)
+        loads.append((np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * give[:, None]) ** 2 * shares[:, 1:])
+        if fitting_m:
+            stiffened, weighed = (each[0][:, None] for each in end.fitting(fitting_m))
+            loads += [_RIGID_SD * stiffened * shares, _HEAVIER_SD * weighed * shares]
+    return np.hstack(loads)
+
+
+def errors_of_bar(
     hanger: Hanger,
-    plane: IntArray,
     order: IntArray,
-    frequency_hz: FloatArray,
+    felt: Callable[[FloatArray], FloatArray],
     places_m: tuple[float, ...] = (),
 ) -> tuple[FloatArray, FloatArray]:
-    """The mean (F,) and the loads (F, k) of ln(measured / bare bar's) frequencies.
+    """The mean (F,) of what sensors do to ln of frequencies of these orders (from 1), and the loads
+    (F, k) of sensors and section.
 
-    `plane` and `order` (from 1) are (F,). A mass M at x lowers a mode by (M / m L) sin^2(n pi x/L)
-    (Rayleigh); supports of compliance C together by 4 C m L f^2/n^2, their reaction being
-    m w^2 / q of the amplitude. `places_m` are the sensors' where they are known.
+    `felt` says of places in m what a sensor there that weighs as much as the bar does, (F, places);
+    `places_m` are the sensors' where they are known.
     """
-    sensor_mean, sensor = _sensors(hanger, order, places_m)
-    section = _section(hanger, order)
-    lowered = _lowered(hanger, order, frequency_hz)
-    give = -_GIVE_SD_M_N * lowered[:, None] * _by_plane(plane)
-    return sensor_mean - _GIVE_M_N * lowered, np.hstack([sensor, give, section])
+    mean, sensor = _sensors(hanger, felt, places_m)
+    return mean, np.hstack([sensor, _section(hanger, order)])
+
+
+def felt_by(deck: EndWaves) -> Callable[[FloatArray], FloatArray]:
+    """By which ln f of each mode (F,) changes by a mass as large as the bar's at places (places,).
+
+    From the modes near the deck's end, of one parameter set: sensors are within reach of it.
+    """
+
+    def felt(x_m: FloatArray) -> FloatArray:
+        return -(np.column_stack([deck.deflection(float(x))[0] for x in x_m]) ** 2)
+
+    return felt
 
 
 def shared_loads(
@@ -64,20 +112,23 @@ def shared_loads(
     For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
     theirs to claim.
     """
-    felt = _felt(hanger, order, _within_reach_m(hanger, _FEW_PLACES))
+    felt = _share(hanger) * _of_string(hanger, order, _within_reach_m(hanger, _FEW_PLACES))
     sensor = np.hypot(_SENSOR_KG, _SENSOR_SD_KG) / np.sqrt(_FEW_PLACES) * felt
-    size = np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
+    size = 2 * np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
     return np.hstack([sensor, -size[:, None] * _by_plane(plane)])
 
 
-def _felt(hanger: Hanger, order: IntArray, x_m: FloatArray) -> FloatArray:
-    """What a kilogram at each place does to ln of each frequency (F, places).
+def _of_string(hanger: Hanger, order: IntArray, x_m: FloatArray) -> FloatArray:
+    """By which ln f of a pinned string changes by a mass as large as its own (F, places)."""
+    return np.asarray(-(np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2))
 
-    Less where a usual sensor would be more than its share of a light bar.
+
+def _share(hanger: Hanger) -> float:
+    """A kilogram as a share of the bar's mass; less where a usual sensor would be more than its
+    share of a light bar.
     """
     mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
-    ratio = min(1.0, _MOST_OF_BAR * mass_kg / _SENSOR_KG) / mass_kg
-    return np.asarray(-ratio * np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2)
+    return min(1.0, _MOST_OF_BAR * mass_kg / _SENSOR_KG) / mass_kg
 
 
 def _within_reach_m(hanger: Hanger, count: int) -> FloatArray:
@@ -87,7 +138,9 @@ def _within_reach_m(hanger: Hanger, count: int) -> FloatArray:
 
 
 def _lowered(hanger: Hanger, order: IntArray, frequency_hz: FloatArray) -> FloatArray:
-    """By which part a frequency falls per m/N that the supports of its plane give way."""
+    """By which part a pinned bar's frequency falls per m/N that a support of its plane gives way:
+    4 m L f^2/n^2, its reaction being m omega^2/q of the amplitude.
+    """
     mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
     return np.asarray(4 * mass_kg * (frequency_hz / order) ** 2)
 
@@ -115,15 +168,15 @@ def _section(hanger: Hanger, order: IntArray) -> FloatArray:
 
 
 def _sensors(
-    hanger: Hanger, order: IntArray, places_m: tuple[float, ...]
+    hanger: Hanger, felt: Callable[[FloatArray], FloatArray], places_m: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """Mean (F,) and loads (F, k) of the sensors' mass."""
     if places_m:
-        felt = _felt(hanger, order, np.array(places_m))
-        return _SENSOR_KG * felt.sum(axis=1), np.asarray(_SENSOR_SD_KG * felt)
-    felt = _felt(hanger, order, _within_reach_m(hanger, _PLACES))
-    mean = _SENSOR_KG * felt.mean(axis=1)
-    square = (_SENSOR_KG**2 + _SENSOR_SD_KG**2) * felt @ felt.T / _PLACES
+        each = _share(hanger) * felt(np.array(places_m))
+        return _SENSOR_KG * each.sum(axis=1), np.asarray(_SENSOR_SD_KG * each)
+    each = _share(hanger) * felt(_within_reach_m(hanger, _PLACES))
+    mean = _SENSOR_KG * each.mean(axis=1)
+    square = (_SENSOR_KG**2 + _SENSOR_SD_KG**2) * each @ each.T / _PLACES
     variance, ways = np.linalg.eigh(square - np.outer(mean, mean))
     kept = variance > _LEAST_SHARE * variance.max()
     return mean, np.asarray(ways[:, kept] * np.sqrt(variance[kept]))
