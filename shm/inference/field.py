@@ -3,18 +3,20 @@
 - The identification's error, with the standard deviation s that was stated, which is itself an
   estimate: the true one is phi s, phi log-normal with a spread of 20 % and heavier tails (a
   jackknife over five hits is no better). Tests of one mode that repeat teach phi.
-- An error of each mode that repeats in all tests, of unknown size tau: sensors' mass, the section
-  along the bar, what no model has. Log-uniform from 1e-5 to 3e-3 with probability 0.95 (sound
-  hangers that others measured had up to 5e-4), and up to 0.3 with the rest: a class that does not
-  fit gets a wide posterior, not a sharp one at a wrong place.
+- An error of each mode that repeats in all tests, of unknown size tau: what no model has.
+  Log-uniform from 1e-5 to 3e-3 with probability 0.95 (sound hangers that others measured had up to
+  5e-4), and up to 0.3 with the rest: a class that does not fit gets a wide posterior, not a sharp
+  one at a wrong place. Half of its variance is each mode's own, half goes together in neighbouring
+  orders (`_ALONG_ORDERS`): what a model lacks is seldom of one mode alone, and many modes that lack
+  the same thing teach less than as many that err by themselves.
 - A measured tension errs by its own standard deviation and by what frequencies do not see of the
   bar's mass and length.
 
-So ln f_hat ~ N(ln f, phi^2 s^2 + tau^2). Both unknowns are integrated out on a grid: tau in steps
-of 1.6 standard deviations of what the data can tell, where the trapezoidal rule of a bell is right
-to 5e-4, phi at equally probable values. What physics says of errors that tests share
-(`shm.inference.systematic_errors`) adds a mean and loads U: the covariance is
-phi^2 diag(s^2) + tau^2 [same mode] + U U'.
+Both unknowns are integrated out on a grid: tau in steps of 1.6 standard deviations of what the data
+can tell, where the trapezoidal rule of a bell is right to 5e-4, phi at equally probable values.
+What physics says of errors that tests share (`shm.inference.systematic_errors`) adds a mean and
+loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2). The eigenvectors of
+S^-1/2 (tau^2 R + U U') S^-1/2 serve all phi, and all floors, which are taken as shares of S.
 """
 
 from __future__ import annotations
@@ -22,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from shm.errors import BadInput
@@ -37,7 +38,12 @@ _USUAL_SHARE = 0.95
 _STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.6, 0.4
 _SD_SPREAD, _SD_FREEDOM = 0.2, 4.0
 _PHI_NODES = 3
-_ALIKE = 1e-6
+_TOGETHER = 0.5
+"""Of the variance tau^2, what neighbouring orders share, and half of that in the other plane."""
+
+_ALONG_ORDERS = 0.7
+"""How far it goes together, in ln of the order: to twice the order the correlation is 0.6."""
+
 _BLOCK = 400
 """Misfits taken together, so that intermediate results stay in the processor's cache."""
 
@@ -96,10 +102,10 @@ class FieldLikelihood:
         self._constant = jacobian + float(of_means)
         if reading is not None:
             self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
-        self._same = self._same_modes()
+        self._together = self._goes_together()
+        self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
         self._settled = False
         self._shift, self._loads = self._systematic(model, self._typical(model))
-        self._tau, self._log_tau = self._grid(_STEP_IN_SD)
 
     @property
     def highest_order(self) -> int:
@@ -120,6 +126,7 @@ class FieldLikelihood:
         """
         if not self._settled:
             self._shift, self._loads = self._systematic(model, theta)
+            self._ways.clear()
         self._settled = True
 
     def _typical(self, model: AsMade) -> FloatArray:
@@ -137,7 +144,9 @@ class FieldLikelihood:
         ends = model.end_waves(theta[None], measured, self._plane)
         places = tuple(sorted({point.x_m for mode in self.modes for point in mode.shape}))
         mean, loads = errors_of_bar(model.hanger, self._order + 1, felt_by(ends[0]), places)
-        loads = np.hstack([loads, loads_of_ends(ends, model.stiff_ends_m, self._plane)])
+        loads = np.hstack(
+            [loads, loads_of_ends(ends, model.stiff_ends_m, self._plane, self._order)]
+        )
         least = max(self.identification_error[: self.frequencies].min(), TAU_LOWER)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
         kept = size > _UNFELT * least
@@ -158,20 +167,21 @@ class FieldLikelihood:
 
     def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
         """Log likelihood (n,) of predictions (n, data), tau and phi integrated out."""
-        joint = self._nodes(predicted, self._tau, floor) + self._log_tau
+        _, log_share = self._grid(_STEP_IN_SD)
+        joint = self._nodes(predicted, _STEP_IN_SD, floor) + log_share
         return _log_sum(joint.reshape(len(predicted), -1))
 
     def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
         """Log likelihood (n,) of predictions (n, data), each with its tau (n,), to a node's."""
         tau, _ = self._grid(_STEP_IN_SD_TO_DRAW)
-        found = _log_sum(self._nodes(predicted, tau, 0.0), axis=2)
+        found = _log_sum(self._nodes(predicted, _STEP_IN_SD_TO_DRAW), axis=2)
         at = np.log(sigma.clip(tau[0], tau[-1]) / tau[0]) / np.log(tau[1] / tau[0])
         return np.asarray(found[np.arange(len(found)), np.round(at).astype(int)])
 
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
         """tau (n,) from its posterior given each prediction (n, data)."""
         tau, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
-        joint = _log_sum(self._nodes(predicted, tau, 0.0), axis=2) + log_share[:, 0]
+        joint = _log_sum(self._nodes(predicted, _STEP_IN_SD_TO_DRAW), axis=2) + log_share[:, 0]
         share = np.exp(joint - logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
         node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(tau) - 1)
         jitter = np.log(tau[1] / tau[0]) * (rng.random(len(node)) - 0.5)
@@ -179,8 +189,8 @@ class FieldLikelihood:
 
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         """The node of the grid with the largest joint likelihood, shape (n,)."""
-        found = _log_sum(self._nodes(predicted, self._tau, 0.0), axis=2)
-        return np.asarray(self._tau[found.argmax(axis=1)])
+        found = _log_sum(self._nodes(predicted, _STEP_IN_SD), axis=2)
+        return np.asarray(self._grid(_STEP_IN_SD)[0][found.argmax(axis=1)])
 
     def model_error(self, predicted: FloatArray) -> FloatArray:
         """The misfit's mean square beyond the identification's own, as a tau (n,)."""
@@ -192,20 +202,36 @@ class FieldLikelihood:
         """Predictions (n, modes) of every mode of every test from those of the data."""
         return predicted[:, self.of_mode]
 
-    def _nodes(self, predicted: FloatArray, tau: FloatArray, floor: float) -> FloatArray:
+    def _nodes(self, predicted: FloatArray, step_in_sd: float, floor: float = 0.0) -> FloatArray:
         """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""
-        rest = self.misfit(predicted)[:, : self.frequencies]
-        own = self.identification_error[: self.frequencies, None] ** 2
-        variance = own * np.tile(self._phi**2, len(tau)) + floor**2
-        common = np.repeat(tau, len(self._phi)) ** 2
-        if self._same is None:
-            found = _by_loads(rest, variance + common, self._loads)
-        else:
-            same = np.equal.outer(self._same, self._same)
-            found = _by_matrices(rest, variance, common, same, self._loads @ self._loads.T)
-        found = found.reshape(len(rest), len(tau), len(self._phi)) + self._log_phi
+        own = self.identification_error[: self.frequencies]
+        ways, size = self._directions(step_in_sd)
+        usual = np.exp(2 * np.log(own).mean())
+        variance = size[:, None] + (self._phi**2 + floor**2 / usual)[:, None]
+        constant = self._log_phi - 0.5 * np.log(variance).sum(axis=2) - np.log(own).sum()
+        rest = self.misfit(predicted)[:, : self.frequencies] / own
+        precision = np.swapaxes(1 / variance, 1, 2)
+        found = np.empty((len(rest), *constant.shape))
+        for first in range(0, len(rest), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            # (nodes, block, F) by (nodes, F, phi)
+            along = (rest[block] @ ways) ** 2
+            found[block] = np.moveaxis(-0.5 * along @ precision, 0, 1)
         reading = self._of_reading(predicted, floor)[:, None, None]
-        return np.asarray(found + self._constant + reading)
+        return np.asarray(found + constant + self._constant + reading)
+
+    def _directions(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
+        """Eigenvectors (nodes, F, F) and eigenvalues (nodes, F) of all errors but phi's, in those:
+        for each node of tau.
+        """
+        if step_in_sd not in self._ways:
+            own = self.identification_error[: self.frequencies]
+            scale = np.multiply.outer(own, own)
+            tau, _ = self._grid(step_in_sd)
+            shared = self._loads @ self._loads.T / scale
+            size, ways = np.linalg.eigh(tau[:, None, None] ** 2 * (self._together / scale) + shared)
+            self._ways[step_in_sd] = ways, size.clip(0)
+        return self._ways[step_in_sd]
 
     def _of_reading(self, predicted: FloatArray, floor: float) -> FloatArray:
         if not self.has_reading:
@@ -214,11 +240,14 @@ class FieldLikelihood:
         off = self.misfit(predicted)[:, -1]
         return np.asarray(-0.5 * (off**2 / variance + np.log(variance)))
 
-    def _same_modes(self) -> IntArray | None:
-        """Which of the modes each datum is of; None where each is another."""
-        mode = self._plane * (self._order.max() + 1) + self._order
-        distinct, index = np.unique(mode, return_inverse=True)
-        return None if len(distinct) == len(mode) else np.asarray(index)
+    def _goes_together(self) -> FloatArray:
+        """Correlation (F, F) of the errors that repeat."""
+        log = np.log(self._order + 1.0)
+        apart = np.subtract.outer(log, log) / _ALONG_ORDERS
+        plane = np.equal.outer(self._plane, self._plane)
+        own = plane & np.equal.outer(self._order, self._order)
+        shared = np.exp(-0.5 * apart**2) * np.where(plane, 1.0, 0.5)
+        return np.asarray((1 - _TOGETHER) * own + _TOGETHER * shared)
 
     def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Nodes (k,) of tau, and the log of each one's share of the prior (k, 1)."""
@@ -270,53 +299,6 @@ def _sd_factors(scatter: float, freedom: int) -> tuple[FloatArray, FloatArray]:
     middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
     nodes = np.interp(middle, share, grid)
     return np.exp(nodes), np.full(_PHI_NODES, total - np.log(_PHI_NODES))
-
-
-def _by_loads(rest: FloatArray, variance: FloatArray, loads: FloatArray) -> FloatArray:
-    """-(quadratic + log volume)/2 (n, nodes) of misfits (n, F) whose covariance is that of the
-    nodes' variances (F, nodes) and of loads (F, k).
-
-    Where all data have one variance, by the loads' own directions, which are those of every node;
-    else by Woodbury's identity.
-    """
-    if np.ptp(variance, axis=0).max() <= _ALIKE * variance.min():
-        return _by_directions(rest, variance[0], loads)
-    precision = 1 / variance
-    inner = np.einsum("fk,fj,fl->jkl", loads, precision, loads) + np.eye(loads.shape[1])
-    factor = np.linalg.cholesky(inner)
-    volume = np.log(variance).sum(axis=0) + 2 * np.log(np.einsum("jkk->jk", factor)).sum(axis=1)
-    # (nodes, k, F): what takes a misfit to the loads' own whitened deviates.
-    pull = np.linalg.solve(factor, loads.T[None] * precision.T[:, None, :])
-    flat = pull.reshape(-1, rest.shape[1]).T
-    found = rest**2 @ precision + volume
-    for first in range(0, len(rest), _BLOCK):
-        block = slice(first, first + _BLOCK)
-        shared = (rest[block] @ flat) ** 2
-        found[block] -= shared.reshape(len(shared), len(inner), -1).sum(axis=2)
-    return np.asarray(-0.5 * found)
-
-
-def _by_directions(rest: FloatArray, variance: FloatArray, loads: FloatArray) -> FloatArray:
-    """The same where every datum has the variance (nodes,) of its node."""
-    directions, size, _ = np.linalg.svd(loads, full_matrices=False)
-    along = size[:, None] ** 2
-    quadratic = (rest**2).sum(axis=1)[:, None] - (rest @ directions) ** 2 @ (
-        along / (along + variance)
-    )
-    volume = (len(loads) - len(size)) * np.log(variance) + np.log(along + variance).sum(axis=0)
-    return np.asarray(-0.5 * (quadratic / variance + volume))
-
-
-def _by_matrices(
-    rest: FloatArray, variance: FloatArray, common: FloatArray, same: FloatArray, shared: FloatArray
-) -> FloatArray:
-    """The same (n, nodes) where data of one mode under several conditions share its error."""
-    found = np.empty((len(rest), len(common)))
-    for node, (own, tau2) in enumerate(zip(variance.T, common, strict=True)):
-        factor = np.linalg.cholesky(np.diag(own) + tau2 * same + shared)
-        white = solve_triangular(factor, rest.T, lower=True, check_finite=False)
-        found[:, node] = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(factor)).sum()
-    return found
 
 
 def _log_sum(values: FloatArray, axis: int = 1) -> FloatArray:

@@ -43,6 +43,10 @@ fork nearly all."""
 _HEAVIER, _HEAVIER_SD = 0.7, 0.6
 """Mass of a fitting beyond the bar's over its length, as a share of that: threads to sockets."""
 
+_SECOND_ORDER = 0.1
+"""Of the mean effect of an end's detail, by which the first order is wrong for each mode (as
+against exact solutions: 0.03 in the middle, 0.2 at the worst)."""
+
 _SECTION_REACH_M = 1.0
 """Over which a rolled section goes together; a fifth of a short bar."""
 
@@ -60,20 +64,26 @@ def mean_of_ends(ends: Ends, fittings_m: tuple[float, float]) -> FloatArray:
     return np.asarray(found)
 
 
-def loads_of_ends(ends: Ends, fittings_m: tuple[float, float], plane: IntArray) -> FloatArray:
-    """Loads (F, k) of the same, of one parameter set: each end by itself.
-
-    What the first order leaves of a soft support is its square.
+def loads_of_ends(
+    ends: Ends, fittings_m: tuple[float, float], plane: IntArray, order: IntArray
+) -> FloatArray:
+    """Loads (F, k) of the same, of one parameter set: each end by itself, and what the first order
+    leaves of each mode.
     """
-    shares, loads = _by_plane(plane), []
+    shares, loads, left = _by_plane(plane), [], []
     for end, fitting_m in zip(ends, fittings_m, strict=True):
         give = end.give()[0]
         loads.append(_GIVE_SD_M_N * give[:, None] * shares)
-        loads.append((np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * give[:, None]) ** 2 * shares[:, 1:])
+        left.append(_GIVE_M_N * give)
         if fitting_m:
-            stiffened, weighed = (each[0][:, None] for each in end.fitting(fitting_m))
-            loads += [_RIGID_SD * stiffened * shares, _HEAVIER_SD * weighed * shares]
-    return np.hstack(loads)
+            stiffened, weighed = (each[0] for each in end.fitting(fitting_m))
+            loads += [_RIGID_SD * stiffened[:, None] * shares]
+            loads += [_HEAVIER_SD * weighed[:, None] * shares]
+            left += [_RIGID * stiffened, _HEAVIER * weighed]
+    mode = np.column_stack([plane, order])
+    same = (mode[:, None] == np.unique(mode, axis=0)).all(axis=2)
+    beyond = _SECOND_ORDER * np.sqrt(np.square(left).sum(axis=0))
+    return np.hstack([*loads, beyond[:, None] * same])
 
 
 def errors_of_bar(

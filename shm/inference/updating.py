@@ -16,7 +16,7 @@ from shm.inference.problem import Problem
 from shm.inference.search import search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
-from shm.models import AsMade, Model
+from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import RESTRAINT
 from shm.values import ENOUGH_EFFECTIVE, ModalTest, Posterior, Selection
 
@@ -42,9 +42,16 @@ def update(
     is the agreement of their batches), and a few steps spread equal draws. `hint`, the posterior of
     another class on the same tests, saves evaluations and changes nothing else. `progress` hears
     the model's name and the fraction done. Raises BadInput where a test has no modes or conditions
-    that the model class cannot describe. Warns (BiasedEvidenceWarning) about the textbook method.
+    that the model class cannot describe, UsageError where the textbook method or a data set that
+    counts twice meets priors of the description. Warns (BiasedEvidenceWarning) about the method.
     """
     options = options or UpdateOptions()
+    if options.method == TEXTBOOK and model.priors != THESIS:
+        raise UsageError(
+            "the textbook's sampler is the thesis's: it draws the model error uniformly and has no "
+            "part in the noise of the field.",
+            remedy="Leave the method out, or take the priors of the thesis.",
+        )
     problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)

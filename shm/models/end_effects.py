@@ -58,13 +58,14 @@ class EndWaves:
         length_m: FloatArray,
         spring_n_m_rad: FloatArray,
     ) -> EndWaves:
-        """Of modes with these frequencies on an end spring, which may be infinite."""
+        """Of modes with these frequencies on an end spring, from 0 to infinite."""
         stiffness = bending_stiffness_n_m2
         inertia = mass_per_length_kg_m * (2 * np.pi * frequency_hz) ** 2
         root = np.sqrt(tension_n**2 + 4 * stiffness * inertia)
         q = np.sqrt(2 * inertia / (root + tension_n))
         p = np.sqrt((root + tension_n) / (2 * stiffness))
-        clamped = 1 / (root / spring_n_m_rad / p + 1)
+        with np.errstate(divide="ignore"):
+            clamped = 1 / (1 + root / (spring_n_m_rad * p))
         slope = q / p * clamped
         cos = 1 / np.sqrt(1 + slope**2)
         return cls(q, p, slope * cos, cos, clamped, stiffness, length_m)

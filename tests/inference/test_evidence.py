@@ -157,6 +157,16 @@ def test_the_textbook_method_warns_and_follows_its_own_evidence() -> None:
     assert 1 <= posterior.effective_sample_size <= 1000
 
 
+def test_the_textbook_method_is_refused_with_the_priors_of_a_description() -> None:
+    """It would take the field's noise for a uniform model error, and say nothing."""
+    with pytest.raises(UsageError, match="the textbook's sampler is the thesis's"):
+        update(
+            [modal_test(TABLES["1.1"])],
+            build("beam1", HANGER_3),
+            UpdateOptions(200, method="textbook"),
+        )
+
+
 def test_the_textbook_evidence_is_right_where_nothing_changes_phase() -> None:
     """One frequency of unknown model error: a broad likelihood that any path follows."""
     test = modal_test({"transverse": [5.8]})

@@ -9,7 +9,7 @@ from scipy.stats import t
 
 from shm.errors import BadInput
 from shm.inference.field import TAU_LOWER, TAU_UPPER, TAU_USUAL, FieldLikelihood
-from shm.inference.systematic_errors import systematic_errors
+from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import build
 from shm.models.conditions import Conditions
 from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
@@ -45,7 +45,7 @@ def measured(
 
 
 def brute_force(tests: list[ModalTest], nodes: int = 50) -> float:
-    """ln f_hat ~ N(ln f + mean, phi^2 diag(s^2) + tau^2 [same mode] + U U'), of all data as read.
+    """ln f_hat ~ N(ln f + mean, phi^2 diag(s^2) + tau^2 R + U U'), of all data as read.
 
     tau log-uniform in two ranges; ln phi Student's t of 4 degrees, scaled by 0.2.
     """
@@ -60,9 +60,17 @@ def brute_force(tests: list[ModalTest], nodes: int = 50) -> float:
             for (_, test), p, o in zip(modes, plane, order, strict=True)
         ]
     )
-    mean, loads = systematic_errors(MODEL.hanger, plane, order, seen)
+    likelihood = FieldLikelihood(tests, MODEL)
+    typical = likelihood._typical(MODEL)[None]
+    ends = MODEL.end_waves(typical, seen[None], plane)
+    mean, loads = errors_of_bar(MODEL.hanger, order, felt_by(ends[0]))
+    loads = np.hstack([loads, loads_of_ends(ends, (0.0, 0.0), plane, order)])
+    mean = mean + mean_of_ends(MODEL.end_waves(THETA, exact[None], plane), (0.0, 0.0))[0]
     rest = np.log(seen / exact) - mean
-    same = np.equal.outer(plane, plane) & np.equal.outer(order, order)
+    same = np.equal.outer(plane, plane)
+    apart = np.log(np.divide.outer(order, order)) / 0.7
+    repeats = 0.5 * (same & np.equal.outer(order, order))
+    repeats = repeats + 0.5 * np.exp(-(apart**2) / 2) * np.where(same, 1.0, 0.5)
     tau, log_tau = [], []
     for low, high, share in ((TAU_LOWER, TAU_USUAL, 0.95), (TAU_USUAL, TAU_UPPER, 0.05)):
         edges = np.linspace(np.log(low), np.log(high), nodes + 1)
@@ -73,7 +81,7 @@ def brute_force(tests: list[ModalTest], nodes: int = 50) -> float:
     log_prior -= logsumexp(log_prior)
     size, phi = np.concatenate(tau), np.exp(log_phi)
     own = np.multiply.outer(phi**2, np.diag(sd**2))[None]
-    covariance = own + np.multiply.outer(size**2, same)[:, None] + loads @ loads.T
+    covariance = own + np.multiply.outer(size**2, repeats)[:, None] + loads @ loads.T
     square = (rest * np.linalg.solve(covariance, rest[:, None])[..., 0]).sum(axis=-1)
     log = -(square + np.linalg.slogdet(2 * np.pi * covariance)[1]) / 2
     log += np.concatenate(log_tau)[:, None] + log_prior
@@ -151,9 +159,10 @@ def test_a_wrong_class_gets_a_wide_error_and_the_right_one_a_usual_one() -> None
     exact = likelihood.predict(MODEL, THETA)
     wrong = exact * (1 + 0.02 * np.sin(3.0 * np.arange(12)))
     right, wide = (drawn_tau(each, likelihood) for each in (exact, wrong))
-    assert np.median(right) < 3e-4
-    assert np.median(wide) == pytest.approx(0.02 * np.sqrt(0.5), rel=0.3)
-    assert likelihood.likeliest_sigma(wrong)[0] == pytest.approx(0.014, rel=0.4)
+    assert np.median(right) < 6e-4
+    # An error of each mode by itself is half of tau's variance.
+    assert np.median(wide) == pytest.approx(0.02, rel=0.3)
+    assert likelihood.likeliest_sigma(wrong)[0] == pytest.approx(0.02, rel=0.4)
     assert likelihood.model_error(wrong)[0] == pytest.approx(0.014, rel=0.2)
     # So much that a prior of at most 3e-3 would have refused the class as it stands.
     assert likelihood.marginal(wrong)[0] > likelihood.marginal(exact)[0] - 80
@@ -194,7 +203,7 @@ def test_each_mode_of_each_test_finds_its_prediction() -> None:
     likelihood = FieldLikelihood(tests, MODEL)
     by_mode = likelihood.by_mode(likelihood.predict(MODEL, THETA))[0]
     seen = [mode.frequency_hz for test in tests for mode in test.modes]
-    np.testing.assert_allclose(by_mode, seen, rtol=1e-3)
+    np.testing.assert_allclose(by_mode, seen, rtol=3e-3)  # supports give way a little
     assert likelihood.highest_order == 2
 
 

@@ -14,9 +14,13 @@ from shm.inference.systematic_errors import (
     _GIVE_SD_M_N,
     _SENSOR_KG,
     _SENSOR_SD_KG,
+    errors_of_bar,
+    felt_by,
+    loads_of_ends,
+    mean_of_ends,
     shared_loads,
-    systematic_errors,
 )
+from shm.models.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, PointMass
 from shm.values import FloatArray, Hanger, Scatter
 from tests.helpers.hangers import HANGER_3
@@ -47,11 +51,17 @@ def lowered(hanger: Hanger, changed: PhysicalHanger) -> tuple[FloatArray, FloatA
     return np.log(frequencies_hz(changed, len(ORDERS))[0, 0] / bare), bare
 
 
+def ends(hanger: Hanger) -> tuple[EndWaves, EndWaves]:
+    """Of the pinned bar, of one plane."""
+    bare = frequencies_hz(pinned(hanger), len(ORDERS))[0, :1]
+    sets = (hanger.nominal_tension_n, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
+    one = EndWaves.of(bare, *(np.asarray(each) for each in (*sets, hanger.length_m, 0.0)))
+    return one, one
+
+
 def found(hanger: Hanger, places_m: tuple[float, ...] = ()) -> tuple[FloatArray, FloatArray]:
-    """Mean and loads of one plane."""
-    bare = frequencies_hz(pinned(hanger), len(ORDERS))[0, 0]
-    plane = np.zeros(len(ORDERS), dtype=int)
-    return systematic_errors(hanger, plane, ORDERS, bare, places_m)
+    """Mean and loads of one plane, of sensors and section."""
+    return errors_of_bar(hanger, ORDERS, felt_by(ends(hanger)[0]), places_m)
 
 
 @pytest.mark.parametrize("x_m", [0.9, 1.7, 3.1])
@@ -60,8 +70,7 @@ def test_a_sensor_where_it_is_known_to_sit_lowers_each_mode_as_the_general_model
 ) -> None:
     """Its mean mass, and by one standard deviation of that what the load says."""
     mean, loads = found(SLIM, (x_m,))
-    nowhere = found(SLIM)[0] - sensors_anywhere(SLIM).mean(axis=0)
-    for kg, size in ((_SENSOR_KG, mean - nowhere), (_SENSOR_SD_KG, loads[:, 0])):
+    for kg, size in ((_SENSOR_KG, mean), (_SENSOR_SD_KG, loads[:, 0])):
         mass = PointMass(np.array([x_m]), np.array([kg]))
         shift, _ = lowered(SLIM, replace(pinned(SLIM), masses=(mass,)))
         np.testing.assert_allclose(size, shift, atol=0.05 * np.abs(shift).max())
@@ -81,43 +90,51 @@ def test_a_sensor_that_may_sit_anywhere_in_reach_has_the_moments_of_draws() -> N
     stiff = replace(SLIM, scatter=Scatter(along=0.0))
     mean, loads = found(stiff)
     drawn = sensors_anywhere(stiff)
-    # Without planes in common, supports add a rank of one: two loads, parallel.
-    bare = frequencies_hz(pinned(stiff), len(ORDERS))[0, 0]
-    whole_kg = stiff.mass_per_length_kg_m * stiff.length_m
-    give = 4 * whole_kg * (bare / ORDERS) ** 2
-    np.testing.assert_allclose(
-        mean + _GIVE_M_N * give, drawn.mean(axis=0), atol=0.02 * np.abs(drawn).mean()
-    )
-    covariance = loads @ loads.T - _GIVE_SD_M_N**2 * np.outer(give, give)
+    np.testing.assert_allclose(mean, drawn.mean(axis=0), atol=0.02 * np.abs(drawn).mean())
     expected = np.cov(drawn.T)
-    np.testing.assert_allclose(covariance, expected, atol=0.03 * expected.max())
+    np.testing.assert_allclose(loads @ loads.T, expected, atol=0.03 * expected.max())
 
 
 @pytest.mark.parametrize("hanger", [HANGER_3, SLIM], ids=["thick", "slim"])
 def test_supports_that_give_way_lower_each_mode_as_the_general_model_does(hanger: Hanger) -> None:
-    """The compliance of both ends together; here all of it at one, then halved between both."""
-    mean, _ = found(hanger, (0.0,))  # a sensor at the end weighs nothing
-    for deck, arch in ((1.0, 0.0), (0.5, 0.5)):
-        give = np.zeros((1, 2, 2))
-        give[0, 0], give[0, 1] = deck * _GIVE_M_N, arch * _GIVE_M_N
-        shift, _ = lowered(hanger, replace(pinned(hanger), translational_compliance_m_n=give))
-        np.testing.assert_allclose(mean, shift, rtol=0.05, atol=1e-9)
+    mean = mean_of_ends(ends(hanger), (0.0, 0.0))[0]
+    give = np.full((1, 2, 2), _GIVE_M_N)
+    shift, _ = lowered(hanger, replace(pinned(hanger), translational_compliance_m_n=give))
+    np.testing.assert_allclose(mean, shift, rtol=0.05, atol=1e-9)
     assert np.abs(mean).max() > 1e-5
 
 
-def test_planes_share_half_of_the_supports_variance_and_all_of_the_sensors() -> None:
-    bare = frequencies_hz(pinned(HANGER_3), 1)[0, 0]
-    both = np.array([0, 1])
-    orders, frequency = np.array([1, 1]), np.repeat(bare, 2)
-    whole_kg = HANGER_3.mass_per_length_kg_m * HANGER_3.length_m
-    size = _GIVE_SD_M_N * 4 * whole_kg * bare[0] ** 2
-    steady = replace(HANGER_3, scatter=Scatter(along=0.0))
-    _, loads = systematic_errors(steady, both, orders, frequency, (0.0,))
-    covariance = loads @ loads.T
-    np.testing.assert_allclose(covariance, size**2 * np.array([[1, 0.5], [0.5, 1]]), rtol=1e-9)
-    _, loads = systematic_errors(steady, both, orders, frequency, (2.0,))
-    alike = loads[:, 0]
-    assert alike[0] == alike[1] < 0
+def test_fittings_stiffen_on_average_what_turns_little() -> None:
+    """A pinned end has no curvature: only its mass is felt there."""
+    none, fitted = (mean_of_ends(ends(HANGER_3), each)[0] for each in ((0.0, 0.0), (0.3, 0.3)))
+    assert np.all(np.abs(fitted - none) < 2e-3)
+    turning = ends(HANGER_3)[0]
+    held = replace(
+        turning,
+        cos=turning.p / np.hypot(turning.p, turning.q),
+        sin=turning.q / np.hypot(turning.p, turning.q),
+        clamped=np.ones_like(turning.q),
+    )
+    assert np.all(mean_of_ends((held, held), (0.3, 0.3)) > 0.01)
+
+
+def test_planes_share_half_of_what_is_unsure_of_an_end() -> None:
+    order = np.array([0, 0])
+    one = replace(
+        ends(HANGER_3)[0],
+        **{
+            name: getattr(ends(HANGER_3)[0], name)[:, order]
+            for name in ("q", "p", "sin", "cos", "clamped")
+        },
+    )
+    both, orders = np.array([0, 1]), np.array([1, 1])
+    for fittings_m in ((0.0, 0.0), (0.3, 0.3)):
+        loads = loads_of_ends((one, one), fittings_m, both, orders)
+        covariance = loads @ loads.T
+        np.testing.assert_allclose(covariance[0, 1] / covariance[0, 0], 0.5, rtol=0.05)
+    give = one.give()[0, 0]
+    bare = loads_of_ends((one, one), (0.0, 0.0), both, orders)
+    np.testing.assert_allclose((bare @ bare.T)[0, 0], 2 * (_GIVE_SD_M_N * give) ** 2, rtol=0.05)
 
 
 def test_a_section_that_wanders_moves_modes_as_much_as_the_general_models() -> None:
@@ -144,22 +161,17 @@ def test_a_diagnosis_has_the_same_errors_about_none_whatever_its_data() -> None:
     loads = shared_loads(SLIM, plane, ORDERS, bare)
     few = shared_loads(SLIM, plane[:2], ORDERS[:2], bare[:2])
     np.testing.assert_allclose(few, loads[:2])
-    steady = replace(SLIM, scatter=Scatter(along=0.0))
-    mean, centred = found(steady)
-    drawn = sensors_anywhere(steady)
-    whole = np.diag(loads @ loads.T)
-    exact = (
-        np.diag(centred @ centred.T) + drawn.mean(axis=0) ** 2 + (mean - drawn.mean(axis=0)) ** 2
-    )
-    np.testing.assert_allclose(whole, exact, rtol=0.15)
+    drawn = sensors_anywhere(SLIM)
+    whole_kg = SLIM.mass_per_length_kg_m * SLIM.length_m
+    give = 2 * np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * 4 * whole_kg * (bare / ORDERS) ** 2
+    exact = (drawn**2).mean(axis=0) + give**2
+    np.testing.assert_allclose(np.diag(loads @ loads.T), exact, rtol=0.15)
 
 
 def test_a_short_bar_has_its_sensor_not_beyond_its_middle() -> None:
     short = replace(SLIM, length_m=2.0)
     mean, _ = found(short)
     kg = short.mass_per_length_kg_m * short.length_m
-    bare = frequencies_hz(pinned(short), len(ORDERS))[0, 0]
-    own = mean + _GIVE_M_N * 4 * kg * (bare / ORDERS) ** 2
     x = np.linspace(0.1, 0.5, 2001)
     expected = -_SENSOR_KG / kg * np.mean(np.sin(np.pi * np.outer(ORDERS, x)) ** 2, axis=1)
-    np.testing.assert_allclose(own, expected, rtol=0.02)
+    np.testing.assert_allclose(mean, expected, rtol=0.02)

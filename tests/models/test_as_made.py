@@ -182,12 +182,19 @@ def test_plates_leave_the_effective_length_open() -> None:
     assert not as_made("solid2", HANGER_3).length_is_open
 
 
-def test_fittings_and_a_stated_length_open_it_as_far_as_they_say() -> None:
-    fitted = as_made("beam2", replace(ROD, fittings_m=(0.3, 0.3))).bounds["theta_L"]
+def test_a_stated_effective_length_opens_it_and_stands_for_the_fittings() -> None:
+    fitted = as_made("beam2", replace(ROD, fittings_m=(0.3, 0.3)))
     stated = replace(ROD, fittings_m=(0.3, 0.3), scatter=Scatter(effective_length=0.01))
-    taped = as_made("beam2", ROD).bounds["theta_L"]
-    known = as_made("beam2", stated).bounds["theta_L"]
-    assert np.ptp(taped) < np.ptp(known) < np.ptp(fitted)
+    known, taped = as_made("beam2", stated), as_made("beam2", ROD)
+    assert np.ptp(taped.bounds["theta_L"]) == np.ptp(fitted.bounds["theta_L"])
+    assert np.ptp(taped.bounds["theta_L"]) < np.ptp(known.bounds["theta_L"])
+    assert fitted.stiff_ends_m == (0.3, 0.3)
+    assert known.stiff_ends_m == (0.0, 0.0)
+
+
+def test_ends_with_other_fittings_cannot_be_exchanged() -> None:
+    assert as_made("beam2", replace(ROD, fittings_m=(0.3, 0.3))).swaps
+    assert not as_made("beam2", replace(ROD, fittings_m=(0.3, 0.1))).swaps
 
 
 def test_a_turnbuckle_keeps_its_share_of_the_length() -> None:
