@@ -54,13 +54,16 @@ class _Draws:
         )
 
 
-def sampled(problem: GapProblem, fit: Fit, rng: np.random.Generator, draws: int) -> Fit:
+def sampled(
+    problem: GapProblem, fit: Fit, rng: np.random.Generator, draws: int, thorough: bool = True
+) -> Fit:
     """The same fit with `draws` equal draws and an evidence with its standard error, by sampling.
 
+    A `thorough` sampler goes on where too few of its draws are effective.
     Where a draw is much more probable than the fit's `z`, the fit is made anew from there.
     """
     sampler = _Sampler(problem, fit)
-    final = sampler.run(rng)
+    final = sampler.run(rng, _ATTEMPTS if thorough else 1)
     best = int((final.settled.log_marginal + log_normal(final.points.w)).argmax())
     if final.settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
         fit = fitted(problem, fit.hypothesis, rng, np.stack([final.settled.z[best], fit.z]))
@@ -94,8 +97,8 @@ class _Sampler:
         """The log likelihood at the fit's other parameters, the linear ones integrated out."""
         return float(self._conditional.settled(self._fit.z[None, self._other]).log_marginal[0])
 
-    def run(self, rng: np.random.Generator) -> _Draws:
-        """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as could be had.
+    def run(self, rng: np.random.Generator, attempts: int) -> _Draws:
+        """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as so many attempts have.
 
         The proposal is refitted to all draws so far, each weighed against the mixture of all
         proposals (Cornuet et al. 2012, Scand. J. Stat. 39). The answer rests on fresh draws; where
@@ -103,7 +106,7 @@ class _Sampler:
         """
         proposal = Proposal.about(self._fit.peaks, self._branches, self._other)
         pool = _Pool()
-        for _ in range(_ATTEMPTS):
+        for _ in range(attempts):
             for _ in range(_MOST_TRIALS):
                 pool.add(proposal, self._drawn(proposal, _TRIAL, rng))
                 drawn = pool.draws()

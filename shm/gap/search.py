@@ -36,6 +36,10 @@ BENT_WITHIN, MOST_BENT = 8.0, 6
 """The same of a baseline with end springs, whose posterior no normal distribution follows: all
 that Laplace's method puts within so much, and the baseline itself, are sampled."""
 
+THOROUGH_WITHIN = 3.0
+"""Of the likeliest, by Laplace's method: the samplers of others stop after their first attempt. An
+evidence that is off by 0.6 changes a probability of 0.05 by 0.03."""
+
 LEADERS = 3
 LEADING_PAIRS = 2
 MOST_PAIRS = 8
@@ -63,6 +67,7 @@ class Search:
         self.variants: dict[str, int] = {}
         self.scans: dict[Hypothesis, Scan] = {}
         self._reached = 0.0
+        self._samples: dict[Hypothesis, tuple[Fit, Fit, bool]] = {}
 
     def singles(self) -> list[Tried]:
         """No gap and every single effect, those that stand a chance fitted."""
@@ -184,8 +189,14 @@ class Search:
         chosen = sorted(near, key=lambda h: -weight[h])[:most]
         if bent and Hypothesis() not in chosen:
             chosen.append(Hypothesis())
-        better = {h: able[h].fit for h in chosen}
-        return [self._sampled(each, better.get(each.hypothesis)) for each in tried]
+        if not bent:
+            thorough = set(chosen)
+        else:
+            thorough = {h for h in chosen if weight[h] > first - THOROUGH_WITHIN or not h.effects}
+        return [
+            self._sampled(each, each.hypothesis in thorough) if each.hypothesis in chosen else each
+            for each in tried
+        ]
 
     def with_laws(self, tried: list[Tried]) -> list[Tried]:
         """Allows for the error of the effects' own laws, where it may decide something."""
@@ -310,11 +321,16 @@ class Search:
     def _tried(self, fit: Fit) -> Tried:
         return Tried.fitted(fit, len(self.baseline.z))
 
-    def _sampled(self, tried: Tried, fit: Fit | None) -> Tried:
+    def _sampled(self, tried: Tried, thorough: bool) -> Tried:
+        fit = tried.fit
         if fit is None:
             return tried
-        self._tell(f"sampling {tried.hypothesis.name}", 0.9)
-        return self._tried(sampled(self.problem, fit, self.rng, self.options.draws))
+        known = self._samples.get(tried.hypothesis)
+        if known is None or known[0] is not fit or (thorough and not known[2]):
+            self._tell(f"sampling {tried.hypothesis.name}", 0.9)
+            found = sampled(self.problem, fit, self.rng, self.options.draws, thorough)
+            known = self._samples[tried.hypothesis] = fit, found, thorough
+        return self._tried(known[1])
 
 
 def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
