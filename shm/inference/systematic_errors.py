@@ -117,14 +117,15 @@ def felt_by(deck: EndWaves) -> Callable[[FloatArray], FloatArray]:
 def shared_loads(
     hanger: Hanger, plane: IntArray, order: IntArray, frequency_hz: FloatArray
 ) -> FloatArray:
-    """Loads (F, k) of sensors and supports alone, about no such error, k whatever the data are.
+    """Loads (F, k) of sensors and of both supports together, about no such error, k whatever the
+    data are.
 
     For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
     theirs to claim.
     """
     felt = _share(hanger) * _of_string(hanger, order, _within_reach_m(hanger, _FEW_PLACES))
     sensor = np.hypot(_SENSOR_KG, _SENSOR_SD_KG) / np.sqrt(_FEW_PLACES) * felt
-    size = 2 * np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * _lowered(hanger, order, frequency_hz)
+    size = np.sqrt(2) * _GIVE_SD_M_N * _lowered(hanger, order, frequency_hz)
     return np.hstack([sensor, -size[:, None] * _by_plane(plane)])
 
 

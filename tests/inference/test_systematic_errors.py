@@ -163,7 +163,7 @@ def test_a_diagnosis_has_the_same_errors_about_none_whatever_its_data() -> None:
     np.testing.assert_allclose(few, loads[:2])
     drawn = sensors_anywhere(SLIM)
     whole_kg = SLIM.mass_per_length_kg_m * SLIM.length_m
-    give = 2 * np.hypot(_GIVE_M_N, _GIVE_SD_M_N) * 4 * whole_kg * (bare / ORDERS) ** 2
+    give = np.sqrt(2) * _GIVE_SD_M_N * 4 * whole_kg * (bare / ORDERS) ** 2
     exact = (drawn**2).mean(axis=0) + give**2
     np.testing.assert_allclose(np.diag(loads @ loads.T), exact, rtol=0.15)
 
