@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.models import stepped, tensioned_beam, timoshenko_beam
+from shm.models import tensioned_beam, timoshenko_beam
 from shm.models.base import Model
+from shm.models.hanger import PhysicalHanger, solve
+from shm.models.turnbuckles import alike_from_both_ends, coupled_bar
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
 _NO_SHEAR = 1e-9
 """A share of shear that changes no frequency by its rounding."""
 
+_POINTS_A_HALF_WAVE, _RISEN = 40, 0.01
+"""Where the largest value of a shape is sought, and what is its first lobe."""
+
 
 class Beam(Model):
     """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends.
 
-    With turnbuckles its section changes in steps (see `shm.models.stepped`), and its ends can be
-    exchanged only where the turnbuckles lie alike from both.
+    With turnbuckles it is a case of the general model (`shm.models.turnbuckles`), and its ends can
+    be exchanged only where the turnbuckles lie alike from both.
     """
 
     def __init__(self, hanger: Hanger):
         super().__init__(hanger)
-        if not stepped.alike_from_both_ends(hanger):
+        if not alike_from_both_ends(hanger):
             self.swaps = ()
 
     @classmethod
@@ -40,9 +45,10 @@ class Beam(Model):
         raise TypeError(f"{type(self).__name__} does not say which springs hold its ends.")
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        deck, arch = self.springs_n_m_rad(theta)
         if self.hanger.turnbuckles:
-            return self._stepped_frequencies_hz(theta, deck, arch, modes)
+            bar = self._coupled(theta)
+            return solve(bar, modes, np.empty(0), shapes=False).frequency_hz
+        deck, arch = self.springs_n_m_rad(theta)
         return tensioned_beam.frequencies_hz(
             self._length_m(theta)[:, None],
             self._tension_n(theta)[:, None],
@@ -53,30 +59,22 @@ class Beam(Model):
             modes,
         )
 
-    def _stepped_frequencies_hz(
-        self, theta: FloatArray, deck: FloatArray, arch: FloatArray, modes: int
-    ) -> FloatArray:
-        alike = np.array_equal(deck[:, 0], deck[:, 1]) and np.array_equal(arch[:, 0], arch[:, 1])
-        planes = 1 if alike else 2
-        beam = stepped.stepped_beam(
-            self.hanger,
-            np.repeat(self._length_m(theta), planes),
-            np.repeat(self._tension_n(theta), planes),
-            deck[:, :planes].ravel(),
-            arch[:, :planes].ravel(),
-        )
-        found = beam.frequencies_hz(modes).reshape(len(theta), planes, modes)
-        return np.broadcast_to(found, (len(theta), 2, modes)).copy()
+    def _coupled(self, theta: FloatArray) -> PhysicalHanger:
+        bar = coupled_bar(self.hanger, self._length_m(theta), self._tension_n(theta))
+        return bar.on_springs(self.springs_n_m_rad(theta))
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
-        deck, arch = (
-            springs[0, PLANES.index(plane)] for springs in self.springs_n_m_rad(theta[None])
-        )
+        at = PLANES.index(plane)
         length, tension = self._length_m(theta[None]), self._tension_n(theta[None])
         if self.hanger.turnbuckles:
-            ends = np.array([deck]), np.array([arch])
-            beam = stepped.stepped_beam(self.hanger, length, tension, *ends)
-            return stepped.mode_shape(beam, order, x_m)
+            fine = np.linspace(0, length[0], _POINTS_A_HALF_WAVE * (order + 2))
+            seen = solve(self._coupled(theta[None]), order, np.append(fine, x_m)).shape
+            shape = seen[0, at, order - 1, :, at]
+            along = shape[: len(fine)]
+            peak = np.abs(along).max()
+            first = along[np.argmax(np.abs(along) > _RISEN * peak)]
+            return np.asarray(shape[len(fine) :] / np.copysign(peak, first))
+        deck, arch = (springs[0, at] for springs in self.springs_n_m_rad(theta[None]))
         stiffness = self.hanger.bending_stiffness_n_m2
         xi, scale = float(length[0] * np.sqrt(tension[0] / stiffness)), length[0] / stiffness
         return tensioned_beam.mode_shape(xi, deck * scale, arch * scale, order, x_m / length)

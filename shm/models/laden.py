@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.hanger import PhysicalHanger, PointMass, solve
+from shm.models.hanger import PointMass, solve
+from shm.models.turnbuckles import coupled_bar
 from shm.values import AddedMass, FloatArray, Hanger
 
 _NOWHERE = np.empty(0)
@@ -25,8 +26,7 @@ def laden_ratio(
     Of bars of `length_m` (n,) from the deck end at tensions (n,), on rotational springs at the deck
     and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
     """
-    bar = replace(PhysicalHanger.clamped(hanger, tension_n), arch_end_m=length_m)
-    bare = bar.on_springs(springs_n_m_rad)
+    bare = coupled_bar(hanger, length_m, tension_n).on_springs(springs_n_m_rad)
     one = np.ones(len(tension_n))
     mass = PointMass(added_mass.x_m * one, added_mass.mass_kg * one)
     laden = replace(bare, masses=(mass,))

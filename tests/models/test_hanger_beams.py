@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shm.models import THESIS, build, tensioned_beam
+from shm.models import tensioned_beam
 from shm.models.hanger import PhysicalHanger, Zone, solve
-from shm.values import Turnbuckle
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import (
     EI,
@@ -61,20 +60,6 @@ def test_springs_from_none_to_rigid_are_exact(xi: float, k: tuple[float, ...]) -
     deck, arch = np.array([k[:2]]), np.array([k[2:]])
     found = frequencies_hz(on_springs(bar, deck, arch), 10)
     np.testing.assert_allclose(found, exact(bar, deck, arch, 10), rtol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["beam1", "beam2"])
-def test_turnbuckles_are_those_of_the_stepped_beam(name: str) -> None:
-    low, high = Turnbuckle(1.5, 0.6, 150.0, 1e7), Turnbuckle(9.0, 0.4, 60.0, 3e7)
-    hanger = replace(HANGER_3, plate=None, turnbuckles=(low, high))
-    model, rng = build(name, hanger, THESIS), np.random.default_rng(1)
-    prior = model.prior
-    theta = rng.uniform(prior.lower, prior.upper, (20, len(prior.names)))
-    theta[:, 1] = 1.0
-    deck, arch = model.springs_n_m_rad(theta)
-    bar = PhysicalHanger.clamped(hanger, theta[:, 0] * TENSION)
-    found = frequencies_hz(on_springs(bar, deck, arch), 8)
-    np.testing.assert_allclose(found, model.frequencies_hz(theta, 8), rtol=5e-5)
 
 
 def test_shear_and_rotary_inertia_are_timoshenkos() -> None:
