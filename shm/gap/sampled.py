@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from typing import TypeAlias
 
 import numpy as np
 from scipy.special import logsumexp
@@ -22,6 +22,7 @@ from shm.gap.coordinates import Branch
 from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
+from shm.inference.pool import Pool
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
@@ -35,23 +36,16 @@ _MUCH_BETTER = 2.0
 
 @dataclass(frozen=True, eq=False)
 class _Draws:
-    """Draws with their linear parameters settled and log weights (n,)."""
+    """Draws with their linear parameters settled."""
 
     points: Points
     settled: Settled
-    log_weight: FloatArray
-
-    @property
-    def effective(self) -> float:
-        """Kish's effective number of draws."""
-        return effective(normalised(self.log_weight))
 
     def joined(self, other: _Draws) -> _Draws:
-        return _Draws(
-            self.points.joined(other.points),
-            self.settled.joined(other.settled),
-            np.append(self.log_weight, other.log_weight),
-        )
+        return _Draws(self.points.joined(other.points), self.settled.joined(other.settled))
+
+
+_Pool: TypeAlias = Pool[Proposal, _Draws]
 
 
 def sampled(
@@ -64,18 +58,19 @@ def sampled(
     """
     sampler = _Sampler(problem, fit)
     final = sampler.run(rng, _ATTEMPTS if thorough else 1)
-    best = int((final.settled.log_marginal + log_normal(final.points.w)).argmax())
-    if final.settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
-        fit = fitted(problem, fit.hypothesis, rng, np.stack([final.settled.z[best], fit.z]))
-    rows = systematic(normalised(final.log_weight), draws, rng)
-    share = 1 / final.effective - 1 / len(final.log_weight)
+    points, settled = final.batch.points, final.batch.settled
+    best = int((settled.log_marginal + log_normal(points.w)).argmax())
+    if settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
+        fit = fitted(problem, fit.hypothesis, rng, np.stack([settled.z[best], fit.z]))
+    rows = systematic(normalised(final.log_weights), draws, rng)
+    share = 1 / _effective(final) - 1 / final.draws
     return replace(
         fit,
-        draws=rng.permutation(sampler.scattered(final.settled.take(rows), rng)),
-        log_evidence=float(logsumexp(final.log_weight) - np.log(len(final.log_weight))),
+        draws=rng.permutation(sampler.scattered(settled.take(rows), rng)),
+        log_evidence=float(logsumexp(final.log_weights) - np.log(final.draws)),
         log_evidence_sd=float(_UNSEEN * np.sqrt(max(share, 0.0))),
         method="sampled",
-        effective=final.effective,
+        effective=_effective(final),
     )
 
 
@@ -97,29 +92,27 @@ class _Sampler:
         """The log likelihood at the fit's other parameters, the linear ones integrated out."""
         return float(self._conditional.settled(self._fit.z[None, self._other]).log_marginal[0])
 
-    def run(self, rng: np.random.Generator, attempts: int) -> _Draws:
+    def run(self, rng: np.random.Generator, attempts: int) -> _Pool:
         """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as so many attempts have.
 
-        The proposal is refitted to all draws so far, each weighed against the mixture of all
-        proposals (Cornuet et al. 2012, Scand. J. Stat. 39). The answer rests on fresh draws; where
-        too few of these are effective they join the others, and the proposal is refitted again.
+        The proposal is refitted to all draws so far. The answer rests on fresh draws; where too few
+        of these are effective they join the others, and the proposal is refitted again.
         """
         proposal = Proposal.about(self._fit.peaks, self._branches, self._other)
-        pool = _Pool()
+        pool = _empty()
         for _ in range(attempts):
             for _ in range(_MOST_TRIALS):
-                pool.add(proposal, self._drawn(proposal, _TRIAL, rng))
-                drawn = pool.draws()
-                proposal = proposal.refitted(drawn.points, drawn.log_weight, rng)
-                if drawn.effective >= _TO_FIT:
+                self._draw(pool, proposal, _TRIAL, rng)
+                proposal = proposal.refitted(pool.batch.points, pool.log_weights, rng)
+                if _effective(pool) >= _TO_FIT:
                     break
-            final = _Pool()
+            final = _empty()
             for _ in range(_MOST_FINALS):
-                final.add(proposal, self._drawn(proposal, _FINAL, rng))
-                if final.draws().effective >= ENOUGH_EFFECTIVE:
-                    return final.draws()
-            pool.join(final)
-        return pool.draws()
+                self._draw(final, proposal, _FINAL, rng)
+                if _effective(final) >= ENOUGH_EFFECTIVE:
+                    return final
+            pool.absorb(final)
+        return pool
 
     def scattered(self, settled: Settled, rng: np.random.Generator) -> FloatArray:
         """Draws z (n, d) with the linear parameters drawn from their own posterior."""
@@ -129,38 +122,20 @@ class _Sampler:
         z[:, self._linear] += (factor @ noise)[..., 0]
         return z
 
-    def _drawn(self, proposal: Proposal, count: int, rng: np.random.Generator) -> _Draws:
-        """Draws whose weights are those of the posterior alone, without any proposal's."""
+    def _draw(self, pool: _Pool, proposal: Proposal, count: int, rng: np.random.Generator) -> None:
         points = proposal.draw(count, rng)
         z = np.empty_like(points.w)
         for k, branch in enumerate(self._branches):
             z[points.branch == k] = branch.z(points.w[points.branch == k])
         settled = self._conditional.settled(z)
-        prior = log_normal(points.w) + self._branches[0].log_prior
-        return _Draws(points, settled, settled.log_marginal + prior)
+        log_prior = log_normal(points.w) + self._branches[0].log_prior
+        pool.add(proposal, count, _Draws(points, settled), settled.log_marginal + log_prior)
 
 
-class _Pool:
-    """Draws of several proposals, each weighed against the mixture of all."""
+def _empty() -> _Pool:
+    return Pool(lambda proposal, draws: proposal.log_density(draws.points))
 
-    def __init__(self) -> None:
-        self._proposals: list[tuple[Proposal, int]] = []
-        self._draws: list[_Draws] = []
 
-    def add(self, proposal: Proposal, draws: _Draws) -> None:
-        self._proposals.append((proposal, len(draws.log_weight)))
-        self._draws.append(draws)
-
-    def join(self, other: _Pool) -> None:
-        self._proposals += other._proposals
-        self._draws += other._draws
-
-    def draws(self) -> _Draws:
-        """All of them; the mean of their weights is the evidence."""
-        whole = reduce(_Draws.joined, self._draws)
-        count = sum(each for _, each in self._proposals)
-        parts = [
-            np.log(each / count) + proposal.log_density(whole.points)
-            for proposal, each in self._proposals
-        ]
-        return replace(whole, log_weight=whole.log_weight - logsumexp(parts, axis=0))
+def _effective(pool: _Pool) -> float:
+    """Kish's effective number of draws."""
+    return effective(normalised(pool.log_weights))

@@ -2,8 +2,7 @@
 
 It gives the evidence without the bias and the scatter of the stages, with the error of a plain
 mean, and independent weighted draws of the posterior. Each trial batch is drawn from a mixture
-refitted to all trials before, every draw weighed against the mixture of all batches' proposals
-(Cornuet et al. 2012, adaptive multiple importance sampling). The weights of draws that were fitted
+refitted to all trials before (`shm.inference.pool`). The weights of draws that were fitted
 to are too small, so that the answer rests on fresh draws from the last mixture alone. Shares of it
 come from the prior (Hesterberg 1995, defensive mixture) and from the sampler's earlier, wider
 stages: no weight is unbounded.
@@ -18,6 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.inference.mixture import TMixture
+from shm.inference.pool import Pool
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors
 from shm.inference.tmcmc import effective, normalised, systematic
@@ -118,17 +118,18 @@ def weigh(
     through them too, lest the population have missed one that matters. Where too few of the final
     draws are effective, they become trials, and others are drawn.
     """
-    tails = _tails(wider, rng)
+    sampler = _Sampler(problem, _tails(wider, rng))
     core = _first(problem, population, anchors, rng)
-    trial = _Pool(problem, tails)
+    trial = sampler.pool()
     for _ in range(_ATTEMPTS):
-        core = _adapted(core, trial, enough, rng)
-        final = _Pool(problem, tails)
-        _fill(final, core, trial.share(), enough, rng)
-        if final.weighted().effective_sample_size >= _POOR * enough:
+        core = _adapted(sampler, trial, core, enough, rng)
+        share = _weighted(trial).effective_sample_size / trial.draws
+        final = sampler.pool()
+        _fill(sampler, final, core, share, enough, rng)
+        if _weighted(final).effective_sample_size >= _POOR * enough:
             break
         trial.absorb(final)
-    return final.weighted()
+    return _weighted(final)
 
 
 def _first(
@@ -140,11 +141,17 @@ def _first(
     return found.joined(anchors.normals(0.0), _FROM_ANCHORS)
 
 
-def _adapted(core: TMixture, trial: _Pool, enough: float, rng: np.random.Generator) -> TMixture:
+def _adapted(
+    sampler: _Sampler,
+    trial: Pool[TMixture, _Kept],
+    core: TMixture,
+    enough: float,
+    rng: np.random.Generator,
+) -> TMixture:
     """The mixture refitted to all trial draws, batch by batch."""
     for _ in range(_MOST_TRIALS):
-        trial.draw(core, _TRIAL, rng)
-        weighted = trial.weighted()
+        sampler.draw(trial, core, _TRIAL, rng)
+        weighted = _weighted(trial)
         core = core.refitted(weighted.points.z, _to_fit(weighted))
         if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
             break
@@ -161,7 +168,12 @@ def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture |
 
 
 def _fill(
-    final: _Pool, core: TMixture, share: float, enough: float, rng: np.random.Generator
+    sampler: _Sampler,
+    final: Pool[TMixture, _Kept],
+    core: TMixture,
+    share: float,
+    enough: float,
+    rng: np.random.Generator,
 ) -> None:
     """Draws from one mixture, of which a `share` is expected to be effective.
 
@@ -169,11 +181,11 @@ def _fill(
     that have missed a large one.
     """
     needed = max(enough, 1 / _AIMED_ERROR**2) / share
-    final.draw(core, int(np.clip(needed, _FEWEST, _MOST)), rng)
+    sampler.draw(final, core, int(np.clip(needed, _FEWEST, _MOST)), rng)
     for _ in range(_MOST_EXTENSIONS):
-        if _suffices(final.weighted(), enough):
+        if _suffices(_weighted(final), enough):
             break
-        final.draw(core, _EXTENSION, rng)
+        sampler.draw(final, core, _EXTENSION, rng)
 
 
 def _suffices(weighted: Weighted, enough: float) -> bool:
@@ -191,71 +203,45 @@ def _to_fit(weighted: Weighted) -> FloatArray:
     return weights
 
 
-class _Pool:
-    """All draws so far, each with the log density of the mixture of all batches' proposals.
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Draws inside of the prior, and the log density (n,) of what all proposals share there."""
 
-    A proposal is a core of its own and what all have in common: the prior and the `tails`, whose
-    density at a draw is found once.
+    points: Points
+    log_common: FloatArray
+
+    def joined(self, other: _Kept) -> _Kept:
+        log_common = np.append(self.log_common, other.log_common)
+        return _Kept(self.points.joined(other.points), log_common)
+
+
+class _Sampler:
+    """Draws from proposals that are each a core of its own and what all have in common: the prior
+    and the `tails`, whose density at a draw is found once.
     """
 
     def __init__(self, problem: Problem, tails: TMixture | None):
-        self._problem = problem
-        self._tails = tails
-        self._from_tails = _FROM_TAILS if tails else 0.0
-        self._proposals: list[tuple[TMixture, int]] = []
-        self._z: FloatArray = np.empty((0, problem.dimension))
-        self._predicted: list[FloatArray] = []
-        self._log_common: FloatArray = np.empty(0)
-        self._log_posterior: FloatArray = np.empty(0)
-        self._log_drawn: FloatArray = np.empty(0)
+        self._problem, self._tails = problem, tails
+        self._of_core = np.log1p(-_FROM_PRIOR) + np.log1p(-_FROM_TAILS if tails else 0.0)
 
-    def draw(self, core: TMixture, draws: int, rng: np.random.Generator) -> None:
-        """One more batch; draws outside of the prior are counted, not evaluated."""
+    def pool(self) -> Pool[TMixture, _Kept]:
+        """An empty one."""
+        return Pool(self._log_density)
+
+    def draw(
+        self, pool: Pool[TMixture, _Kept], core: TMixture, draws: int, rng: np.random.Generator
+    ) -> None:
+        """One more batch into the pool; draws outside of the prior are counted, not evaluated."""
         n = rng.binomial(draws, _FROM_PRIOR)
         mixture = core.mixed(self._tails, _FROM_TAILS) if self._tails else core
-        z = np.vstack([self._problem.coordinates.draw_prior(n, rng), mixture.draw(draws - n, rng)])
-        log_prior = self._problem.coordinates.log_prior(z)
+        coordinates = self._problem.coordinates
+        z = np.vstack([coordinates.draw_prior(n, rng), mixture.draw(draws - n, rng)])
+        log_prior = coordinates.log_prior(z)
         inside = np.isfinite(log_prior)
         z, log_prior = z[inside], log_prior[inside]
         points = self._problem.evaluate(z)
         log_posterior = log_prior + self._problem.likelihood.marginal(points.predicted)
-        log_common = self._common(z, log_prior)
-        self._append([(core, draws)], z, [points.predicted], log_common, log_posterior)
-
-    def absorb(self, other: _Pool) -> None:
-        """Takes over the draws of another pool of the same problem and tails."""
-        self._append(
-            other._proposals, other._z, other._predicted, other._log_common, other._log_posterior
-        )
-
-    def _append(
-        self,
-        proposals: list[tuple[TMixture, int]],
-        z: FloatArray,
-        predicted: list[FloatArray],
-        log_common: FloatArray,
-        log_posterior: FloatArray,
-    ) -> None:
-        old = self._drawn(proposals, self._z, self._log_common)
-        self._proposals += proposals
-        new = self._drawn(self._proposals, z, log_common)
-        self._log_drawn = np.append(np.logaddexp(self._log_drawn, old), new)
-        self._z = np.vstack([self._z, z])
-        self._predicted += predicted
-        self._log_common = np.append(self._log_common, log_common)
-        self._log_posterior = np.append(self._log_posterior, log_posterior)
-
-    def weighted(self) -> Weighted:
-        """The draws with their weights."""
-        points = Points(self._z, np.vstack(self._predicted))
-        log_weights = self._log_posterior - self._log_drawn
-        draws = sum(k for _, k in self._proposals)
-        return Weighted(points, log_weights + np.log(draws), draws)
-
-    def share(self) -> float:
-        """Effective draws as a share of all."""
-        weighted = self.weighted()
-        return weighted.effective_sample_size / weighted.draws
+        pool.add(core, draws, _Kept(points, self._common(z, log_prior)), log_posterior)
 
     def _common(self, z: FloatArray, log_prior: FloatArray) -> FloatArray:
         """Log density (n,) of the prior's and the tails' shares of every proposal."""
@@ -265,13 +251,10 @@ class _Pool:
         share = np.log1p(-_FROM_PRIOR) + np.log(_FROM_TAILS)
         return np.asarray(np.logaddexp(log_common, share + self._tails.log_density(z)))
 
-    def _drawn(
-        self, proposals: list[tuple[TMixture, int]], z: FloatArray, log_common: FloatArray
-    ) -> FloatArray:
-        """Log of how many draws per volume (n,) the proposals, each of so many, put at `z`."""
-        share = np.log1p(-_FROM_PRIOR) + np.log1p(-self._from_tails)
-        parts = [
-            np.log(draws) + np.logaddexp(log_common, share + core.log_density(z))
-            for core, draws in proposals
-        ]
-        return np.asarray(logsumexp(parts, axis=0))
+    def _log_density(self, core: TMixture, kept: _Kept) -> FloatArray:
+        own = self._of_core + core.log_density(kept.points.z)
+        return np.asarray(np.logaddexp(kept.log_common, own))
+
+
+def _weighted(pool: Pool[TMixture, _Kept]) -> Weighted:
+    return Weighted(pool.batch.points, pool.log_weights, pool.draws)

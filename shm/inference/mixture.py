@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -62,7 +63,10 @@ class TMixture:
     def of(cls, population: FloatArray, clusters: int, rng: np.random.Generator) -> TMixture:
         """One t on each cluster of a population (n, d)."""
         whole = Normal.of(population)
-        label = kmeans2(whole.whiten(population), clusters, minit="++", rng=rng)[1]
+        with warnings.catch_warnings():
+            # A cluster that loses its points is left out below.
+            warnings.filterwarnings("ignore", "One of the clusters is empty")
+            label = kmeans2(whole.whiten(population), clusters, minit="++", rng=rng)[1]
         members = [population[label == k] for k in range(clusters) if np.sum(label == k) > 2]
         shares = np.array([len(cluster) for cluster in members], dtype=float)
         return cls([_shrunk(cluster, whole) for cluster in members], shares)

@@ -11,13 +11,12 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from shm.gap.branched import Proposal
-from shm.gap.conditional import Settled
 from shm.gap.contract import Hypothesis, Peak
 from shm.gap.coordinates import Branch
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.noise import nodes
 from shm.gap.problem import GapProblem
-from shm.gap.sampled import _Draws, _Pool, sampled
+from shm.gap.sampled import sampled
 from shm.gap.sensitivity import scan, truncate
 from shm.inference.tmcmc import normalised
 from shm.models.effects import Variant
@@ -196,20 +195,3 @@ def test_refitting_follows_a_bent_posterior_until_most_draws_count(s: float) -> 
     log_weight = bent.log(points.w) - proposal.log_density(points)
     assert shares[-1] > max(0.15, 1.5 * shares[0])
     assert logsumexp(log_weight) - np.log(4000) == pytest.approx(0.0, abs=0.08)
-
-
-def test_draws_of_several_proposals_count_as_draws_of_their_mixture() -> None:
-    """A pool's mean weight is the evidence, be its first proposal ever so far off."""
-    rng = np.random.default_rng(4)
-    signs = np.zeros(2)
-    pool, near = _Pool(), np.array([0.5, 0.5])
-    for centre, count in ((np.array([3.0, 3.0]), 500), (near, 3000)):
-        peak = Peak(signs, centre, 0.3 * np.eye(2), 0.0)
-        proposal = Proposal.about([peak], [Branch(signs)], np.arange(2))
-        points = proposal.draw(count, rng)
-        log = np.asarray(stats.multivariate_normal(near, 0.2 * np.eye(2)).logpdf(points.w))
-        settled = Settled(points.w, np.zeros((count, 0, 0)), log)
-        pool.add(proposal, _Draws(points, settled, log))
-    found = pool.draws()
-    assert found.effective > 1500
-    assert logsumexp(found.log_weight) - np.log(3500) == pytest.approx(0.0, abs=0.05)
