@@ -5,7 +5,7 @@ from __future__ import annotations
 from shm.inference.ensemble import refresh
 from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
 from shm.inference.textbook import BiasedEvidenceWarning
-from shm.inference.updating import select, update
+from shm.inference.updating import class_probabilities, select, update
 
 __all__ = [
     "METHODS",
@@ -14,6 +14,7 @@ __all__ = [
     "BiasedEvidenceWarning",
     "Progress",
     "UpdateOptions",
+    "class_probabilities",
     "refresh",
     "select",
     "update",

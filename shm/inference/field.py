@@ -29,7 +29,7 @@ from scipy.special import logsumexp
 from shm.errors import BadInput
 from shm.inference.likelihood import conditions_of, predicted_hz
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
-from shm.models import AsMade
+from shm.models import Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
@@ -68,7 +68,7 @@ class FieldLikelihood:
     def __init__(
         self,
         tests: Sequence[ModalTest],
-        model: AsMade,
+        model: Model,
         reading: tuple[float, float] | None = None,
     ):
         self.tests = tuple(tests)
@@ -112,7 +112,7 @@ class FieldLikelihood:
         """The highest order of a measured mode, which a model has to reach in each plane."""
         return int(self._order.max()) + 1
 
-    def predict(self, model: AsMade, theta: FloatArray) -> FloatArray:
+    def predict(self, model: Model, theta: FloatArray) -> FloatArray:
         """The model's frequency for each datum (n, frequencies), in Hz, its ends as they usually
         are.
         """
@@ -120,7 +120,7 @@ class FieldLikelihood:
         ends = model.end_waves(theta, bare, self._plane)
         return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m))
 
-    def settle(self, model: AsMade, theta: FloatArray) -> None:
+    def settle(self, model: Model, theta: FloatArray) -> None:
         """Takes what is systematic from `theta` (parameters,), once: near the optimum, so that all
         draws are judged by one covariance.
         """
@@ -129,7 +129,7 @@ class FieldLikelihood:
             self._ways.clear()
         self._settled = True
 
-    def _typical(self, model: AsMade) -> FloatArray:
+    def _typical(self, model: Model) -> FloatArray:
         """Parameters (parameters,) in the middle of the prior, the tension as of a string."""
         hanger, theta = model.hanger, np.add(model.prior.lower, model.prior.upper) / 2
         first = self._order.argmin()
@@ -138,7 +138,7 @@ class FieldLikelihood:
         theta[model.parameter_names.index(TENSION)] = np.clip(ratio, *model.bounds[TENSION])
         return np.asarray(theta)
 
-    def _systematic(self, model: AsMade, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _systematic(self, model: Model, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The mean (data,) and those loads (frequencies, k) that are felt."""
         measured = self.frequency_hz[None, : self.frequencies]
         ends = model.end_waves(theta[None], measured, self._plane)
@@ -199,8 +199,20 @@ class FieldLikelihood:
         return np.asarray(np.sqrt(beyond.mean(axis=1).clip(TAU_LOWER**2)))
 
     def by_mode(self, predicted: FloatArray) -> FloatArray:
-        """Predictions (n, modes) of every mode of every test from those of the data."""
-        return predicted[:, self.of_mode]
+        """Predictions (n, modes) of every mode of every test from those of the data (n, data).
+
+        With the sensors, supports, fittings and section that the data most probably had, by their
+        normal posterior at the mean prediction.
+        """
+        middle = predicted.mean(axis=0)[None]
+        own = self.identification_error[: self.frequencies] ** 2
+        repeats = self.likeliest_sigma(middle)[0] ** 2 * self._together
+        shared = self._loads @ self._loads.T
+        off = -self.misfit(middle)[0, : self.frequencies]
+        found = self._shift[: self.frequencies] + shared @ np.linalg.solve(
+            np.diag(own) + repeats + shared, off
+        )
+        return (predicted[:, : self.frequencies] * np.exp(found))[:, self.of_mode]
 
     def _nodes(self, predicted: FloatArray, step_in_sd: float, floor: float = 0.0) -> FloatArray:
         """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""

@@ -97,7 +97,7 @@ class Problem:
     def run(self, theta: FloatArray) -> FloatArray:
         """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
         self.evaluations += len(theta)
-        found = self.likelihood.predict(self.model, theta)  # type: ignore[arg-type]
+        found = self.likelihood.predict(self.model, theta)
         if isinstance(self.likelihood, FieldLikelihood) and self.likelihood.has_reading:
             ratio = theta[:, self.model.parameter_names.index(TENSION)]
             tension_n = ratio * self.model.hanger.nominal_tension_n
@@ -110,7 +110,7 @@ class Problem:
 
     def settle(self, z: FloatArray) -> None:
         """Takes what the covariance of the noise has of the model from `z` (d,), once."""
-        if isinstance(self.likelihood, FieldLikelihood) and isinstance(self.model, AsMade):
+        if isinstance(self.likelihood, FieldLikelihood):
             self.likelihood.settle(self.model, self.coordinates.theta(z[None])[0])
 
     def slopes(self, z: FloatArray) -> FloatArray:
@@ -137,13 +137,10 @@ def _likelihood(
             f"a data set that counts {repeat} times is the thesis's: real tests count once.",
             remedy="Leave repeat out, or take the priors of the thesis.",
         )
-    if not isinstance(model, AsMade):
-        raise UsageError(
-            f"model class {model.name} knows no priors but its own.",
-            remedy="Build it with `shm.models.build`.",
-        )
     reading = reading_of(tests)
     if reading is None:
         return FieldLikelihood(tests, model)
-    sd = DescribedCoordinates(model, tests, 1.0, calibration).reading_sd
+    sd = reading.sd
+    if isinstance(model, AsMade):
+        sd = DescribedCoordinates(model, tests, 1.0, calibration).reading_sd
     return FieldLikelihood(tests, model, (reading.tension_n, sd))

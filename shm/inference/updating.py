@@ -122,15 +122,24 @@ def select(
     cheap = [update(tests, m, options, progress) for m in models if not m.expensive]
     best = max(cheap, key=lambda posterior: posterior.log_evidence, default=None)
     costly = [update(tests, m, options, progress, best) for m in models if m.expensive]
-    prior = {model.name: log_prior(model, tests) for model in models}
     found = [*cheap, *costly]
-    log = np.array([each.log_evidence + prior[each.model] for each in found])
-    order = np.argsort(-log, kind="stable")
-    weights = normalised(log[order])
-    return Selection(tuple(found[k] for k in order), tuple(float(weight) for weight in weights))
+    chances = class_probabilities(found, models, tests)
+    order = np.argsort([-chances[each.model] for each in found], kind="stable")
+    chosen = tuple(found[k] for k in order)
+    return Selection(chosen, tuple(chances[each.model] for each in chosen))
 
 
-def log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
+def class_probabilities(
+    posteriors: Sequence[Posterior], models: Sequence[Model], tests: Sequence[ModalTest]
+) -> dict[str, float]:
+    """The probability of each class, by name, of its posterior's evidence and before any data."""
+    prior = {model.name: _log_prior(model, tests) for model in models}
+    log = np.array([each.log_evidence + prior[each.model] for each in posteriors])
+    weights = normalised(log)
+    return {each.model: float(w) for each, w in zip(posteriors, weights, strict=True)}
+
+
+def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     """Log of how probable a class is before any data, beside one of springs.
 
     No end is perfectly clamped: a rigid end stands for springs in the decade beyond `RESTRAINT`, as

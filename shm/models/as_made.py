@@ -26,8 +26,7 @@ import numpy as np
 from shm.models.base import DESCRIPTION, Model, silent
 from shm.models.beam import Beam, Beam3
 from shm.models.conditions import Conditions
-from shm.models.end_effects import EndWaves
-from shm.values import AddedMass, FloatArray, IntArray, ModalTest, Plane
+from shm.values import AddedMass, FloatArray, ModalTest, Plane
 
 TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
@@ -113,7 +112,6 @@ class AsMade(Model):
         return max(1 - most, 0.5), 1 + most
 
     def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """e, mu and l, each (n,), of parameter sets (n, parameters)."""
         section, density, modulus = (self._column(theta, n) for n in (SECTION, DENSITY, MODULUS))
         slip = np.ones(len(theta))
         if self.is_strand:
@@ -175,36 +173,6 @@ class AsMade(Model):
             at = self.model.parameter_names.index(LENGTH)
             own = np.insert(own, at, self._column(theta, LENGTH), axis=1)
         return self.model.springs_n_m_rad(own)
-
-    def end_waves(
-        self, theta: FloatArray, frequency_hz: FloatArray, plane: IntArray
-    ) -> tuple[EndWaves, EndWaves]:
-        """Modes near the deck's and the arch's end: `frequency_hz` (n, data) of `theta`
-        (n, parameters) in planes `plane` (data,). A solid's ends count as clamped.
-        """
-        hanger = self.hanger
-        e, mu, length = (each[:, None] for each in self.stiffness_mass_length(theta))
-        ends = [np.full(frequency_hz.shape, np.inf)] * 2
-        if isinstance(self.model, Beam):
-            ends = [springs[:, plane] for springs in self.springs_n_m_rad(theta)]
-        deck, arch = (
-            EndWaves.of(
-                frequency_hz,
-                self._column(theta, TENSION)[:, None] * hanger.nominal_tension_n,
-                e * hanger.bending_stiffness_n_m2,
-                mu * hanger.mass_per_length_kg_m,
-                length * hanger.length_m,
-                spring,
-            )
-            for spring in ends
-        )
-        return deck, arch
-
-    @property
-    def stiff_ends_m(self) -> tuple[float, float]:
-        """Lengths of fittings, none where the owner states the effective length."""
-        stated = math.isfinite(self.hanger.scatter.effective_length)
-        return (0.0, 0.0) if stated else self.hanger.fittings_m
 
     def _column(self, theta: FloatArray, name: str) -> FloatArray:
         return np.asarray(theta[:, self.parameter_names.index(name)])

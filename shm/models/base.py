@@ -10,8 +10,9 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.models.conditions import Conditions
+from shm.models.end_effects import EndWaves
 from shm.models.laden import laden_ratio
-from shm.values import FloatArray, Hanger, ModalTest, Plane, Prior
+from shm.values import FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
 
@@ -119,6 +120,42 @@ class Model:
         """
         clamped = np.full((len(theta), 2), np.inf)
         return clamped, clamped
+
+    def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Bending stiffness, mass per length and length of parameter sets (n, parameters), each
+        (n,) over the described one.
+        """
+        one = np.ones(len(theta))
+        values = dict(zip(self.parameter_names, theta.T, strict=True))
+        return one, one, np.asarray(values.get("theta_L", one))
+
+    def end_waves(
+        self, theta: FloatArray, frequency_hz: FloatArray, plane: IntArray
+    ) -> tuple[EndWaves, EndWaves]:
+        """Modes near the deck's and the arch's end: `frequency_hz` (n, data) of `theta`
+        (n, parameters) in planes `plane` (data,).
+        """
+        hanger = self.hanger
+        e, mu, length = (each[:, None] for each in self.stiffness_mass_length(theta))
+        ratio = theta[:, self.parameter_names.index("theta_F")][:, None]
+        deck, arch = (
+            EndWaves.of(
+                frequency_hz,
+                ratio * hanger.nominal_tension_n,
+                e * hanger.bending_stiffness_n_m2,
+                mu * hanger.mass_per_length_kg_m,
+                length * hanger.length_m,
+                springs[:, plane],
+            )
+            for springs in self.springs_n_m_rad(theta)
+        )
+        return deck, arch
+
+    @property
+    def stiff_ends_m(self) -> tuple[float, float]:
+        """Lengths of fittings, none where the owner states the effective length."""
+        stated = math.isfinite(self.hanger.scatter.effective_length)
+        return (0.0, 0.0) if stated else self.hanger.fittings_m
 
     def wave_stiffness_n_m_rad(self, order: float) -> float:
         """What an end spring is stiff or soft against: bending stiffness times wave number.

@@ -9,24 +9,20 @@ record, and dropping the adoption puts them in force again.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-import numpy as np
-
 from shm.errors import NothingThere, UsageError
-from shm.inference import update
+from shm.inference import class_probabilities, update
 from shm.inference.options import Progress, silent
-from shm.inference.tmcmc import normalised
-from shm.models import build
+from shm.models import build, class_of
 from shm.models.adopted import variant_of
 from shm.models.adopted_name import AdoptedName
 from shm.pipeline.calibrating import options_of
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.terms import update_terms
 from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredSelection, Workspace
-from shm.values import Hanger, Posterior
+from shm.values import Hanger
 from shm.watch import gap_percent, has_grown
 
 
@@ -102,8 +98,9 @@ def adopt(
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
+    measured = [test.test for test in chosen]
     posterior = update(
-        [test.test for test in chosen],
+        measured,
         build(str(name), hanger, terms.priors),
         options_of(terms, hanger),
         progress,
@@ -111,7 +108,9 @@ def adopt(
     )
     gaps = gap_percent(baseline.posterior), gap_percent(posterior)
     adoption = _adoption(name, hanger, wish, gaps, diagnosis.id if diagnosis else None)
-    probabilities = _probabilities([*before.selection.posteriors, posterior])
+    competing = [*before.selection.posteriors, posterior]
+    models = [class_of(each, hanger) for each in competing]
+    probabilities = class_probabilities(competing, models, measured)
     return store.adopt(adoption, posterior, probabilities, (before, chosen), lineage, at)
 
 
@@ -152,9 +151,3 @@ def _adoption(
         gap_percent=gaps[1],
         diagnosis_id=diagnosis_id,
     )
-
-
-def _probabilities(competing: Sequence[Posterior]) -> dict[str, float]:
-    """Of each class, all equally probable before."""
-    weights = normalised(np.array([each.log_evidence for each in competing]))
-    return {each.model: float(w) for each, w in zip(competing, weights, strict=True)}
