@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.errors import BadInput
+from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import Likelihood
 from shm.inference.options import silent
 from shm.inference.problem import Problem
@@ -60,6 +61,8 @@ def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hang
     """The same where the likelihood is that of `shm.inference.field`."""
     problem = Problem.of(tests, class_of(posterior, hanger), 1, silent)
     likelihood, sigma = problem.likelihood, posterior.samples[:, -1]
+    if isinstance(likelihood, FieldLikelihood):
+        likelihood.settle(problem.model, posterior.most_probable[:-1])
     predicted = problem.run(posterior.samples[:, :-1])
     kept = posterior.log_likelihood
     if not np.allclose(likelihood.joint(predicted, sigma), kept, rtol=1e-4, atol=_NATS):

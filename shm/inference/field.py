@@ -104,7 +104,6 @@ class FieldLikelihood:
             self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
         self._together = self._goes_together()
         self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
-        self._settled = False
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     @property
@@ -121,13 +120,9 @@ class FieldLikelihood:
         return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m))
 
     def settle(self, model: Model, theta: FloatArray) -> None:
-        """Takes what is systematic from `theta` (parameters,), once: near the optimum, so that all
-        draws are judged by one covariance.
-        """
-        if not self._settled:
-            self._shift, self._loads = self._systematic(model, theta)
-            self._ways.clear()
-        self._settled = True
+        """Takes what is systematic from `theta` (parameters,): one covariance judges all draws."""
+        self._shift, self._loads = self._systematic(model, theta)
+        self._ways.clear()
 
     def _typical(self, model: Model) -> FloatArray:
         """Parameters (parameters,) in the middle of the prior, the tension as of a string."""

@@ -76,14 +76,21 @@ def assembled(
 ) -> Posterior:
     """The posterior of equal draws."""
     model, samples = problem.model, outcome.samples
-    log_likelihood = problem.likelihood.joint(outcome.predicted, samples[:, -1])
+    likelihood = problem.likelihood
+    log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
+    most_probable = _most_probable(problem, samples, log_likelihood)
+    log_occam = outcome.log_evidence - _highest(problem, outcome.predicted)
+    if isinstance(likelihood, FieldLikelihood):
+        # What is kept can be computed again from the posterior alone.
+        likelihood.settle(model, most_probable[:-1])
+        log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
     return Posterior(
         model=model.name,
         hanger=tests[0].hanger,
         names=(*problem.prior.names, SIGMA),
         samples=samples,
         log_likelihood=log_likelihood,
-        most_probable=_most_probable(problem, samples, log_likelihood),
+        most_probable=most_probable,
         nominal_tension_n=model.hanger.nominal_tension_n,
         log_evidence=outcome.log_evidence,
         log_evidence_sd=outcome.log_evidence_sd,
@@ -99,7 +106,7 @@ def assembled(
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
         misfit_percent=_misfit_percent(problem, outcome.predicted),
-        log_occam=outcome.log_evidence - _highest(problem, outcome.predicted),
+        log_occam=log_occam,
     )
 
 

@@ -60,6 +60,7 @@ class Problem:
         self.model = model
         self.likelihood = likelihood
         self.evaluations = 0
+        self._settled = False
         middle = (1 + likelihood.highest_order) / 2
         own = model.wave_stiffness_n_m_rad(middle)
         self.coordinates: Coordinates | DescribedCoordinates
@@ -109,9 +110,12 @@ class Problem:
         return Points(z, self.predict(z))
 
     def settle(self, z: FloatArray) -> None:
-        """Takes what the covariance of the noise has of the model from `z` (d,), once."""
-        if isinstance(self.likelihood, FieldLikelihood):
+        """Takes what the covariance of the noise has of the model from `z` (d,), the first time:
+        near the optimum.
+        """
+        if isinstance(self.likelihood, FieldLikelihood) and not self._settled:
             self.likelihood.settle(self.model, self.coordinates.theta(z[None])[0])
+        self._settled = True
 
     def slopes(self, z: FloatArray) -> FloatArray:
         """Derivatives of the fractional misfit by z (m, d): (m, measurements, d)."""
