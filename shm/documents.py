@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from datetime import UTC, datetime
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeGuard
 
@@ -37,6 +38,14 @@ from shm.values import (
 MODES_SCHEMA = "shm.modes/1"
 _LARGEST = 1e300
 _LONGEST_ID = 200
+_HIGHEST_ORDER = 200
+_TEST_KEYS = (
+    "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
+    "tension_read_sd_n", "modes",
+)  # fmt: skip
+_MODE_KEYS = tuple(field.name for field in fields(Mode))
+_ALIKE = 0.75
+_SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
 _LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold when read
 
 
@@ -152,6 +161,7 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
         raise BadInput(
             f"{label} has no list `modes`.", file=file, remedy="Give its modes or drop the test."
         )
+    _refuse_misspelt(test, _TEST_KEYS, label, file)
     modes = tuple(
         _parse_mode(mode, f"{label}.modes[{i}]", file) for i, mode in enumerate(test["modes"])
     )
@@ -188,14 +198,28 @@ def _tension_read(test: Mapping[str, Any], label: str, file: str | Path) -> dict
     keys = ("tension_read_n", "tension_read_sd_n")
     values = {key: _number(test, key, label, file) for key in keys}
     read, sd = values.values()
-    if math.isfinite(read) != math.isfinite(sd) or read < 0 or sd <= 0:
+    if read <= 0 or sd <= 0 or (math.isnan(read) and math.isfinite(sd)):
         raise BadInput(
             f"{label}: tension_read_n and tension_read_sd_n are a tension and its standard "
             f"deviation, above 0.",
             file=file,
-            remedy="Give both, in N, or neither.",
+            remedy="Give the tension in N, and its standard deviation where you know it.",
         )
     return values
+
+
+def _refuse_misspelt(
+    table: Mapping[str, Any], known: Sequence[str], label: str, file: str | Path
+) -> None:
+    """Keys of others are left alone, but not those that somebody may think are read."""
+    for key in table.keys() - set(known):
+        meant = get_close_matches(str(key), known, n=1, cutoff=_ALIKE)
+        if meant:
+            raise BadInput(
+                f"{label}: unknown key {key}.",
+                file=file,
+                remedy=_SPELT.get(meant[0], f"Write {meant[0]}, or leave it out."),
+            )
 
 
 def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
@@ -203,9 +227,14 @@ def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
         raise BadInput(
             f"{label}: plane must be one of {', '.join(PLANES)}.", file=file, remedy="Correct it."
         )
+    _refuse_misspelt(mode, _MODE_KEYS, label, file)
     order = mode.get("order")
-    if not _is_whole(order, 1):
-        raise BadInput(f"{label}: order must be 1, 2, 3, ...", file=file, remedy="Correct it.")
+    if not _is_whole(order, 1) or order > _HIGHEST_ORDER:
+        raise BadInput(
+            f"{label}: order must be 1, 2, 3, ... up to {_HIGHEST_ORDER}.",
+            file=file,
+            remedy="Correct it.",
+        )
     frequency = _number(mode, "frequency_hz", label, file)
     if not frequency > 0:
         raise BadInput(f"{label}: frequency_hz must be positive.", file=file, remedy="Correct it.")

@@ -34,7 +34,8 @@ def calibrated(
 ) -> UpdateOptions:
     """The options with what the tests of `path` teach, by the most probable of the classes.
 
-    Raises UsageError where the priors leave nothing to learn, BadInput where no tension was read.
+    Raises UsageError where the priors leave nothing to learn, BadInput where no tension was read,
+    or one that contradicts the frequencies.
     """
     if path is None:
         return options
@@ -55,5 +56,11 @@ def calibrated(
         progress(f"{label} (calibrating)", fraction)
 
     posterior = select(tests, models, options, tell).selected
+    if posterior.caveats:
+        raise BadInput(
+            f"the tension read does not fit the frequencies. {posterior.caveats[0]}",
+            file=path,
+            remedy="Check the reading (in N), the orders and the description.",
+        )
     own = tests[0].hanger in (None, hanger.id)
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))

@@ -22,6 +22,9 @@ _OPTIONAL = (
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
 _LEAST_FACTOR = 1e-6
+_SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
+"""Rubber, and twice a diamond: what lies beyond was written in another unit."""
+
 _FALSE_CALL_YEARS = (0.1, 1e6)
 
 
@@ -30,8 +33,18 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
     table = Table(values, f"[[hanger]] id {values.get('id', '?')}", path)
     table.refuse_unknown(_KNOWN)
     length_m, elastic_modulus = table.positive("length_m"), table.positive("elastic_modulus_pa")
+    if not _SOFTEST_PA <= elastic_modulus <= _STIFFEST_PA:
+        raise table.refusal(
+            f"elastic_modulus_pa = {elastic_modulus:g} is that of no material",
+            "Give it in Pa: steel has 2.0e11 to 2.1e11.",
+        )
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
+    if max(diameter, math.sqrt(area)) >= length_m:
+        raise table.refusal(
+            f"a section of {max(diameter, math.sqrt(area)):g} m is no hanger of {length_m:g} m",
+            "Give lengths and diameters in m, areas in m2.",
+        )
     return Hanger(
         id=_whole_number(table),
         length_m=length_m,

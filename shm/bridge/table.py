@@ -28,8 +28,9 @@ class Table:
 
     def refuse_unknown(self, known: Iterable[str]) -> None:
         """Raises BadInput where a key is none of `known`."""
-        for key in self.values.keys() - set(known):
-            raise self.refusal(f"unknown key {key}", f"Known: {', '.join(sorted(known))}.")
+        names = sorted(known)
+        for key in self.values.keys() - set(names):
+            raise self.refusal(f"unknown key {key}", f"Known: {', '.join(names)}.")
 
     def positive(self, key: str) -> float:
         """A number above 0; raises BadInput where it is missing or none."""

@@ -96,6 +96,12 @@ MODE = ["tests", 0, "modes", 0]
         (changed(["tests", 0, "time"], "yesterday"), "not an ISO 8601 time"),
         (changed(["tests", 0, "added_mass"], {"mass_kg": -1, "x_m": 2}), "positive mass_kg"),
         (changed(["tests", 0, "added_mass"], 25), "added_mass is not an object"),
+        (changed(["tests", 0, "added_mass_kg"], 25), r"tests\[0\]: unknown key added_mass_kg"),
+        (changed(["tests", 0, "temperature"], 12), "unknown key temperature"),
+        (changed([*MODE, "frequency_sd"], 0.01), r"modes\[0\]: unknown key frequency_sd"),
+        (changed([*MODE, "order"], 10**9), "up to 200"),
+        (changed(["tests", 0, "tension_read_n"], -5.0), "above 0"),
+        (changed(["tests", 0, "tension_read_sd_n"], 5.0), "Give the tension in N"),
     ],
 )
 def test_what_is_wrong_is_named_with_a_remedy(document: Any, complaint: str) -> None:
@@ -103,6 +109,14 @@ def test_what_is_wrong_is_named_with_a_remedy(document: Any, complaint: str) -> 
         parse_modes(document, "x.modes.json")
     assert "x.modes.json" in str(refusal.value)
     assert refusal.value.remedy
+
+
+def test_keys_of_others_and_a_reading_without_sd_are_let_in() -> None:
+    document = changed(["tests", 0, "operator"], "Ada")
+    document["tests"][0]["tension_read_n"] = 5e5
+    (test,) = parse_modes(document)
+    assert test.tension_read_n == 5e5
+    assert math.isnan(test.tension_read_sd_n)
 
 
 def test_a_mode_given_twice_is_refused() -> None:
