@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from shm.bridge import load_hanger
-from shm.documents import load_modes
 from shm.gap import GapOptions, diagnose
+from shm.modes_document import load_modes
 from shm.values import Diagnosis, TensionEstimate
 from shm_cli.thesis import HANGER_FILE, PRINTINGS
 

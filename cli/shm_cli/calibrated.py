@@ -9,10 +9,10 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.documents import load_modes
 from shm.errors import BadInput, UsageError
 from shm.inference import Progress, UpdateOptions, select
 from shm.models import DESCRIPTION, Model
+from shm.modes_document import load_modes
 from shm.pipeline.calibrating import calibration
 from shm.pipeline.terms import Taught
 from shm.values import Hanger

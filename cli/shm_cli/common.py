@@ -27,10 +27,11 @@ from rich.progress import (
 from rich.table import Column, Table
 
 from shm.bridge import load_hanger
-from shm.documents import dump, load_modes
+from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.inference import METHODS, NOISE_FLOOR, UpdateOptions
 from shm.models import PRIORS, THESIS
+from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli import completers
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import rich_click as click
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
+from shm.modes_document import modes_document
 from shm.read.apart import read_test
 from shm.report import TestSheet, test_figures, test_page, test_text
 from shm.settings import Settings

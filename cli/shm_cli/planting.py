@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.errors import UsageError
+from shm.modes_document import modes_document
 from shm.simulate import (
     CampaignPlan,
     CampaignTruth,

@@ -8,7 +8,8 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from shm.documents import dump, load_modes, modes_document
+from shm.documents import dump
+from shm.modes_document import load_modes, modes_document
 from shm.read import write
 from shm.read.atomic import replace_text
 from shm.simulate import HammerPlan, HangerState, hammer_test

@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import shm
-from shm.documents import dump, modes_document
+from shm.documents import dump
+from shm.modes_document import modes_document
 from shm.simulate import CampaignPlan, HangerState, campaign
 from shm_cli.main import run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shm import documents
+from shm import modes_document
 from shm.read import read as read_file
 from shm.values import FrequencyResponse, ModalTest, Recording
 
@@ -35,4 +35,4 @@ def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
         >>> tests[0].modes[0].frequency_hz
         5.82
     """
-    return documents.load_modes(Path(path))
+    return modes_document.load_modes(Path(path))

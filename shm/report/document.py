@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shm import documents
+from shm import documents, modes_document
 from shm.report.bridge.document import pattern_json
 from shm.report.content import HangerReport
 from shm.report.diagnosis.document import diagnosis_json
@@ -27,7 +27,7 @@ def json(data: HangerReport) -> dict[str, Any]:
         "status": status(data).name.lower(),
         "summary": summary(data),
         "advice": list(advice(data)),
-        "test": documents.test_document(data.latest),
+        "test": modes_document.test_document(data.latest),
         "posterior": documents.posterior_document(data.posterior),
         "baseline": documents.posterior_document(data.baseline) if data.baseline else None,
         "selection": (

@@ -10,7 +10,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from shm.documents import MODES_SCHEMA, averaged_from, parse_modes, parse_time
+from shm.documents import averaged_from, parse_time
+from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.values import (
     NAN,
     Alert,

@@ -10,7 +10,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import posterior_document, test_document
+from shm.documents import posterior_document
+from shm.modes_document import test_document
 from shm.store.blobs import pack_response, pack_samples
 from shm.store.database import Database, insert
 from shm.store.files import in_force

@@ -30,7 +30,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 from docs.filling import fill_in
-from shm.documents import dump, format_time, modes_document
+from shm.documents import dump, format_time
+from shm.modes_document import modes_document
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
 from shm.store import Stage, Store, Workspace

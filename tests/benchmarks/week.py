@@ -27,7 +27,8 @@ import numpy as np
 
 from docs.filling import fill_in
 from shm.bridge import Hook
-from shm.documents import dump, modes_document
+from shm.documents import dump
+from shm.modes_document import modes_document
 from shm.resources import one_thread_a_process
 from shm.store import Stage, Workspace
 from shm.values import Alert, ModalTest, Mode

@@ -20,9 +20,9 @@ from shm.blind.making.planting import Site, planted_effects
 from shm.blind.making.traces import of_one_instant, padded
 from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
-from shm.documents import load_modes
 from shm.errors import UsageError
 from shm.models.effects import EFFECTS
+from shm.modes_document import load_modes
 from shm.read import read
 from shm.simulate import (
     PLANTED,

@@ -18,8 +18,8 @@ from shm.blind.making.mix import Draft
 from shm.blind.solving import solve_left_out, solve_trial, solved
 from shm.blind.solving.guard import Refused, guard
 from shm.blind.workers import workers
-from shm.documents import load_modes
 from shm.errors import BadInput, NothingThere, ShmError
+from shm.modes_document import load_modes
 from shm.values import Answer
 from tests.helpers.blind_workers import in_this_process
 

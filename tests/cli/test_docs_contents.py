@@ -12,7 +12,7 @@ from types import ModuleType
 import pytest
 from sphinx.errors import SphinxError
 
-from shm.documents import load_modes
+from shm.modes_document import load_modes
 from shm.read import peek, sidecar_path
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.models.effects import EFFECTS
+from shm.modes_document import modes_document
 from shm.store import Workspace
 from shm.values import PLANES, ModalTest, Mode
 from tests.cli.conftest import Shm

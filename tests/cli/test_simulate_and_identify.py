@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shm.bridge import load_hanger
-from shm.documents import load_modes
 from shm.models import THESIS, build
+from shm.modes_document import load_modes
 from shm.read import read
 from shm.values import Recording
 from shm_cli.main import run

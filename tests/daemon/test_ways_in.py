@@ -14,8 +14,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.errors import UsageError
+from shm.modes_document import modes_document
 from shm.store import Stage, Workspace
 from shm_daemon.web.address import Address
 from shm_daemon.web.beside import web_beside

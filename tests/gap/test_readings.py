@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.documents import dump, modes_document, parse_modes
+from shm.documents import dump
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.hanger import PhysicalHanger, solve
+from shm.modes_document import modes_document, parse_modes
 from shm.values import NAN, FloatArray, ModalTest, Mode, Supports
 from tests.helpers.hangers import HANGER_3
 

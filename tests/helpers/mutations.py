@@ -22,7 +22,8 @@ import h5py
 import numpy as np
 import scipy.io
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
+from shm.modes_document import modes_document
 from shm.read import bundle, sidecar_path, write
 from shm.values import Channel, FrequencyResponse, ModalTest, Mode, Recording, ResponsePoint
 

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.models import THESIS, build
+from shm.modes_document import modes_document
 from shm.store import Workspace
 from shm.values import PLANES, Hanger, ModalTest, Mode
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import shm.identify
-from shm.documents import dump, modes_document, parse_modes
+from shm.documents import dump
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import IDENTIFIERS, Identification, IdentifyOptions, identify
+from shm.modes_document import modes_document, parse_modes
 from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
 from shm.values import PLANES, FrequencyResponse, Hanger, Recording, ResponsePoint
 from tests.identify.signals import BIAXIAL, Planted, Sensor, hanger_modes, recording

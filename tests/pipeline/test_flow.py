@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.errors import ShmError, StoreBusy, StoreError, UsageError
+from shm.modes_document import modes_document
 from shm.pipeline import steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Store, Workspace

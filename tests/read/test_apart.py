@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.documents import dump, modes_document
-from shm.documents import load_modes as load_modes_here
+from shm.documents import dump
 from shm.errors import BadInput
+from shm.modes_document import load_modes as load_modes_here
+from shm.modes_document import modes_document
 from shm.read import FORMATS, Format, apart, bundle, peek_test, read_test, write
 from shm.read.apart import asking
 from shm.values import FrequencyResponse, ModalTest, Mode, Recording

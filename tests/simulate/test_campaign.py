@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from shm.documents import dump, modes_document, parse_modes
+from shm.documents import dump
 from shm.errors import UsageError
+from shm.modes_document import modes_document, parse_modes
 from shm.simulate import (
     CampaignPlan,
     Deviations,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.documents import load_modes
+from shm.modes_document import load_modes
 from shm.read import FORMATS, read
 from shm.values import ModalTest, Recording
 from shm_cli.main import run

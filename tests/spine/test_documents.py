@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shm.documents import dump, load_modes, modes_document, parse_modes, parse_time, summary
+from shm.documents import dump, parse_time, summary
 from shm.errors import BadInput
+from shm.modes_document import load_modes, modes_document, parse_modes
 from shm.values import AddedMass, ModalTest, Mode, ShapePoint
 
 FULL = ModalTest(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.documents import load_modes
 from shm.inference import UpdateOptions, select
 from shm.models import THESIS, build
+from shm.modes_document import load_modes
 from shm.values import Hanger, Posterior, Selection
 from shm_cli import thesis
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Path, Query, Request
 from fastapi.responses import JSONResponse, Response
 
-from shm import documents
+from shm import modes_document
 from shm.errors import NothingThere
 from shm.report.verdicts import overall
 from shm.store import FormerPosterior, FormerTest
@@ -94,7 +94,7 @@ def test(_: Reader, view: View) -> Any:
     before, after = view.store.beside(stored)
     response = sheet.identification.frequency_response
     return {
-        "test": documents.test_document(stored.test),
+        "test": modes_document.test_document(stored.test),
         "hanger": stored.hanger,
         "time": stored.time,
         "stage": stored.stage.value,

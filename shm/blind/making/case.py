@@ -12,8 +12,9 @@ from shm.blind.making.mix import Draft
 from shm.blind.making.plans import PLANS
 from shm.blind.making.planting import Site, planted_effects
 from shm.bridge import load_hanger
-from shm.documents import dump, modes_document
+from shm.documents import dump
 from shm.errors import UsageError
+from shm.modes_document import modes_document
 from shm.read.single import write_single
 from shm.simulate import PLANTED, CampaignTruth, PlantedEffect, campaign_with_truth, drawn_hanger
 from shm.simulate.recorded import Recorder, recorded

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from shm.documents import parse_modes
 from shm.errors import BadInput
+from shm.modes_document import parse_modes
 from shm.read.apart.answers import Answer, Refused, refusal_of, value_of
 from shm.read.apart.asking import Request, ask
 from shm.read.apart.sound import refuse_unsound, refuse_unsound_look

@@ -18,8 +18,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from shm.documents import dump, load_modes, modes_document
+from shm.documents import dump
 from shm.errors import BadInput, ShmError
+from shm.modes_document import load_modes, modes_document
 from shm.read.apart.answers import LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.apart.asking import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.apart.confinement import Confinement, confine, pythons_own

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from shm import documents
+from shm import modes_document
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.summary import summary
 from shm.report.verdicts import overall
@@ -22,7 +22,7 @@ def test_json(sheet: TestSheet) -> dict[str, Any]:
         "hanger": found.test.hanger,
         "verdict": overall(found.quality),
         "summary": summary(sheet),
-        "test": documents.test_document(found.test),
+        "test": modes_document.test_document(found.test),
         "quality": [asdict(check) for check in found.quality],
         "set_aside": [asdict(each) for each in found.set_aside],
         "hits": [asdict(hit) for hit in found.hits],
