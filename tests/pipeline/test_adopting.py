@@ -279,7 +279,8 @@ def test_where_an_effect_sits_stays_as_diagnosed_and_its_size_is_free(begun: Wor
 
 
 def _with_temperature(test: ModalTest, temperature_c: float) -> str:
-    from shm.documents import dump, modes_document
+    from shm.documents import dump
+    from shm.modes_document import modes_document
 
     return dump(modes_document([replace(test, temperature_c=temperature_c)]))
 
