@@ -15,6 +15,7 @@ import numpy as np
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
 from shm.gap.turns import told_apart
+from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
@@ -109,7 +110,7 @@ def _tension_shifts(tests: Sequence[ModalTest]) -> FloatArray:
     The level of all readings is left open, as is an error that they share. A test without a reading
     is taken at the mean, and where fewer than two tests have one it says nothing.
     """
-    read = np.array([(test.tension_read_n, test.tension_read_sd_n) for test in tests])
+    read = np.array([(test.tension_read_n, reading_sd_n(test)) for test in tests])
     known = np.isfinite(read).all(axis=1)
     if known.sum() < _FEWEST_READINGS:
         return np.zeros((len(tests), 2))

@@ -59,7 +59,9 @@ Bulletin 30, Acceptance of stay cable systems)."""
 def reading_of(tests: Sequence[ModalTest]) -> TensionReading | None:
     """The readings of all tests as one, weighted by their precision; None where there is none."""
     values = [
-        (test.tension_read_n, _sd_of(test)) for test in tests if math.isfinite(test.tension_read_n)
+        (test.tension_read_n, reading_sd_n(test))
+        for test in tests
+        if math.isfinite(test.tension_read_n)
     ]
     if not values:
         return None
@@ -69,7 +71,8 @@ def reading_of(tests: Sequence[ModalTest]) -> TensionReading | None:
     return TensionReading(mean, float(weight.sum() ** -0.5) / mean)
 
 
-def _sd_of(test: ModalTest) -> float:
+def reading_sd_n(test: ModalTest) -> float:
+    """Standard deviation of a test's reading (N): as stated, else that of an ordinary lift-off."""
     known = math.isfinite(test.tension_read_sd_n) and test.tension_read_sd_n > 0
     return test.tension_read_sd_n if known else UNKNOWN_READING_SD * test.tension_read_n
 

@@ -14,6 +14,7 @@ from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
+from shm.inference.priors import UNKNOWN_READING_SD, reading_of
 from shm.models.hanger import PhysicalHanger, solve
 from shm.modes_document import modes_document, parse_modes
 from shm.values import NAN, FloatArray, ModalTest, Mode, Supports
@@ -97,15 +98,35 @@ def test_a_reading_survives_the_modes_document_and_is_absent_where_there_was_non
 @pytest.mark.parametrize(
     "values",
     [
-        {"tension_read_n": 6e5},
         {"tension_read_sd_n": 1e4},
         {"tension_read_n": 6e5, "tension_read_sd_n": 0.0},
         {"tension_read_n": -1.0, "tension_read_sd_n": 1.0},
     ],
 )
-def test_a_reading_without_a_standard_deviation_is_refused(values: dict[str, float]) -> None:
+def test_a_reading_that_is_none_is_refused(values: dict[str, float]) -> None:
     tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
     document = json.loads(dump(modes_document(tests)))
     document["tests"][0] |= values
     with pytest.raises(BadInput, match="tension_read"):
         parse_modes(document)
+
+
+def test_a_reading_without_a_standard_deviation_is_taken_as_an_ordinary_lift_off() -> None:
+    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
+    document = json.loads(dump(modes_document(tests)))
+    document["tests"][0] |= {"tension_read_n": 6e5}
+    (test,) = parse_modes(document)
+    assert np.isnan(test.tension_read_sd_n)
+    reading = reading_of([test])
+    assert reading is not None
+    assert (reading.tension_n, reading.sd) == (6e5, UNKNOWN_READING_SD)
+
+
+def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:
+    stated = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, 650e3), SD_N)
+    silent = [replace(test, tension_read_sd_n=NAN) for test in stated]
+    shifts = [
+        [each.tension_shift_n for each in observed(tests, HANGER_3).design.conditions]
+        for tests in (stated, silent)
+    ]
+    assert shifts[0] == shifts[1] == [-25e3, 25e3]
