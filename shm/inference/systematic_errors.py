@@ -20,7 +20,7 @@ from shm.values import FloatArray, Hanger, IntArray
 Ends: TypeAlias = tuple[EndWaves, EndWaves]
 """The deck's and the arch's."""
 
-_SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
+_SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.05
 """Piezo-electric and MEMS accelerometers for structures with magnet, base and cable end: 20 to 90 g
 (makers' data sheets)."""
 
