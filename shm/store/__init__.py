@@ -12,16 +12,21 @@ from shm.store.glances import (
     TestRow,
     TrendPoint,
 )
+from shm.store.judging import Judged
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
+    ENDED,
     Acknowledgement,
     Adoption,
     Baseline,
+    Decision,
     Delivery,
     DeliveryState,
     Event,
     FormerPosterior,
     FormerTest,
+    HeldTest,
+    Hold,
     IdentifiedTest,
     KeptWatch,
     Lineage,
@@ -47,6 +52,7 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM",
+    "ENDED",
     "Acknowledgement",
     "ActiveLock",
     "Adoption",
@@ -54,6 +60,7 @@ __all__ = [
     "Archive",
     "Baseline",
     "BaselineGlance",
+    "Decision",
     "Delivery",
     "DeliveryRow",
     "DeliveryState",
@@ -62,7 +69,10 @@ __all__ = [
     "FormerPosterior",
     "FormerTest",
     "HangerEvent",
+    "HeldTest",
+    "Hold",
     "IdentifiedTest",
+    "Judged",
     "KeptWatch",
     "Lineage",
     "Numbers",

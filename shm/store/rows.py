@@ -15,6 +15,8 @@ from shm.values import (
     NAN,
     Alert,
     Diagnosis,
+    Doubt,
+    Fingerprint,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
@@ -34,6 +36,11 @@ class Stage(StrEnum):
     WATCHED = "watched"
     DONE = "done"
     REFUSED = "refused"
+    HELD = "held"  # implausible: counts in nothing until a person has confirmed it
+
+
+ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
+"""Where a recording waits for no step: it is through, or for a person to look at."""
 
 
 class Outcome(StrEnum):
@@ -43,6 +50,15 @@ class Outcome(StrEnum):
     RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
     DUPLICATE = "duplicate"  # the same bytes dropped again
     REOPENED = "reopened"  # refused before, dropped again: tried again
+    REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
+
+
+class Decision(StrEnum):
+    """What a person made of a held recording; `REPLACED`: it was done again before one had."""
+
+    CONFIRMED = "confirmed"
+    DISCARDED = "discarded"
+    REPLACED = "replaced"
 
 
 class DeliveryState(StrEnum):
@@ -74,7 +90,10 @@ def checksum_of(document: object) -> str:
 
 @dataclass(frozen=True)
 class ReceivedFile:
-    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive."""
+    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive.
+
+    `modified_at` is when the file was last written, as its folder says; copying resets that.
+    """
 
     sha256: str
     file_name: str
@@ -82,6 +101,51 @@ class ReceivedFile:
     arrival: str
     archived_as: str | None = None
     sidecar_as: str | None = None
+    modified_at: datetime | None = None
+
+
+@dataclass(frozen=True)
+class HeldTest:
+    """One test that is held and why: its place in its file, and the shift of the tension that it
+    implies (a fraction, NaN where that cannot be said)."""
+
+    position: int
+    name: str
+    doubts: tuple[Doubt, ...]
+    tension_shift: float = NAN
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A recording that is or was held; `message` is what its owner was told of it.
+
+    `time` is the one that a person gave its test. All of `decision`, `decided_at`, `who`, `why` are
+    empty while nobody has decided.
+    """
+
+    id: int
+    recording_id: int
+    file_name: str
+    hanger: int
+    held_at: datetime
+    message: str
+    tests: tuple[HeldTest, ...]
+    sidecar_as: str | None = None
+    decision: Decision | None = None
+    decided_at: datetime | None = None
+    who: str = ""
+    why: str = ""
+    time: datetime | None = None
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Of all its tests, each check once."""
+        return tuple({d.check: d for test in self.tests for d in test.doubts}.values())
+
+    @property
+    def time_unknown(self) -> bool:
+        """Whether the time that its test claims is certainly wrong."""
+        return any(doubt.time_unknown for doubt in self.doubts)
 
 
 @dataclass(frozen=True)
@@ -108,7 +172,8 @@ class Receipt:
 class IdentifiedTest:
     """A test to be stored: its place in its file, its frequency response, what was dropped.
 
-    `quality` and `set_aside` are empty where a file gave the modes.
+    `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
+    of the test, `fingerprint` is that of their samples, None where the modes were given.
     """
 
     test: ModalTest
@@ -117,6 +182,8 @@ class IdentifiedTest:
     notes: tuple[str, ...] = ()
     quality: tuple[QualityCheck, ...] = ()
     set_aside: tuple[ForeignMode, ...] = ()
+    times: tuple[datetime, ...] = ()
+    fingerprint: Fingerprint | None = None
 
 
 @dataclass(frozen=True, eq=False)
