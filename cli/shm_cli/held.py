@@ -1,4 +1,4 @@
-"""`shm ingest --held`, `--confirm ID` and `--discard ID`: what waits for a person, and its answer."""
+"""`shm ingest --held`, `--confirm ID`, `--discard ID`: what waits for a person, and the answer."""
 
 from __future__ import annotations
 

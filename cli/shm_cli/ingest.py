@@ -64,6 +64,7 @@ from shm_cli.working import finish, working
 @click.pass_context
 def command(
     ctx: click.Context,
+    /,
     files: tuple[Path, ...],
     together: bool,
     look: bool,
