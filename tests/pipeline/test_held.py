@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
 import pytest
 
 from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import modes_document
+from shm.read import write
+from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, Workspace
-from shm.values import ModalTest
+from shm.values import ModalTest, Recording
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
+from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test, put
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
@@ -289,3 +293,67 @@ def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> 
         receipt = flow.receive(held.spool / "lost.modes.json")
         assert receipt.outcome is Outcome.DUPLICATE
         assert flow.store.recording(2).stage is Stage.HELD
+
+
+def a_recording(seed: int = 1) -> Recording:
+    state = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
+    plan, rng = HammerPlan(hits=3), np.random.default_rng(seed)
+    return hammer_test(HANGER_3, state, plan, rng, time=day(0), source="s")
+
+
+def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Workspace) -> None:
+    """It confirmed itself: the watch calls a change at the second test that shows it."""
+    first = a_recording()
+    write(first, workspace.spool / "a.npz")
+    ingest(workspace)
+    scaled = [replace(c, values=c.values[5:] * 1.0) for c in first.channels[::-1]]
+    again = replace(first, channels=tuple(scaled), time=day(30))
+    for name in ("b.uff", "c.csv", "d.h5"):
+        write(again, workspace.spool / name)
+        ingest(workspace)
+    write(replace(a_recording(2), time=day(60)), workspace.spool / "e.npz")
+    ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["a", "e"]
+        assert [hold.file_name for hold in store.holds()] == ["b.uff", "c.csv", "d.h5"]
+        for hold in store.holds():
+            assert "copy" in [doubt.check for doubt in hold.doubts]
+            assert "again" in hold.message
+
+
+def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace) -> None:
+    write(a_recording(), workspace.spool / "a.uff")  # its sidecar says hanger 3
+    raw = (workspace.spool / "a.uff").read_bytes()
+    sidecar = (workspace.spool / "a.toml").read_text()
+    ingest(workspace)
+    with workspace.store() as store:
+        (before,) = store.tests(3)
+    put(workspace.spool / "a.toml", sidecar.replace("2026-05-01", "2026-05-09"))
+    put(workspace.spool / "a.uff", raw)
+    with a_flow(workspace) as flow:
+        receipt = flow.receive(workspace.spool / "a.uff")
+        assert receipt.outcome is Outcome.REDESCRIBED
+        flow.drain()
+        (after,) = flow.store.tests(3)
+        assert after.time == before.time + timedelta(days=8)
+        assert after.lineage.input_sha256 != before.lineage.input_sha256
+        former, _ = flow.store.former_tests(1)
+        assert former.superseded_at is not None
+        assert list(workspace.spool.iterdir()) == []
+
+
+def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
+    write(replace(a_recording(), time=EPOCH), workspace.spool / "a.uff")
+    raw = (workspace.spool / "a.uff").read_bytes()
+    sidecar = (workspace.spool / "a.toml").read_text()
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.stage_counts()[Stage.HELD] == 1
+    put(workspace.spool / "a.toml", sidecar.replace("1970-01-01", "2026-05-09"))
+    put(workspace.spool / "a.uff", raw)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.holds() == ()
+        assert store.recording(1).stage is Stage.DONE
+        (notice,) = store.alerts()
+        assert notice.acknowledgement is not None
