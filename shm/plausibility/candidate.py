@@ -91,9 +91,14 @@ def _slopes(hanger: Hanger, modes: int) -> FloatArray:
 
 
 def frequency_change(test: ModalTest, reference: Sequence[ModalTest]) -> float:
-    """The median change of the frequencies from the reference's, a fraction; NaN: none shared."""
+    """By which fraction the lowest frequencies differ from the reference's; NaN: none shared.
+
+    Those of the lowest order that both have, which tells most of the tension.
+    """
     change = _shared(test, reference)
-    return float(np.expm1(np.median(list(change.values())))) if change else NAN
+    lowest = min((order for _, order in change), default=0)
+    shift = [value for (_, order), value in change.items() if order == lowest]
+    return float(np.expm1(np.mean(shift))) if shift else NAN
 
 
 def _shared(test: ModalTest, reference: Sequence[ModalTest]) -> dict[tuple[str, int], float]:

@@ -45,5 +45,5 @@ def _loss(candidate: Candidate, others: Sequence[float]) -> str:
     return (
         f"Hanger {hanger.id} may have {moved} {100 * abs(shift):.0f} % of its tension: {say}. "
         "Repeat the test today, with the logger's clock set. "
-        f"Its frequencies are {100 * abs(change):.1f} % {side} the last ones."
+        f"Its lowest frequencies are {100 * abs(change):.1f} % {side} the last ones."
     )
