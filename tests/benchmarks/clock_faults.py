@@ -1,6 +1,6 @@
 """How often a loss of a tenth is told of by its second test, whatever the logger's clock says.
 
-`python tests/benchmarks/clock_faults.py 50`: so many bridges a fault.
+`python tests/benchmarks/clock_faults.py 50`: so many bridges a fault, of all faults or those named.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def main() -> None:
     number = int(sys.argv[1])
     for verb in ("update", "refresh", "select"):
         setattr(steps, verb, getattr(quick_update, verb))
-    for fault in FAULTS:
+    for fault in sys.argv[2:] or FAULTS:
         with TemporaryDirectory() as folder:
             found = [one_case(fault, seed, Path(folder)) for seed in range(number)]
         told = sum(each.told for each in found)

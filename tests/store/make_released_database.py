@@ -82,10 +82,10 @@ def _hold(store: Store) -> None:
         recording = store.receive(a_file(number, modified_at=NOW), NOW).recording
         doubt = Doubt(check, "its time cannot be that", "Confirm it", "No clock was there.", True)
         held = HeldTest(0, f"t{number}", (doubt,), -0.1)
-        notice = replace(an_alert("", f"t{number}"), drifts=(), kinds=("held",))
+        notice = replace(an_alert("", f"t{number}"), hanger=5, drifts=(), kinds=("held",))
         print_ = Fingerprint(f"{number:064x}", np.ones((1, 256)) / 16)
         judged = Judged(None, print_, (held,), notice, ["mail"])
-        found = [IdentifiedTest(a_test(f"t{number}", number))]
+        found = [IdentifiedTest(a_test(f"t{number}", number, hanger=5))]
         store.identified(recording.id, found, LINEAGE, NOW, judged)
     later = NOW + timedelta(days=9)
     store.confirm(5, "engineer", "battery was flat", later, later)

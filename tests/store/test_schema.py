@@ -137,7 +137,7 @@ def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> N
         (waits,) = store.holds()
         assert [(test.name, test.tension_shift) for test in waits.tests] == [("t6", -0.1)]
         assert [doubt.check for doubt in waits.doubts] == ["copy"]
-        known = store.known_samples(7, 3, Fingerprint("0" * 64, np.ones((1, 256))))
+        known = store.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
         assert [each.fingerprint.shapes.shape for each in known] == [(1, 256)] * 2
         assert store.recording(5).file.modified_at == NOW
 
