@@ -12,6 +12,7 @@ from shm.store.glances import (
     TestRow,
     TrendPoint,
 )
+from shm.store.hold_rows import Decision, HeldTest, Hold
 from shm.store.judging import Judged
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
@@ -19,14 +20,11 @@ from shm.store.rows import (
     Acknowledgement,
     Adoption,
     Baseline,
-    Decision,
     Delivery,
     DeliveryState,
     Event,
     FormerPosterior,
     FormerTest,
-    HeldTest,
-    Hold,
     IdentifiedTest,
     KeptWatch,
     Lineage,

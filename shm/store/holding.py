@@ -15,10 +15,11 @@ from shm.modes_document import test_document
 from shm.store.blobs import test_from_document
 from shm.store.database import insert
 from shm.store.files import counts, in_force, write_event
+from shm.store.hold_rows import Decision, Hold
 from shm.store.judging import fingerprint_from, held_tests_from, notice_key
 from shm.store.queries import Queries, plain_tests
 from shm.store.results import advance_recordings
-from shm.store.rows import Decision, Hold, Stage, StoredTest
+from shm.store.rows import Stage, StoredTest
 from shm.store.stepping import write_step
 from shm.store.tables import acknowledgements, alerts, fingerprints, holds, recordings, tests
 from shm.values import Fingerprint, KnownSamples

@@ -13,8 +13,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.store.blobs import number, pack, unpack
 from shm.store.database import insert
 from shm.store.files import in_force, write_event
+from shm.store.hold_rows import HeldTest
 from shm.store.outbox import raise_alert
-from shm.store.rows import HeldTest, Stage, StoredAlert
+from shm.store.rows import Stage, StoredAlert
 from shm.store.stepping import write_step
 from shm.store.tables import fingerprints, holds, recordings, tests
 from shm.values import Alert, Doubt, Fingerprint

@@ -15,7 +15,6 @@ from shm.values import (
     NAN,
     Alert,
     Diagnosis,
-    Doubt,
     Fingerprint,
     ForeignMode,
     FrequencyResponse,
@@ -51,14 +50,6 @@ class Outcome(StrEnum):
     DUPLICATE = "duplicate"  # the same bytes dropped again
     REOPENED = "reopened"  # refused before, dropped again: tried again
     REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
-
-
-class Decision(StrEnum):
-    """What a person made of a held recording; `REPLACED`: it was done again before one had."""
-
-    CONFIRMED = "confirmed"
-    DISCARDED = "discarded"
-    REPLACED = "replaced"
 
 
 class DeliveryState(StrEnum):
@@ -102,50 +93,6 @@ class ReceivedFile:
     archived_as: str | None = None
     sidecar_as: str | None = None
     modified_at: datetime | None = None
-
-
-@dataclass(frozen=True)
-class HeldTest:
-    """One test that is held and why: its place in its file, and the shift of the tension that it
-    implies (a fraction, NaN where that cannot be said)."""
-
-    position: int
-    name: str
-    doubts: tuple[Doubt, ...]
-    tension_shift: float = NAN
-
-
-@dataclass(frozen=True)
-class Hold:
-    """A recording that is or was held; `message` is what its owner was told of it.
-
-    `time` is the one that a person gave its test. All of `decision`, `decided_at`, `who`, `why` are
-    empty while nobody has decided.
-    """
-
-    id: int
-    recording_id: int
-    file_name: str
-    hanger: int
-    held_at: datetime
-    message: str
-    tests: tuple[HeldTest, ...]
-    sidecar_as: str | None = None
-    decision: Decision | None = None
-    decided_at: datetime | None = None
-    who: str = ""
-    why: str = ""
-    time: datetime | None = None
-
-    @property
-    def doubts(self) -> tuple[Doubt, ...]:
-        """Of all its tests, each check once."""
-        return tuple({d.check: d for test in self.tests for d in test.doubts}.values())
-
-    @property
-    def time_unknown(self) -> bool:
-        """Whether the time that its test claims is certainly wrong."""
-        return any(doubt.time_unknown for doubt in self.doubts)
 
 
 @dataclass(frozen=True)
