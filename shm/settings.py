@@ -96,7 +96,7 @@ class Settings:
         2.0, "s", "a file is whole once unchanged for so long", 0, 3600
     )
     future_tolerance_seconds: float = _row(
-        3600.0, "s", "how far ahead of the clock a test may claim to be", 0, None
+        86400.0, "s", "a test further ahead of the clock is held; zones differ by 14 hours", 0, None
     )
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
     max_channels: int = _row(16, "", "accelerations that one file may hold", 1, 1000)

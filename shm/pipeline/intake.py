@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import uuid
 from collections import Counter
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from shm.errors import BadInput
@@ -53,6 +53,7 @@ def receive(
     name, spooled = _place(path, workspace.spool)
     path = path.parent.resolve() / path.name
     sidecar, archive = sidecar_path(path), workspace.archive
+    modified_at = _modified(path)
     kept_sidecar = archive.keep(sidecar) if _is_plain(sidecar) else None
     kept = archive.keep(path, follow=not spooled)
     file = ReceivedFile(
@@ -62,11 +63,20 @@ def receive(
         kept.entry if spooled else uuid.uuid4().hex,
         kept.archived_as,
         kept_sidecar.archived_as if kept_sidecar else None,
+        modified_at,
     )
     receipt = store.receive(file, at)
     if spooled:
         _remove(path, kept, kept_sidecar, sharing or Sharing())
     return receipt
+
+
+def _modified(path: Path) -> datetime | None:
+    """When the file was last written; None where its folder says something impossible."""
+    try:
+        return datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    except (OSError, OverflowError, ValueError):
+        return None
 
 
 def _place(path: Path, spool: Path) -> tuple[Path, bool]:

@@ -13,6 +13,7 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
+from shm.pipeline.judging import judge
 from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import Taught, identify_lineage, update_terms
 from shm.pipeline.watching import to_watch
@@ -166,9 +167,11 @@ class Jobs:
         run = partial(step, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))
 
-    def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> None:
+    def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> object:
+        """What is implausible is held: kept with the rest, and counted in nothing."""
         lineage = identify_lineage(recording, found[0].test.hanger, self.workspace)
-        self.store.identified(recording.id, found, lineage, self.clock())
+        found, judged = judge(self.workspace, self.store, recording, found)
+        return self.store.identified(recording.id, found, lineage, self.clock(), judged)
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.test(test.id) for test in first]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta
 from pathlib import Path
 
 from shm.bridge import Bridge
-from shm.documents import format_time
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
 from shm.inference import refresh, select, update
@@ -17,6 +15,7 @@ from shm.models import build
 from shm.pipeline.calibrating import options_of
 from shm.pipeline.parcel import Opens
 from shm.pipeline.terms import Terms, competing, identify_settings, read_limits
+from shm.plausibility import fingerprint_of
 from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
@@ -38,15 +37,13 @@ def identify_file(
     test, and so must every competing class where none is selected yet.
     """
     _refuse_size(recording.file.size_bytes, settings.max_file_bytes)
-    latest = recording.received_at + timedelta(seconds=settings.future_tolerance_seconds)
     with archive.opened(recording.file) as path:
         if path.name.lower().endswith(MODES_SUFFIX):
             found = _tests_in(path, read_limits(settings))
         else:
-            found = (_test_in(path, bridge, settings, latest),)
+            found = (_test_in(path, bridge, settings),)
     for item in found:
         hanger = _hanger(item.test.hanger, bridge)
-        _refuse_future(item.test.time, latest, f"test {item.test.id}")
         for model in competing(hanger, settings, selected):
             model.refuse(item.test)
     return found
@@ -70,11 +67,9 @@ def _tests_in(path: Path, limits: Limits) -> tuple[IdentifiedTest, ...]:
     return tuple(IdentifiedTest(test, position) for position, test in enumerate(tests))
 
 
-def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -> IdentifiedTest:
+def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     records = read_test(path, read_limits(settings))
     hanger = _hanger(records[0].hanger, bridge)
-    for record in records:
-        _refuse_future(record.time, latest, "the recording")
     options = identify_options(settings, bridge)
     result = identify(records, options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
@@ -84,6 +79,8 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -
         notes=(*result.notes, *dropped),
         quality=result.quality,
         set_aside=result.set_aside,
+        times=tuple(record.time for record in records if record.time is not None),
+        fingerprint=fingerprint_of(records),
     )
 
 
@@ -99,14 +96,6 @@ def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
             "the file names no hanger.", remedy="Give `hanger` in its header or its sidecar."
         )
     return bridge.hanger(hanger_id)
-
-
-def _refuse_future(time: datetime | None, latest: datetime, what: str) -> None:
-    if time is not None and time > latest:
-        raise BadInput(
-            f"{what} claims the time {format_time(time)}, ahead of the clock.",
-            remedy="Correct its `time`, or the clock of the logger.",
-        )
 
 
 def select_model(

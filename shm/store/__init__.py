@@ -12,8 +12,11 @@ from shm.store.glances import (
     TestRow,
     TrendPoint,
 )
+from shm.store.hold_rows import Decision, HeldTest, Hold
+from shm.store.judging import Judged
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
+    ENDED,
     Acknowledgement,
     Adoption,
     Baseline,
@@ -47,6 +50,7 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM",
+    "ENDED",
     "Acknowledgement",
     "ActiveLock",
     "Adoption",
@@ -54,6 +58,7 @@ __all__ = [
     "Archive",
     "Baseline",
     "BaselineGlance",
+    "Decision",
     "Delivery",
     "DeliveryRow",
     "DeliveryState",
@@ -62,7 +67,10 @@ __all__ = [
     "FormerPosterior",
     "FormerTest",
     "HangerEvent",
+    "HeldTest",
+    "Hold",
     "IdentifiedTest",
+    "Judged",
     "KeptWatch",
     "Lineage",
     "Numbers",

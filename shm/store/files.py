@@ -1,4 +1,4 @@
-"""Verbs on received files: take in, refuse, look up."""
+"""Verbs on received files: refuse, look up."""
 
 from __future__ import annotations
 
@@ -11,25 +11,13 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
 from shm.store.database import Database, insert
-from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
-from shm.store.stepping import ARCHIVED, write_step
+from shm.store.rows import Event, ReceivedFile, Stage, StoredRecording
+from shm.store.stepping import write_step
 from shm.store.tables import events, recordings, tests
 
 
 class Files(Database):
     """The part of the store that keeps account of the files."""
-
-    def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
-        """Enters a file that is safe in the archive. The same bytes are never entered twice."""
-        with self.writing() as connection:
-            known = _by_checksum(connection, file.sha256)
-            outcome = _outcome(known, file)
-            if known is None:
-                row_id = _enter(connection, file, at)
-            else:
-                row_id = known.id
-                _notice(connection, known, file, outcome, at)
-            return Receipt(outcome, recording_from(_by_id(connection, row_id)))
 
     def refuse(
         self,
@@ -46,7 +34,7 @@ class Files(Database):
         the step that failed here, or refused it already.
         """
         with self.writing() as connection:
-            row = _by_id(connection, recording_id)
+            row = by_id(connection, recording_id)
             if stage is not None and not _waits(connection, row, stage, test_ids):
                 return
             test_ids = _own(connection, recording_id, test_ids)
@@ -66,17 +54,17 @@ class Files(Database):
     def waits(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
         """Whether a recording, or its tests where some are named, are still at a stage."""
         with self.reading() as connection:
-            return _waits(connection, _by_id(connection, recording_id), stage, test_ids)
+            return _waits(connection, by_id(connection, recording_id), stage, test_ids)
 
     def recording(self, recording_id: int) -> StoredRecording:
         """Raises NothingThere."""
         with self.reading() as connection:
-            return recording_from(_by_id(connection, recording_id))
+            return recording_from(by_id(connection, recording_id))
 
     def recording_of(self, sha256: str) -> StoredRecording | None:
         """The recording with these bytes, if it was received."""
         with self.reading() as connection:
-            row = _by_checksum(connection, sha256)
+            row = by_checksum(connection, sha256)
         return None if row is None else recording_from(row)
 
     def recordings(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
@@ -115,12 +103,12 @@ class Files(Database):
             return tuple(recording_from(row) for row in connection.execute(query))
 
 
-def _by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
+def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
     query = sa.select(recordings).where(recordings.c.sha256 == sha256)
     return connection.execute(query).one_or_none()
 
 
-def _by_id(connection: Connection, recording_id: int) -> Row[Any]:
+def by_id(connection: Connection, recording_id: int) -> Row[Any]:
     query = sa.select(recordings).where(recordings.c.id == recording_id)
     row = connection.execute(query).one_or_none()
     if row is None:
@@ -146,57 +134,27 @@ def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -
 
 def recording_from(row: Row[Any]) -> StoredRecording:
     file = ReceivedFile(
-        row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
+        row.sha256,
+        row.file_name,
+        row.size_bytes,
+        row.arrival,
+        row.archived_as,
+        row.sidecar_as,
+        row.modified_at,
     )
     return StoredRecording(row.id, file, row.received_at, Stage(row.stage), row.hanger, row.reason)
 
 
-def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:
-    if known is None:
-        return Outcome.NEW
-    if known.arrival == file.arrival:
-        return Outcome.RESUMED
-    return Outcome.REOPENED if known.stage == Stage.REFUSED else Outcome.DUPLICATE
-
-
-def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
-    values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
-    row_id = insert(connection, recordings, values)
-    write_step(connection, row_id, ARCHIVED, at)
-    write_step(connection, row_id, Stage.RECEIVED, at)
-    return row_id
-
-
-def _notice(
-    connection: Connection, known: Row[Any], file: ReceivedFile, outcome: Outcome, at: datetime
-) -> None:
-    if outcome is Outcome.RESUMED:
-        return
-    message = "dropped again after its refusal; tried again."
-    if outcome is Outcome.REOPENED:
-        _reopen(connection, known.id, file, at)
-    else:
-        message = f"the same file as {known.file_name}; not stored twice."
-        if file.sidecar_as not in (None, known.sidecar_as):
-            message += " Its sidecar differs: the first one holds."
-    write_event(connection, at, outcome, known.id, file.file_name, message)
-
-
-def _reopen(connection: Connection, recording_id: int, file: ReceivedFile, at: datetime) -> None:
-    """A refused file starts anew; results it had before the refusal stay in force."""
-    refused = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.REFUSED)
-    connection.execute(sa.update(tests).where(refused, in_force(tests)).values(superseded_at=at))
-    connection.execute(
-        sa.update(recordings).where(recordings.c.id == recording_id).values(**vars(file))
-    )
-    begin_again(connection, recording_id, at)
-
-
 def begin_again(connection: Connection, recording_id: int, at: datetime) -> None:
     """A recording waits to be identified as if it had just come in."""
-    by_id = sa.update(recordings).where(recordings.c.id == recording_id)
-    connection.execute(by_id.values(stage=Stage.RECEIVED, reason=None))
+    own = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(own.values(stage=Stage.RECEIVED, reason=None))
     write_step(connection, recording_id, Stage.RECEIVED, at)
+
+
+def counts(table: sa.Table) -> sa.ColumnElement[bool]:
+    """What is neither refused nor held: all that is shown and computed with."""
+    return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
 def in_force(table: sa.Table) -> sa.ColumnElement[bool]:

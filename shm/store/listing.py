@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere
 from shm.store.blobs import change_from
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.glances import EventKind, HangerEvent, TestRow
 from shm.store.queries import Queries, baselines_now, plain_tests
 from shm.store.rows import Baseline, Stage, StoredTest, StoredWatch
@@ -127,7 +127,7 @@ class Listing(Queries, Watching):
 
 
 def _shown(hanger: int) -> sa.ColumnElement[bool]:
-    return (tests.c.hanger == hanger) & in_force(tests) & (tests.c.stage != Stage.REFUSED)
+    return (tests.c.hanger == hanger) & in_force(tests) & counts(tests)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

@@ -9,7 +9,7 @@ from datetime import datetime
 import sqlalchemy as sa
 
 from shm.store.database import Database
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.rows import DeliveryState, Stage
 from shm.store.tables import acknowledgements, alerts, deliveries, recordings, steps, tests
 
@@ -76,7 +76,7 @@ class Measuring(Database):
 
     def latest_tests(self) -> dict[int, LatestTest]:
         """How many tests in force each hanger has, and when the latest was taken."""
-        shown = (tests.c.stage != Stage.REFUSED) & in_force(tests)
+        shown = counts(tests) & in_force(tests)
         counted = (tests.c.hanger, sa.func.count().label("tests"), sa.func.max(tests.c.time))
         with self.reading() as connection:
             rows = connection.execute(sa.select(*counted).where(shown).group_by(tests.c.hanger))

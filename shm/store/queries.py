@@ -19,7 +19,7 @@ from shm.store.blobs import (
     unpack_response,
 )
 from shm.store.database import Database
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.rows import (
     Baseline,
     Lineage,
@@ -137,7 +137,7 @@ class Queries(Database):
 
     def tests(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
         """The tests of a hanger, or of all, by time; those refused are left out."""
-        query = plain_tests.where(tests.c.stage != Stage.REFUSED, in_force(tests))
+        query = plain_tests.where(counts(tests), in_force(tests))
         if hanger is not None:
             query = query.where(tests.c.hanger == hanger)
         return self._tests(query.order_by(tests.c.time, tests.c.id))
@@ -147,7 +147,7 @@ class Queries(Database):
         query = plain_tests.where(
             tests.c.hanger.in_(hangers),
             tests.c.time < before,
-            tests.c.stage != Stage.REFUSED,
+            counts(tests),
             in_force(tests),
             _WEIGHED,
         )

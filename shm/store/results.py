@@ -15,7 +15,8 @@ from shm.modes_document import test_document
 from shm.store.blobs import pack_response, pack_samples
 from shm.store.database import Database, insert
 from shm.store.files import in_force
-from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredTest
+from shm.store.judging import Judged, keep_judgement
+from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredAlert, StoredTest
 from shm.store.stepping import write_step
 from shm.store.tables import (
     baselines,
@@ -40,13 +41,20 @@ class Results(Database):
         found: Sequence[IdentifiedTest],
         lineage: Lineage,
         at: datetime,
-    ) -> None:
-        """Keeps the tests of a recording; does nothing where another process was first."""
+        judged: Judged | None = None,
+    ) -> StoredAlert | None:
+        """Keeps the tests of a recording; does nothing where another process was first.
+
+        Nor where it has another sidecar by now than it was `judged` with: it waits to be done with
+        that. The notice where tests of it are held.
+        """
         with self.writing() as connection:
             query = sa.select(recordings).where(recordings.c.id == recording_id)
             recording = connection.execute(query).one()
             if recording.stage != Stage.RECEIVED:
-                return
+                return None
+            if judged is not None and judged.sidecar_as != recording.sidecar_as:
+                return None
             kept = _positions(connection, recording_id)
             for item in (item for item in found if item.position not in kept):
                 values = {**_test_values(connection, item, recording), **vars(lineage)}
@@ -55,7 +63,9 @@ class Results(Database):
             hanger = found[0].test.hanger
             by_id = recordings.c.id == recording_id
             connection.execute(sa.update(recordings).where(by_id).values(hanger=hanger))
+            notice = keep_judgement(connection, recording, judged, at) if judged else None
             advance_recordings(connection, [recording_id], at)
+            return notice
 
     def selected(
         self,
@@ -109,13 +119,14 @@ def move(connection: Connection, chosen: Iterable[StoredTest], stage: Stage, at:
 
 
 def advance_recordings(connection: Connection, ids: Collection[int], at: datetime) -> None:
-    """A recording stands where the least advanced of its tests stands."""
+    """A recording stands where the least advanced of its tests stands, and is held with one."""
     for recording_id in ids:
         query = sa.select(tests.c.stage).where(
             tests.c.recording_id == recording_id, in_force(tests), tests.c.stage != Stage.REFUSED
         )
-        least = min(_PROGRESS.index(Stage(stage)) for stage in connection.scalars(query))
-        stage = Stage.DONE if _PROGRESS[least] is Stage.WATCHED else _PROGRESS[least]
+        stages = [Stage(stage) for stage in connection.scalars(query)]
+        stage = Stage.HELD if Stage.HELD in stages else min(stages, key=_PROGRESS.index)
+        stage = Stage.DONE if stage is Stage.WATCHED else stage
         moved = connection.execute(
             sa.update(recordings)
             .where(recordings.c.id == recording_id)

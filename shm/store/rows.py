@@ -15,6 +15,7 @@ from shm.values import (
     NAN,
     Alert,
     Diagnosis,
+    Fingerprint,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
@@ -34,6 +35,11 @@ class Stage(StrEnum):
     WATCHED = "watched"
     DONE = "done"
     REFUSED = "refused"
+    HELD = "held"  # implausible: counts in nothing until a person has confirmed it
+
+
+ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
+"""Where a recording waits for no step: it is through, or for a person to look at."""
 
 
 class Outcome(StrEnum):
@@ -43,6 +49,7 @@ class Outcome(StrEnum):
     RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
     DUPLICATE = "duplicate"  # the same bytes dropped again
     REOPENED = "reopened"  # refused before, dropped again: tried again
+    REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
 
 
 class DeliveryState(StrEnum):
@@ -74,7 +81,10 @@ def checksum_of(document: object) -> str:
 
 @dataclass(frozen=True)
 class ReceivedFile:
-    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive."""
+    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive.
+
+    `modified_at` is when the file was last written, as its folder says; copying resets that.
+    """
 
     sha256: str
     file_name: str
@@ -82,6 +92,7 @@ class ReceivedFile:
     arrival: str
     archived_as: str | None = None
     sidecar_as: str | None = None
+    modified_at: datetime | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +119,8 @@ class Receipt:
 class IdentifiedTest:
     """A test to be stored: its place in its file, its frequency response, what was dropped.
 
-    `quality` and `set_aside` are empty where a file gave the modes.
+    `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
+    of the test, `fingerprint` is that of their samples, None where the modes were given.
     """
 
     test: ModalTest
@@ -117,6 +129,8 @@ class IdentifiedTest:
     notes: tuple[str, ...] = ()
     quality: tuple[QualityCheck, ...] = ()
     set_aside: tuple[ForeignMode, ...] = ()
+    times: tuple[datetime, ...] = ()
+    fingerprint: Fingerprint | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,10 @@ from shm.store.adopting import Adopting
 from shm.store.alert_rows import AlertRows
 from shm.store.archive_copies import ArchiveCopies
 from shm.store.database import make_engine
-from shm.store.files import Files
+from shm.store.holding import Holding
 from shm.store.listing import Listing
 from shm.store.measuring import Measuring
+from shm.store.receiving import Receiving
 from shm.store.results import Results
 from shm.store.stepping import Stepping
 from shm.store.superseding import Superseding
@@ -28,8 +29,9 @@ from shm.store.upkeep import Upkeep
 
 
 class Store(
-    Files,
+    Receiving,
     Results,
+    Holding,
     Listing,
     AlertRows,
     Trends,

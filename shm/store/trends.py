@@ -27,10 +27,9 @@ from shm.errors import UsageError
 from shm.store.blobs import number, posterior_from
 from shm.store.columns import Number
 from shm.store.database import Database
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.glances import BaselineGlance, Numbers, TrendPoint
 from shm.store.queries import baselines_now, hidden, selection_numbers, selection_of
-from shm.store.rows import Stage
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
 from shm.values import NAN, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
@@ -173,7 +172,7 @@ class Trends(Database):
 
 
 def _shown_tests() -> sa.Select[Any]:
-    return sa.select(tests.c.id).where(in_force(tests), tests.c.stage != Stage.REFUSED)
+    return sa.select(tests.c.id).where(in_force(tests), counts(tests))
 
 
 def _shown() -> tuple[sa.ColumnElement[bool], ...]:

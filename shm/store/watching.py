@@ -11,10 +11,10 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document
 from shm.store.blobs import alert_from_document, watch_document, watch_from
 from shm.store.database import Database, insert
 from shm.store.files import in_force
+from shm.store.outbox import raise_alert
 from shm.store.results import all_at, move
 from shm.store.rows import (
     Acknowledgement,
@@ -74,9 +74,9 @@ class Watching(Database):
             if state is not None:
                 _keep_state(connection, baseline, state)
             move(connection, [test], Stage.WATCHED, at)
-            if alert is None or _is_raised(connection, alert):
+            if alert is None:
                 return None
-            return _raise(connection, test, baseline, alert, hooks, at)
+            return raise_alert(connection, test.id, baseline.id, alert, hooks, at)
 
     def kept_watch(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
@@ -196,32 +196,6 @@ def _drop_state(connection: Connection, baseline: Baseline) -> None:
     connection.execute(sa.delete(watch_states).where(former))
 
 
-def _is_raised(connection: Connection, alert: Alert) -> bool:
-    query = sa.select(alerts.c.id).where(alerts.c.key == alert.key)
-    return connection.execute(query).first() is not None
-
-
-def _raise(
-    connection: Connection,
-    test: StoredTest,
-    baseline: Baseline,
-    alert: Alert,
-    hooks: Sequence[str],
-    at: datetime,
-) -> StoredAlert:
-    values = {
-        **{name: getattr(alert, name) for name in ("key", "hanger", "time", "message")},
-        "test_id": test.id,
-        "baseline_id": baseline.id,
-        "raised_at": at,
-        "document": alert_document(alert),
-    }
-    alert_id = insert(connection, alerts, values)
-    for hook in hooks:
-        insert(connection, deliveries, _owed(alert_id, hook, at))
-    return StoredAlert(alert_id, alert, at)
-
-
 def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> bool:
     """Whether it was still owed: another process may have had an answer of the hook before."""
     owed = (deliveries.c.id == delivery.id) & (deliveries.c.state == DeliveryState.WAITING)
@@ -241,17 +215,6 @@ def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> 
         about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
         row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
         write_step(connection, row.recording_id, NOTIFIED, at, row.id)
-
-
-def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
-    return {
-        "alert_id": alert_id,
-        "hook": hook,
-        "state": DeliveryState.WAITING,
-        "attempts": 0,
-        "next_attempt_at": at,
-        "last_error": "",
-    }
 
 
 def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from shm.store.tables import (
 )
 
 _TIMES = {"time", "received_at", "identified_at", "updated_at", "raised_at", "ended_at", "at"}
+_TIMES |= {"modified_at"}
 _ROWS = {"id", "recording_id", "test_id", "baseline_id", "alert_id", "arrival", "seconds"}
 
 

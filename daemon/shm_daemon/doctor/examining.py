@@ -13,6 +13,7 @@ from shm.store import Workspace
 from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, unknown
 from shm_daemon.doctor.flowing import (
     check_daemon,
+    check_held,
     check_quarantine,
     check_raw_files,
     check_spool,
@@ -29,6 +30,7 @@ _CHECKS: Sequence[tuple[str, Check]] = (
     ("spool", check_spool),
     ("recordings", check_under_way),
     ("quarantine", check_quarantine),
+    ("held", check_held),
     ("raw files", check_raw_files),
     ("backup", check_backup),
     ("clock", check_clock),

@@ -101,6 +101,20 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
     )
 
 
+def check_held(examined: Examined) -> Iterator[Finding]:
+    """Whether recordings wait for a person to decide."""
+    found = examined.store.holds()
+    if not found:
+        yield ok("held", "nothing waits for you to decide")
+        return
+    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    yield warning(
+        "held",
+        f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
+        "See why with `shm ingest --held`, then confirm or discard each.",
+    )
+
+
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
     """Whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive

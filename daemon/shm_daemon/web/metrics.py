@@ -16,7 +16,7 @@ from prometheus_client.registry import Collector
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm.store import Stage, Store
+from shm.store import ENDED, Store
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.hangers import quarantined
@@ -26,7 +26,6 @@ __all__ = ["CONTENT_TYPE", "exposition"]
 
 _LATELY = timedelta(hours=1)
 _QUANTILES = (0.5, 0.95, 1.0)
-_ENDED = (Stage.DONE, Stage.REFUSED)
 
 log = logging.getLogger(__name__)
 
@@ -73,7 +72,7 @@ class _Measured(Collector):
 
 def _of_store(store: Store, spooled: int, spooled_s: float) -> Iterator[Metric]:
     counts = store.stage_counts()
-    waiting = sum(n for stage, n in counts.items() if stage not in _ENDED)
+    waiting = sum(n for stage, n in counts.items() if stage not in ENDED)
     text = "Files in the spool and recordings that are not through."
     yield _gauge("shm_queue_length", text, spooled + waiting)
     oldest, now = store.oldest_waiting(), utc_now()

@@ -221,10 +221,12 @@ def _recording(store: Store, key: str) -> StoredRecording:
 
 
 def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
-    """The tests in force that came of a recording."""
+    """The tests in force that came of a recording, but for those that are held."""
     if recording.hanger is None:
         return []
-    names = [test.name for test in store.former_tests(recording.id) if test.superseded_at is None]
+    found = store.former_tests(recording.id)
+    shown = (each for each in found if each.stage is not Stage.HELD)
+    names = [test.name for test in shown if test.superseded_at is None]
     return [{"name": name, "page": test_page(recording.hanger, name)} for name in names]
 
 

@@ -15,6 +15,7 @@ from shm_daemon.doctor.contract import told
 from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
+from shm_daemon.web.held import attention
 from shm_daemon.web.metrics import CONTENT_TYPE, exposition
 from shm_daemon.web.models import Health
 from shm_daemon.web.site import Site
@@ -35,7 +36,10 @@ log = logging.getLogger(__name__)
 def health(site: AtSite) -> Any:
     """Needs no token and tells no secrets: for load balancers and service managers."""
     reasons = troubles(site)
-    found = Health(status="failing" if reasons else "ok", reasons=reasons)
+    if reasons:
+        found = Health(status="failing", reasons=reasons)
+    else:
+        found = Health(status="ok", reasons=[], attention=attention(site))
     return JSONResponse(found.model_dump(), 503) if reasons else found
 
 
