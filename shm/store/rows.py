@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -51,6 +51,23 @@ class DeliveryState(StrEnum):
     WAITING = "waiting"
     DELIVERED = "delivered"
     GIVEN_UP = "given up"
+
+
+OTHER = "other"
+"""Stands for whatever a row says that this version has no name for."""
+
+
+def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+    """How many rows say what: each name of `known`, 0 where there is none, and `OTHER` where a row
+    says something else, as one of a newer version may.
+
+    `rows` are pairs of what is said and how often. Counting never fails for what a row says.
+    """
+    counted: dict[str, int] = {str(name): 0 for name in known}
+    for said, times in rows:
+        name = said if said in counted else OTHER
+        counted[name] = counted.get(name, 0) + int(times)
+    return counted
 
 
 @dataclass(frozen=True)

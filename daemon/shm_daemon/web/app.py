@@ -13,6 +13,7 @@ from shm_daemon.web import alerts, hanger_numbers, hangers, recordings, signing_
 from shm_daemon.web.address import Address
 from shm_daemon.web.around import Around
 from shm_daemon.web.faults import handle_faults
+from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import alerts as alerts_page
 from shm_daemon.web.pages import bridge, hanger, health, static, test, upload
 from shm_daemon.web.site import Site
@@ -44,6 +45,7 @@ def make_app(workspace: Workspace, address: Address | None = None) -> FastAPI:
     )
     app.state.site = site
     app.state.workshop = Workshop()
+    app.state.exposition = Exposition(site)
     handle_faults(app)
     for part in (
         recordings,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
 from shm.errors import ShmError
@@ -15,7 +16,7 @@ from shm_daemon.doctor.contract import told
 from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.metrics import CONTENT_TYPE, exposition
+from shm_daemon.web.metrics import CONTENT_TYPE, Exposition
 from shm_daemon.web.models import Health
 from shm_daemon.web.site import Site
 
@@ -41,7 +42,16 @@ def health(site: AtSite) -> Any:
 
 def troubles(site: Site) -> list[str]:
     """Why work stands still; empty where all is well."""
-    return [*_store(site), *_spool(site), *_daemon(site)]
+    return [reason for check in (_store, _spool, _daemon) for reason in _found(check, site)]
+
+
+def _found(check: Callable[[Site], list[str]], site: Site) -> list[str]:
+    """Whatever befalls one check, the others answer, and so does `/health`."""
+    try:
+        return check(site)
+    except Exception:
+        log.exception("a check of /health failed")
+        return [f"The check of the {check.__name__.strip('_')} failed; see the log."]
 
 
 @router.get(
@@ -53,14 +63,18 @@ def troubles(site: Site) -> list[str]:
     },
     summary="Metrics for Prometheus",
 )
-def metrics(site: AtSite, _: Reader) -> Response:
-    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out."""
-    return Response(exposition(site), headers={"Content-Type": CONTENT_TYPE})
+def metrics(request: Request, _: Reader) -> Response:
+    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
+    `shm_scrape_errors_total` counts what could not be told.
+    """
+    exposition = request.app.state.exposition
+    assert isinstance(exposition, Exposition)
+    return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})
 
 
 def _store(site: Site) -> list[str]:
     try:
-        site.store.stage_counts()
+        site.store.alert_counts()
     except ShmError as error:
         log.error("%s", error)
         return ["The store cannot be used."]

@@ -53,6 +53,7 @@ _STAGES = {
     "done": "through",
     "refused": "refused",
 }
+_OTHER_STAGE = "at a stage that this version of shm does not know"
 
 
 @dataclass(frozen=True)
@@ -130,10 +131,10 @@ def _operation(site: Site) -> dict[str, Any]:
         "troubles": troubles(site),
         "daemon": workspace.holder(),
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
-        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
+        "recordings": store.stage_counts(),
         "spool": len(scan(workspace.spool)),
         "oldest_waiting_at": store.oldest_waiting(),
-        "deliveries": {state.value: n for state, n in store.delivery_counts().items()},
+        "deliveries": store.delivery_counts(),
         "quarantine": _refused(workspace),
         "quarantined": quarantined(workspace),
         "disk_free_bytes": disk.free,
@@ -213,7 +214,7 @@ def _since(oldest: datetime | None) -> str:
 
 
 def _stages(counts: dict[str, int]) -> Table:
-    rows = tuple((name, str(n), _STAGES[name]) for name, n in counts.items())
+    rows = tuple((name, str(n), _STAGES.get(name, _OTHER_STAGE)) for name, n in counts.items())
     return Table("Recordings by stage", ("stage", "recordings", "what that means"), rows)
 
 
