@@ -17,8 +17,7 @@ from shm.report.words import model_class
 from shm.store import DeliveryState, Stage, Store, Workspace
 from shm_cli.common import json_option, opened_store, show, show_table, table
 from shm_cli.stages import show_stages
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 
 

@@ -15,10 +15,10 @@ from shm_daemon.doctor.contract import (
     fault,
     ok,
     some,
-    told,
     unknown,
     warning,
 )
+from shm_daemon.heartbeat import told
 
 _CLOCK_TOLERANCE = timedelta(minutes=1)
 _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]

@@ -21,16 +21,15 @@ from shm.pipeline import utc_now
 from shm.report import Table, words
 from shm.store import DeliveryState, Stage, Workspace
 from shm_daemon.doctor import Finding, Level, examine
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
+from shm_daemon.web.health import troubles
 from shm_daemon.web.models import Examination, Operation, Underway
 from shm_daemon.web.site import Site
-from shm_daemon.web.watching import troubles
 from shm_daemon.web.working_out import workshop_of
 
 router = APIRouter(tags=["operation"])
