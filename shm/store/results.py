@@ -15,7 +15,7 @@ from shm.modes_document import test_document
 from shm.store.blobs import pack_response, pack_samples
 from shm.store.database import Database, insert
 from shm.store.files import in_force
-from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredTest
+from shm.store.rows import DESCRIBED, IdentifiedTest, Lineage, Stage, StoredTest
 from shm.store.stepping import write_step
 from shm.store.tables import (
     baselines,
@@ -49,7 +49,7 @@ class Results(Database):
                 return
             kept = _positions(connection, recording_id)
             for item in (item for item in found if item.position not in kept):
-                values = {**_test_values(connection, item, recording), **vars(lineage)}
+                values = {**_test_values(connection, item, recording), **lineage.columns}
                 test_id = insert(connection, tests, {**values, "identified_at": at})
                 write_step(connection, recording_id, Stage.IDENTIFIED, at, test_id)
             hanger = found[0].test.hanger
@@ -190,12 +190,15 @@ def insert_posterior(
     at: datetime,
 ) -> int:
     """Keeps a posterior of tests; its number."""
+    document = posterior_document(posterior)
+    if lineage.described is not None:
+        document[DESCRIBED] = dict(lineage.described)
     values: Mapping[str, Any] = {
-        **vars(lineage),
+        **lineage.columns,
         "hanger": hanger,
         "model": posterior.model,
         "time": max(test.time for test in chosen),
-        "document": posterior_document(posterior),
+        "document": document,
         "samples": pack_samples(posterior),
         "log_evidence": posterior.log_evidence,
         "log_evidence_sd": posterior.log_evidence_sd,

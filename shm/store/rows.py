@@ -70,18 +70,36 @@ def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[
     return counted
 
 
+DESCRIBED = "described"
+"""Of a posterior's document: the hanger as it was described when it was made."""
+
+
 @dataclass(frozen=True)
 class Lineage:
-    """Where a result comes from: checksums of its input and settings, and the version."""
+    """Where a result comes from: checksums of its input and settings, and the version.
+
+    `described` is the description of the hanger among those settings, where it is known: kept
+    beside a posterior, so that a later description can be compared with it.
+    """
 
     input_sha256: str
     settings_sha256: str
     version: str
+    described: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
-    def of(cls, inputs: object, settings: object) -> Lineage:
+    def of(
+        cls, inputs: object, settings: object, described: Mapping[str, Any] | None = None
+    ) -> Lineage:
         """The lineage of a result computed now from JSON-able `inputs` and `settings`."""
-        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__)
+        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__, described)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """What stands in columns of its own, and in the lineage of what is made from it."""
+        return {
+            name: getattr(self, name) for name in ("input_sha256", "settings_sha256", "version")
+        }
 
 
 def checksum_of(document: object) -> str:
@@ -185,7 +203,8 @@ class Baseline:
     """The posterior that later tests of a hanger are compared with; who set it, when and why.
 
     `since` is the time from which on its tests were taken, where a person had the hanger compared
-    with itself anew; tests before it belong to the baseline before.
+    with itself anew; tests before it belong to the baseline before. `described` is the hanger as
+    it was described when the posterior was made; None of one of before that was kept.
     """
 
     id: int
@@ -195,6 +214,7 @@ class Baseline:
     who: str
     why: str
     since: datetime | None = None
+    described: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)
