@@ -9,10 +9,11 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from shm.errors import BadInput, ShmError
+from shm.errors import ShmError
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
 from shm_daemon.web.site import Site
 
@@ -39,10 +40,48 @@ def limits(site: Site) -> list[str]:
     return _found(site, _description, _strangers)
 
 
-def fault_in_words(fault: ShmError) -> str:
-    """What is wrong with `bridge.toml`, and where."""
-    where = fault.where if isinstance(fault, BadInput) and fault.where else "bridge.toml"
-    return f"{where}: {fault.message} The description before is still in force."
+@dataclass(frozen=True)
+class Notice:
+    """What every page says at its top: a state in a sentence, and what to do."""
+
+    state: str
+    action: str
+
+
+def notices(site: Site) -> list[Notice]:
+    """What limits the work, with its remedy; a page is shown whatever befalls this."""
+    try:
+        return [*_of_description(site), *_of_strangers(site)]
+    except Exception:
+        log.exception("the notices of a page cannot be made")
+        return []
+
+
+def _of_description(site: Site) -> list[Notice]:
+    fault = site.fault
+    if fault is None:
+        return []
+    where = fault.where or "bridge.toml"
+    message = fault.message.replace(str(site.workspace.folder), "the workspace")
+    state = f"{where}: {message} The description before is still in force."
+    return [Notice(state, fault.remedy or "Correct the file; `shm doctor` looks at it again.")]
+
+
+def _of_strangers(site: Site) -> list[Notice]:
+    try:
+        tested = set(site.store.latest_tests())
+    except ShmError:
+        return []  # told as a trouble
+    missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
+    if not missing:
+        return []
+    named = ", ".join(map(str, missing[:5])) + (" and others" if missing[5:] else "")
+    return [
+        Notice(
+            f"bridge.toml: hanger {named} is not described, though tests of it are stored.",
+            f"Add its table `[[hanger]]` with `id = {missing[0]}` to bridge.toml.",
+        )
+    ]
 
 
 def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:
@@ -83,16 +122,8 @@ def _daemon(site: Site) -> list[str]:
 
 
 def _description(site: Site) -> list[str]:
-    return [fault_in_words(site.fault)] if site.fault else []
+    return [notice.state for notice in _of_description(site)]
 
 
 def _strangers(site: Site) -> list[str]:
-    try:
-        tested = set(site.store.latest_tests())
-    except ShmError:
-        return []  # told as a trouble
-    missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
-    if not missing:
-        return []
-    named = ", ".join(map(str, missing[:5])) + (" and others" if missing[5:] else "")
-    return [f"bridge.toml does not describe hanger {named}, of which tests are stored."]
+    return [notice.state for notice in _of_strangers(site)]
