@@ -147,6 +147,13 @@ class Settings:
     web_hosts: str = _row(
         "", "", "names, parted by commas, by which the web interface may be called", None, None
     )
+    web_proxies: str = _row(
+        "127.0.0.1,::1",
+        "",
+        "addresses, parted by commas, of proxies that are believed whom they were called by",
+        None,
+        None,
+    )
     mqtt_url: str = _row(
         "", "", "broker to take recordings from, as mqtts://user@host:8883", None, None
     )

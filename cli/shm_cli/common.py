@@ -86,6 +86,16 @@ log_file_option = click.option(
 )
 
 
+_PEM = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def tls_options(function: F) -> F:
+    """`--certificate PEM --key PEM` of whatever serves the web interface."""
+    for name, text in (("key", "The key of the certificate."), ("certificate", "Serve HTTPS.")):
+        function = click.option(f"--{name}", type=_PEM, metavar="PEM", help=text)(function)
+    return function
+
+
 def hanger_option(required: bool = False) -> Callable[[F], F]:
     """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
     return click.option(

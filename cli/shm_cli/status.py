@@ -18,8 +18,7 @@ from shm.store import ENDED, DeliveryState, Store, Workspace
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 
 
@@ -138,14 +137,14 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     return {
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
-        "recordings": {stage.value: n for stage, n in counts.items()},
+        "recordings": counts,
         "under_way": sum(counts.values()) - ended,
         "oldest_waiting_at": store.oldest_waiting(),
         "spool": len(scan(workspace.spool)),
         "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
         "alerts": len(alerts),
         "open_alerts": open_at.total(),
-        "deliveries": {state.value: n for state, n in deliveries.items()},
+        "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],

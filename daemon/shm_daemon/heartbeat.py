@@ -7,6 +7,7 @@ import os
 import socket
 import time
 from contextlib import suppress
+from datetime import timedelta
 
 from shm.store import Workspace
 
@@ -60,3 +61,12 @@ def seconds_since_beat(workspace: Workspace) -> float | None:
 def patience_s(workspace: Workspace) -> float:
     """After so long without a sign the daemon is taken to be down, or stuck."""
     return _PATIENCE_S + 2 * workspace.settings.spool_scan_seconds
+
+
+def told(age: timedelta) -> str:
+    """A duration as people say it."""
+    seconds = age.total_seconds()
+    for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -97,8 +98,12 @@ def _parse(path: Path) -> dict[str, Any]:
             f"cannot be read: {error.strerror}.", file=path, remedy="Check its permissions."
         ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        at = re.search(r"\(at line (\d+)", str(error))
         raise BadInput(
-            f"not a readable TOML file: {error}.", file=path, remedy="Correct the file."
+            f"not a readable TOML file: {error}.",
+            file=path,
+            line=int(at[1]) if at else None,
+            remedy="Correct the file.",
         ) from error
 
 

@@ -57,6 +57,7 @@ def status_of(
 def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
+        redescribed(data),
         *data.averaged.caveats,
         _tension(data),
         *_repeats_and_limits(data),
@@ -70,6 +71,20 @@ def summary(data: HangerReport) -> str:
         *advice(data),
     )
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def redescribed(data: HangerReport) -> str:
+    """That the description has changed since the baseline, and what to do; empty where not."""
+    if not data.redescribed:
+        return ""
+    changed, more = data.redescribed[:_MOST_NAMED], data.redescribed[_MOST_NAMED:]
+    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
+    number = data.hanger.id
+    return (
+        f"The description of hanger {number} has changed since its baseline: {named}. "
+        f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`. "
+        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
+    )
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:

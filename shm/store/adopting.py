@@ -38,7 +38,7 @@ class Adopting(Database):
     ) -> StoredDiagnosis:
         """Keeps a diagnosis, which is the hanger's latest from now on."""
         values = {
-            **vars(lineage),
+            **lineage.columns,
             "hanger": hanger,
             "diagnosed_at": at,
             "tests": list(diagnosis.tests),

@@ -11,7 +11,13 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
 from shm.store.database import Database, insert
-from shm.store.rows import Event, ReceivedFile, Stage, StoredRecording
+from shm.store.rows import (
+    Event,
+    ReceivedFile,
+    Stage,
+    StoredRecording,
+    counts_by_name,
+)
 from shm.store.stepping import write_step
 from shm.store.tables import events, recordings, tests
 
@@ -82,12 +88,11 @@ class Files(Database):
         query = sa.select(recordings).where(waiting, recordings.c.id.not_in(excluding))
         return self._recordings(query.order_by(recordings.c.id).limit(limit))
 
-    def stage_counts(self) -> dict[Stage, int]:
-        """How many recordings stand at each stage; every stage is named."""
+    def stage_counts(self) -> dict[str, int]:
+        """How many recordings stand at each stage; see `counts_by_name`."""
         query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
         with self.reading() as connection:
-            counted = {Stage(row[0]): int(row[1]) for row in connection.execute(query)}
-        return {stage: counted.get(stage, 0) for stage in Stage}
+            return counts_by_name(Stage, connection.execute(query))
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
         """What was noticed on the way, oldest first; `kind` as duplicate or refused."""

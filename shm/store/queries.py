@@ -21,6 +21,7 @@ from shm.store.blobs import (
 from shm.store.database import Database
 from shm.store.files import counts, in_force
 from shm.store.rows import (
+    DESCRIBED,
     Baseline,
     Lineage,
     Stage,
@@ -269,7 +270,8 @@ _BASELINE = ("id", "set_at", "who", "why", "since")
 
 def _baseline(row: Row[Any], hanger: int) -> Baseline:
     values = {name: getattr(row, f"b_{name}") for name in _BASELINE}
-    return Baseline(hanger=hanger, posterior=_posterior(row), **values)
+    described = row.document.get(DESCRIBED)
+    return Baseline(hanger=hanger, posterior=_posterior(row), described=described, **values)
 
 
 def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:

@@ -16,7 +16,14 @@ from shm.store.blobs import pack_response, pack_samples
 from shm.store.database import Database, insert
 from shm.store.files import in_force
 from shm.store.judging import Judged, keep_judgement
-from shm.store.rows import IdentifiedTest, Lineage, Stage, StoredAlert, StoredTest
+from shm.store.rows import (
+    DESCRIBED,
+    IdentifiedTest,
+    Lineage,
+    Stage,
+    StoredAlert,
+    StoredTest,
+)
 from shm.store.stepping import write_step
 from shm.store.tables import (
     baselines,
@@ -57,7 +64,7 @@ class Results(Database):
                 return None
             kept = _positions(connection, recording_id)
             for item in (item for item in found if item.position not in kept):
-                values = {**_test_values(connection, item, recording), **vars(lineage)}
+                values = {**_test_values(connection, item, recording), **lineage.columns}
                 test_id = insert(connection, tests, {**values, "identified_at": at})
                 write_step(connection, recording_id, Stage.IDENTIFIED, at, test_id)
             hanger = found[0].test.hanger
@@ -201,12 +208,15 @@ def insert_posterior(
     at: datetime,
 ) -> int:
     """Keeps a posterior of tests; its number."""
+    document = posterior_document(posterior)
+    if lineage.described is not None:
+        document[DESCRIBED] = dict(lineage.described)
     values: Mapping[str, Any] = {
-        **vars(lineage),
+        **lineage.columns,
         "hanger": hanger,
         "model": posterior.model,
         "time": max(test.time for test in chosen),
-        "document": posterior_document(posterior),
+        "document": document,
         "samples": pack_samples(posterior),
         "log_evidence": posterior.log_evidence,
         "log_evidence_sd": posterior.log_evidence_sd,

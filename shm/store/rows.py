@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -60,18 +60,53 @@ class DeliveryState(StrEnum):
     GIVEN_UP = "given up"
 
 
+OTHER = "other"
+"""Stands for whatever a row says that this version has no name for."""
+
+
+def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+    """How many rows say what: each name of `known`, 0 where there is none, and `OTHER` where a row
+    says something else, as one of a newer version may.
+
+    `rows` are pairs of what is said and how often. Counting never fails for what a row says.
+    """
+    counted: dict[str, int] = {str(name): 0 for name in known}
+    for said, times in rows:
+        name = said if said in counted else OTHER
+        counted[name] = counted.get(name, 0) + int(times)
+    return counted
+
+
+DESCRIBED = "described"
+"""Of a posterior's document: the hanger as it was described when it was made."""
+
+
 @dataclass(frozen=True)
 class Lineage:
-    """Where a result comes from: checksums of its input and settings, and the version."""
+    """Where a result comes from: checksums of its input and settings, and the version.
+
+    `described` is the description of the hanger among those settings, where it is known: kept
+    beside a posterior, so that a later description can be compared with it.
+    """
 
     input_sha256: str
     settings_sha256: str
     version: str
+    described: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
-    def of(cls, inputs: object, settings: object) -> Lineage:
+    def of(
+        cls, inputs: object, settings: object, described: Mapping[str, Any] | None = None
+    ) -> Lineage:
         """The lineage of a result computed now from JSON-able `inputs` and `settings`."""
-        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__)
+        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__, described)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """What stands in columns of its own, and in the lineage of what is made from it."""
+        return {
+            name: getattr(self, name) for name in ("input_sha256", "settings_sha256", "version")
+        }
 
 
 def checksum_of(document: object) -> str:
@@ -182,7 +217,8 @@ class Baseline:
     """The posterior that later tests of a hanger are compared with; who set it, when and why.
 
     `since` is the time from which on its tests were taken, where a person had the hanger compared
-    with itself anew; tests before it belong to the baseline before.
+    with itself anew; tests before it belong to the baseline before. `described` is the hanger as
+    it was described when the posterior was made; None of one of before that was kept.
     """
 
     id: int
@@ -192,6 +228,7 @@ class Baseline:
     who: str
     why: str
     since: datetime | None = None
+    described: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)

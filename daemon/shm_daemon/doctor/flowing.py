@@ -9,8 +9,8 @@ from pathlib import Path
 
 from shm.report.words import counted
 from shm.store import Stage
-from shm_daemon.doctor.contract import Examined, Finding, fault, ok, some, told, warning
-from shm_daemon.heartbeat import patience_s, seconds_since_beat
+from shm_daemon.doctor.contract import Examined, Finding, fault, ok, some, warning
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
 from shm_daemon.spool import left_alone, scan
 
 _WAITS_LONG = timedelta(minutes=10)

@@ -35,7 +35,7 @@ def status(site: AtSite, _: Reader) -> Any:
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
-        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
+        "recordings": store.stage_counts(),
         "spool": len(scan(workspace.spool)),
         "quarantine": quarantined(workspace),
         "open_alerts": store.alert_counts()[0],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from shm.report.words import counted
 from shm_daemon.web.site import Site
 
 
@@ -20,12 +19,3 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
         }
         for hold in site.store.holds(hanger)
     ]
-
-
-def attention(site: Site) -> list[str]:
-    """What a person should look at though nothing fails."""
-    number = len(site.store.holds())
-    if not number:
-        return []
-    are = "is" if number == 1 else "are"
-    return [f"{counted(number, 'recording')} {are} held until a person decides."]

@@ -186,9 +186,9 @@ class Status(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether all is well; `reasons` says what is not."""
+    """Whether all is well; `reasons` says what is not. What is degraded works, not as described."""
 
-    status: Literal["ok", "failing"]
+    status: Literal["ok", "degraded", "failing"]
     reasons: list[str]
     attention: list[str] = Field(
         default=[], description="What a person should look at though nothing fails."

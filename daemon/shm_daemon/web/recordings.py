@@ -16,6 +16,7 @@ from shm.errors import BadInput, NothingThere
 from shm.store import Stage, Store, StoredRecording
 from shm_daemon.landing import Incoming, Landed, TooLarge, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.address import UPLOADS
 from shm_daemon.web.faults import Refused, answers
 from shm_daemon.web.models import Recordings, RecordingStatus, Uploaded
 from shm_daemon.web.test_address import test_page
@@ -30,7 +31,7 @@ _BODY = {
     }
 }
 
-router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+router = APIRouter(prefix=UPLOADS, tags=["recordings"])
 
 List = Annotated[str | None, Query(max_length=2000)]
 Number = Annotated[float | None, Query(allow_inf_nan=False)]
@@ -111,7 +112,7 @@ async def upload(
     finally:
         await run_in_threadpool(file.close)
     outcome = await run_in_threadpool(_outcome, site.store, landed)
-    status_url = f"/api/recordings/{landed.sha256}"
+    status_url = f"{UPLOADS}/{landed.sha256}"
     return Uploaded(
         sha256=landed.sha256,
         size_bytes=landed.size_bytes,

@@ -13,7 +13,7 @@ from shm.pipeline import utc_now
 from shm.report import Interval, words
 from shm.report.bridge.content import hangers_unit
 from shm.values.force_units import ForceUnit
-from shm_daemon.doctor.contract import told
+from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_drawing import CLASSES, elevation, shift_words, triangles
 from shm_daemon.web.bridge_view import (
