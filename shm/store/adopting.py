@@ -12,6 +12,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
+from shm.store.checksums import decoding, loads
 from shm.store.database import Database, insert
 from shm.store.queries import selection_in_force
 from shm.store.results import insert_baseline, insert_posterior, insert_selection
@@ -150,21 +151,23 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
 
 
 def _adoption(row: Row[Any]) -> StoredAdoption:
-    return StoredAdoption(
-        id=row.id,
-        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-        adopted_at=row.adopted_at,
-        undone_at=row.undone_at,
-        undone_why=row.undone_why or "",
-        undone_who=row.undone_who or "",
-    )
+    with decoding(adoptions, row, row.hanger):
+        return StoredAdoption(
+            id=row.id,
+            adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
+            adopted_at=row.adopted_at,
+            undone_at=row.undone_at,
+            undone_why=row.undone_why or "",
+            undone_who=row.undone_who or "",
+        )
 
 
 def _diagnosis(row: Row[Any]) -> StoredDiagnosis:
-    return StoredDiagnosis(
-        id=row.id,
-        hanger=row.hanger,
-        diagnosis=diagnosis_of(row.document),
-        diagnosed_at=row.diagnosed_at,
-        lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
-    )
+    with decoding(diagnoses, row, row.hanger):
+        return StoredDiagnosis(
+            id=row.id,
+            hanger=row.hanger,
+            diagnosis=diagnosis_of(loads(row.document)),
+            diagnosed_at=row.diagnosed_at,
+            lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
+        )

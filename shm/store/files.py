@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
+from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Database, insert
 from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
 from shm.store.stepping import ARCHIVED, write_step
@@ -98,7 +99,7 @@ class Files(Database):
         """How many recordings stand at each stage; every stage is named."""
         query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
         with self.reading() as connection:
-            counted = {Stage(row[0]): int(row[1]) for row in connection.execute(query)}
+            counted = {row[0]: int(row[1]) for row in connection.execute(query)}
         return {stage: counted.get(stage, 0) for stage in Stage}
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
@@ -112,7 +113,7 @@ class Files(Database):
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
         with self.reading() as connection:
-            return tuple(recording_from(row) for row in connection.execute(query))
+            return tuple(readable(connection.execute(query), recording_from))
 
 
 def _by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
@@ -145,10 +146,12 @@ def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:
-    file = ReceivedFile(
-        row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
-    )
-    return StoredRecording(row.id, file, row.received_at, Stage(row.stage), row.hanger, row.reason)
+    with decoding(recordings, row, row.hanger):
+        file = ReceivedFile(
+            row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
+        )
+        stage, reason = Stage(row.stage), loads(row.reason)
+        return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
 
 
 def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere
 from shm.store.blobs import change_from
+from shm.store.checksums import decoding, loads
 from shm.store.files import in_force
 from shm.store.glances import EventKind, HangerEvent, TestRow
 from shm.store.queries import Queries, baselines_now, plain_tests
@@ -87,11 +88,12 @@ class Listing(Queries, Watching):
 
     def called_changes(self) -> dict[int, tuple[Change, ...]]:
         """The changes called of each hanger against its baseline in force, by time."""
-        query = sa.select(watches.c.hanger, watches.c.document).where(*_called())
+        query = sa.select(watches).where(*_called())
         found = defaultdict[int, list[Change]](list)
         with self.reading() as connection:
             for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
-                found[row.hanger].append(change_from(row.document))
+                with decoding(watches, row, row.hanger):
+                    found[row.hanger].append(change_from(loads(row.document)))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def telling_watches(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
