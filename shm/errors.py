@@ -112,6 +112,7 @@ class DamagedRow(StoreDamaged):
         super().__init__(
             f"row {id_} of {table}{of_hanger} is damaged: it is not as it was written.",
             remedy=remedy,
+            retry_after_s=60.0,  # it may be healed meanwhile
         )
         self.table, self.id, self.hanger = table, id_, hanger
 

@@ -18,7 +18,7 @@ from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Connection, Row, RowMapping
 
 from shm.errors import DamagedRow
 from shm.store.tables import APART, metadata
@@ -29,6 +29,8 @@ _ROWS_AT_ONCE = 50  # a row may hold some 100 kB
 _DAMAGE = "shm_damage"
 _SQLITE_TIME = "%Y-%m-%d %H:%M:%S.%f"
 _T = TypeVar("_T")
+Values = RowMapping | dict[str, Any]
+"""A row by the names of its columns."""
 
 
 def seal(connection: Connection) -> None:
@@ -49,11 +51,9 @@ def seal(connection: Connection) -> None:
 
 def look_before_update(connection: Connection, statement: Any, *_: Any) -> None:
     """Notes which rows are damaged before an update changes them (an event of the engine)."""
-    table = getattr(statement, "table", None)
-    if not isinstance(statement, sa.Update) or table is not metadata.tables.get(
-        getattr(table, "name", "")
-    ):
-        return
+    table = statement.table if isinstance(statement, sa.Update) else None
+    if not isinstance(table, sa.Table) or metadata.tables.get(table.name) is not table:
+        return  # migrations name their own tables
     changed = sa.select(*_own(table))
     if statement.whereclause is not None:
         changed = changed.where(statement.whereclause)
@@ -73,12 +73,12 @@ def healed(connection: Connection, table: sa.Table, id_: int) -> None:
     connection.info.get(_DAMAGE, set()).discard((table.name, (id_,)))
 
 
-def key_of(table: sa.Table, row: Mapping[str, Any]) -> tuple[Any, ...]:
+def key_of(table: sa.Table, row: Values) -> tuple[Any, ...]:
     """The primary key of a row."""
     return tuple(row[column.name] for column in table.primary_key)
 
 
-def checksum_of(table: sa.Table, row: Mapping[str, Any]) -> int:
+def checksum_of(table: sa.Table, row: Values) -> int:
     """Of a row's values as the database holds them, the same in SQLite and in PostgreSQL.
 
     64 bits of a SHA-256: what a disk changes by chance passes once in 2^64 times.
@@ -96,7 +96,7 @@ def content_checksum(content: bytes | None) -> int | None:
     return None if content is None else _number(hashlib.sha256(content))
 
 
-def digest_of(row: Mapping[str, Any]) -> bytes:
+def digest_of(row: Values) -> bytes:
     """SHA-256 of all values of a row, its checksum too."""
     digest = hashlib.sha256()
     for value in row.values():
@@ -115,7 +115,7 @@ def whole(table: sa.Table, row: Row[Any]) -> bool:
 
 
 @contextmanager
-def decoding(table: sa.Table, row: Row[Any], hanger: int | None = None) -> Iterator[None]:
+def decoding(table: sa.Table, row: Any, hanger: int | None = None) -> Iterator[None]:
     """Compares a row with its checksum; what cannot be made of its contents is a DamagedRow too.
 
     This is the one place where it is found out that a row is damaged, but for `shm db check`.
@@ -127,7 +127,7 @@ def decoding(table: sa.Table, row: Row[Any], hanger: int | None = None) -> Itera
         yield
     except DamagedRow:
         raise
-    except Exception as error:  # noqa: BLE001 - a damaged document may be of any shape
+    except Exception as error:
         raise damaged(table, id_, hanger) from error
 
 
@@ -181,11 +181,13 @@ def _setting(name: str) -> sa.Update:
     found = sa.update(plain).where(
         *(plain.c[key.name] == sa.bindparam(f"key_{key.name}") for key in keys)
     )
-    apart = {f"{APART[name]}_checksum": sa.bindparam("apart")} if name in APART else {}
+    apart: dict[str, Any] = (
+        {f"{APART[name]}_checksum": sa.bindparam("apart")} if name in APART else {}
+    )
     return found.values(checksum=sa.bindparam("sum"), **apart)
 
 
-def _sums(table: sa.Table, row: Mapping[str, Any]) -> dict[str, Any]:
+def _sums(table: sa.Table, row: Values) -> dict[str, Any]:
     keys = {f"key_{key.name}": row[key.name] for key in table.primary_key}
     if table.name not in APART:
         return {**keys, "sum": checksum_of(table, row)}

@@ -13,7 +13,6 @@ from sqlalchemy.engine import Dialect
 from shm.documents import dump
 from shm.values import NAN
 
-
 UNREADABLE_TIME = datetime.min.replace(tzinfo=UTC)
 """Stands for a time in a damaged row: the row's checksum tells, and other rows are not held up."""
 

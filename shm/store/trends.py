@@ -49,7 +49,11 @@ _HANGERS_KNOWN = 4096
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
 _NUMBERS_HELD = 1024
-_SUMMARY = (summaries.c.key, summaries.c.document.label("summary"), summaries.c.checksum.label("sum"))
+_SUMMARY = (
+    summaries.c.key,
+    summaries.c.document.label("summary"),
+    summaries.c.checksum.label("sum"),
+)
 
 
 class Trends(Database):

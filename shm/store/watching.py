@@ -12,8 +12,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document
-from shm.store.blobs import alert_from_document, watch_document, watch_from
 from shm.errors import DamagedRow
+from shm.store.blobs import alert_from_document, watch_document, watch_from
 from shm.store.checksums import decoding, loads, note_damage, whole
 from shm.store.database import Database, insert
 from shm.store.files import in_force
@@ -46,9 +46,7 @@ stored_alerts = sa.select(
     alerts,
     tests.c.name.label("test"),
     *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
-).select_from(
-    alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id)
-)
+).select_from(alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id))
 
 _OWED = ("id", "hook", "state", "attempts", "next_attempt_at", "last_error", "ended_at")
 _outbox = stored_alerts.add_columns(
