@@ -27,26 +27,28 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--files", type=int, default=12)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--cuts", type=int, default=400, help="cuts a round")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    began, rng, cuts, went_on, rounds = time.monotonic(), random.Random(options.seed), 0, 0, 0
+    began, rng, rounds = time.monotonic(), random.Random(options.seed), 0
+    total: Counter[str] = Counter()
+    until = began + 60 * options.minutes
     memory = "/dev/shm" if Path("/dev/shm").is_dir() else None
     with tempfile.TemporaryDirectory() as folder:
-        while (left := 60 * options.minutes - (time.monotonic() - began)) > 0:
+        while time.monotonic() < until:
             rounds += 1
             where = Path(folder) / str(rounds)
             where.mkdir()
             made = record(where, options.files)
             kinds = Counter(each.kind for each in made.operations)
-            # The first round cuts once after every call; later ones wherever time allows.
-            moments = made.moments if rounds == 1 else rng.sample(made.moments, 500)
-            went_on += cut_at(made, sorted(moments), rng, every=25, memory=memory)
-            cuts += len(moments)
-            print(f"{cuts} cuts, {left:.0f} s were left", flush=True)
+            moments = rng.sample(made.moments, min(options.cuts, len(made.moments)))
+            cuts, went_on = cut_at(made, moments, rng, every=25, memory=memory, until=until)
+            total.update(cuts=cuts, went_on=went_on, calls=len(made.moments))
+            print(f"{total['cuts']} cuts in {time.monotonic() - began:.0f} s", flush=True)
     print(
-        f"store: file; {options.files} files in, {sum(kinds.values())} calls a round {dict(kinds)};"
-        f" {cuts} cuts, the work went on after {went_on}: 0 lost, 0 half written; "
-        f"{time.monotonic() - began:.0f} s"
+        f"store: file; {options.files} files a round, {sum(kinds.values())} calls {dict(kinds)}; "
+        f"{total['cuts']} cuts in {rounds} rounds, the work went on after {total['went_on']}: "
+        f"0 lost, 0 half written; {time.monotonic() - began:.0f} s"
     )
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import random
 import tempfile
+import time
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,25 +49,33 @@ def record(where: Path, files: int) -> Recorded:
 
 
 def cut_at(
-    made: Recorded, moments: Collection[int], rng: random.Random, every: int, memory: str | None
-) -> int:
-    """Cuts at each of some moments, and goes on after one in `every`; how many went on.
+    made: Recorded,
+    moments: Collection[int],
+    rng: random.Random,
+    every: int,
+    memory: str | None = None,
+    until: float = math.inf,
+) -> tuple[int, int]:
+    """Cuts at each of some moments, and goes on after one in `every`; how many of both there were.
 
-    Goes once through the recording: a `Recorded` is used up by it.
+    Goes once through the recording, which is used up by it, and no longer than to `until`, on the
+    clock that only goes on.
     """
-    went_on = 0
+    cuts, went_on, counted = 0, 0, Counter(moments)
     for number, each in enumerate(made.operations, start=1):
         made.disk.do(each)
-        for _ in range(sum(moment == number for moment in moments)):
+        if time.monotonic() > until:
+            break
+        for _ in range(counted[number]):
             goes_on = rng.randrange(every) == 0
-            went_on += goes_on
+            went_on, cuts = went_on + goes_on, cuts + 1
             seed = rng.randrange(2**32)
             try:
                 _look(made.disk, random.Random(seed), goes_on, memory)
             except Exception as error:
                 error.add_note(f"the cut came after operation {number}, {each.kind}; seed {seed}")
                 raise
-    return went_on
+    return cuts, went_on
 
 
 def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> None:
