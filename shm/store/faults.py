@@ -92,6 +92,12 @@ def translated(location: str, errors: type[Exception] = sa.exc.SQLAlchemyError) 
     """Turns the database's own errors into ours, with remedy and time to wait."""
     try:
         yield
+    except UnicodeDecodeError as error:  # SQLite's message quotes a damaged schema
+        raise StoreDamaged(
+            f"the store {location} is damaged: its schema cannot be read.",
+            remedy=_RESTORE,
+            retry_after_s=60.0,
+        ) from error
     except errors as error:
         cause = " ".join(str(getattr(error, "orig", None) or error).split())
         fault = _meaning(error, cause.lower())
