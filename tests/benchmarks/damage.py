@@ -1,5 +1,4 @@
-"""Flips random bits of a store and its archive: does `shm db check --archive` find each that matters,
-and does the daemon live through it?
+"""Flips random bits of a store and its archive: is each that matters found, does the daemon live?
 
     python tests/benchmarks/damage.py --minutes 10
 
