@@ -61,6 +61,8 @@ def run(
                 if once and isinstance(error, StoreDamaged):
                     raise
                 if not bell.stopped and not (waiting_helps and patience(error)):
+                    if waiting_helps and bell.stopped:  # meanwhile: that is no failure
+                        return
                     raise
 
 
