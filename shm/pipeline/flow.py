@@ -145,7 +145,7 @@ class Flow:
             except DamagedRow as error:
                 self._stop(job, error)
                 damaged |= {job.hanger} - {None}
-            except ShmError:
+            except (ShmError, BrokenExecutor):
                 raise
             except Exception:  # what one hanger's rows hold must not stop the others
                 log.exception("%s %s cannot begin", *job.key, extra=_about(job))
