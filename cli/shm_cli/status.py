@@ -10,6 +10,7 @@ from typing import Any
 
 import rich_click as click
 
+from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
@@ -49,6 +50,8 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     for row in document["hangers"]:
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+        if row["damage"] is not None:
+            click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
 
 
 def _show(document: dict[str, Any]) -> None:
@@ -162,9 +165,14 @@ def _hangers(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int], held: Mapping[int, int]
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.selected_models(), store.latest_tests(), []
+    damage = {each.hanger: str(each) for each in store.known_damage()}
     for hanger in workspace.bridge.hangers:
-        found, baseline = latest.get(hanger.id), store.baseline(hanger.id)
-        adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+        found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
+        try:
+            baseline, watch = store.baseline(hanger.id), gap_watch(store, hanger.id)
+            adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+        except DamagedRow as error:
+            damage[hanger.id] = str(error)
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
@@ -178,7 +186,8 @@ def _hangers(
                 "baseline_since": (baseline.since or baseline.set_at) if baseline else None,
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
-                "gap": _gap(gap_watch(store, hanger.id)),
+                "gap": _gap(watch),
+                "damage": damage.get(hanger.id),
             }
         )
     return rows

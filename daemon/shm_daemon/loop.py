@@ -10,7 +10,7 @@ from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from shm.errors import ShmError, StoreBusy, StoreError
+from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Workspace
@@ -57,7 +57,12 @@ def run(
                     if daemon.serve(once):
                         return
             except StoreError as error:
-                if not bell.stopped and (error.retry_after_s is None or not patience(error)):
+                waiting_helps = error.retry_after_s is not None
+                if once and isinstance(error, StoreDamaged):
+                    raise
+                if not bell.stopped and not (waiting_helps and patience(error)):
+                    if waiting_helps and bell.stopped:  # meanwhile: that is no failure
+                        return
                     raise
 
 
@@ -136,12 +141,14 @@ class Daemon:
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
         self._described_at = _modified_ns(flow.workspace)
+        self._once = False
 
     def serve(self, once: bool) -> bool:
         """Takes turns until the bell is stopped or, with `once`, until nothing is left to do.
 
         False where the store is no longer ours: another may have begun what we had under way.
         """
+        self._once = once
         while not self._bell.stopped:
             if not self._lock.held():
                 log.warning("the right to the store was lost; it is asked for again")
@@ -170,11 +177,24 @@ class Daemon:
             log.warning("a worker process died; beginning new ones")
             self._flow.executor = self._make_executor()
         except ShmError as error:
-            if error.retry_after_s is None:
+            if self._is_fatal(error):
                 raise
             log.warning("%s", error)
-            self._scan_at = time.monotonic() + error.retry_after_s
+            self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
+        except Exception:
+            if self._once:
+                raise
+            # A service that ends by what it read reads it again when it is begun again.
+            log.exception("this turn failed; the next one is tried in %.0f s", _UNREADABLE_S)
+            self._scan_at = time.monotonic() + _UNREADABLE_S
         return True
+
+    def _is_fatal(self, error: ShmError) -> bool:
+        """Whether the service ends: not by what a damaged store answers, unless once is enough."""
+        if isinstance(error, StoreDamaged):
+            return self._once
+        mends = isinstance(error, StoreError) and not isinstance(error, SchemaOutdated)
+        return error.retry_after_s is None and (self._once or not mends)
 
     def _scan(self) -> None:
         self._heed_description()

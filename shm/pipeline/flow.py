@@ -23,7 +23,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from shm.errors import ShmError, StoreError
+from shm.errors import DamagedRow, ShmError, StoreError
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
@@ -33,6 +33,7 @@ from shm.values import Alert
 
 _CRASHES = 2
 _LONGEST_S = 86400.0
+_AGAIN_S = 60.0
 
 log = logging.getLogger(__name__)
 
@@ -76,6 +77,7 @@ class Flow:
         self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
         self._crashes: Counter[int] = Counter()
         self._postponed: dict[int, datetime] = {}
+        self._damaged: dict[int, datetime] = {}  # hangers that stand still, and until when
         self.use(workspace)
         workspace.archive.sweep()
 
@@ -130,11 +132,25 @@ class Flow:
     def _begin_steps(self) -> None:
         now = self.clock()
         held = {id_ for id_, until in self._postponed.items() if until > now}
+        damaged: set[int | None] = {
+            hanger for hanger, until in self._damaged.items() if until > now
+        }
         for job in self.jobs.waiting(2 * self.lanes, held):
+            if job.hanger in damaged or job.key in self._running:
+                continue
             if not self._has_room(job):
                 return
-            if job.key not in self._running:
+            try:
                 self._begin(job, self.executor)
+            except DamagedRow as error:
+                self._stop(job, error)
+                damaged |= {job.hanger} - {None}
+            except (ShmError, BrokenExecutor):
+                raise
+            except Exception:  # what one hanger's rows hold must not stop the others
+                log.exception("%s %s cannot begin", *job.key, extra=_about(job))
+                self._hold(job, _AGAIN_S)
+                damaged |= {job.hanger} - {None}
 
     def _has_room(self, job: Job) -> bool:
         """Whether a step may begin now; one whose process died before runs alone."""
@@ -176,11 +192,26 @@ class Flow:
                     extra=_about_alert(kept.alert),
                 )
             log.info("%s %d: done", *running.job.key, extra=_about(running.job))
+        except DamagedRow as error:
+            self._stop(running.job, error)
         except StoreError as error:
             if error.retry_after_s is not None:
                 raise
             self._refuse(running.job, error)
         self._forget(running.job)
+
+    def _stop(self, job: Job, error: DamagedRow) -> None:
+        """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""
+        self._hold(job, error.retry_after_s or _AGAIN_S)
+        if self.store.note_damage(error, self.clock()):
+            log.error("%s %s stands still: %s", *job.key, error, extra=_about(job))
+
+    def _hold(self, job: Job, seconds: float) -> None:
+        until = self.clock() + timedelta(seconds=seconds)
+        if job.hanger is None:
+            self._postponed.update(dict.fromkeys(job.recordings, until))
+        else:
+            self._damaged[job.hanger] = until
 
     def _forget(self, job: Job) -> None:
         """Earlier troubles of a job that has come to an end count no more."""
@@ -209,9 +240,13 @@ class Flow:
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
             name, archive = recording.file.file_name, self.workspace.archive
-            if archive.holds(recording.file):
+            try:
                 with archive.opened(recording.file) as path:
                     self.workspace.quarantine.put(path, name, reason, sidecar_path(path))
+            except StoreError as damage:
+                if damage.retry_after_s is not None:
+                    raise
+                log.error("%s is not laid in the quarantine: %s", name, damage)
             self.store.refuse(recording_id, reason, now, job.tests, stage=job.stage)
             about = {**_about(job), "recording": recording_id, "file": name}
             why = (reason["message"], reason["remedy"])

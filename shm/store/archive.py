@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import logging
 import os
 import re
 import shutil
@@ -24,7 +25,10 @@ from shm.errors import BadInput, ShmError, StoreError
 from shm.read import sidecar_path
 from shm.store.rows import ReceivedFile
 
+log = logging.getLogger(__name__)
+
 MODES_SUFFIX = ".modes.json"
+_FETCH = "Drop the file into the spool again, which heals it, or run `shm archive fetch`."
 _CHUNK = 1 << 20
 _NAME_BYTES = 200  # file systems end at 255; the quarantine puts ".reason.json" behind
 _SUFFIX = re.compile(r"(\.[a-z0-9]{1,12}){1,2}")
@@ -53,6 +57,14 @@ def checksum(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def is_whole(path: Path) -> bool:
+    """Whether a file of an archive has the SHA-256 that it is named by."""
+    try:
+        return checksum(path) == path.name[:64]
+    except OSError:
+        return False
+
+
 @dataclass(frozen=True)
 class Kept:
     """A file that is safe in the archive; `entry` tells what was read from a later file there."""
@@ -72,6 +84,7 @@ class Archive:
     def keep(self, source: Path, *, follow: bool = False) -> Kept:
         """Copies a file in under its checksum; bytes that are there already are left alone.
 
+        Where those have rotted, which their name tells, the good ones take their place.
         All is read from one descriptor. A link is refused unless it is to be followed: by one,
         whoever writes into the spool could send in any file of this machine. Raises BadInput where
         it is a link or no file, ShmError with `retry_after_s` where the file changes while it is
@@ -90,22 +103,40 @@ class Archive:
             self._place(temporary, self.folder / relative)
         return Kept(sha256, size, relative.as_posix(), entry_of(before))
 
+    def refuse_damaged(self, file: ReceivedFile) -> None:
+        """Raises StoreError where a file or its sidecar is missing or is not as it was kept."""
+        if file.archived_as is None or not self.holds(file):
+            raise StoreError(f"{file.file_name} is not in the archive.", remedy=_FETCH)
+        for name in (file.archived_as, file.sidecar_as):
+            if name is not None and not is_whole(self.folder / name):
+                raise StoreError(
+                    f"{file.file_name} is damaged in the archive: archive/{name} has not the "
+                    "SHA-256 that it is named by.",
+                    remedy=_FETCH,
+                )
+
+    def holds_whole(self, file: ReceivedFile) -> bool:
+        """Whether the file and its sidecar are there as they were kept; reads them."""
+        try:
+            self.refuse_damaged(file)
+        except StoreError:
+            return False
+        return True
+
     def holds(self, file: ReceivedFile) -> bool:
-        """Whether the file is there, as it should be."""
+        """Whether the file is there; what is in it is looked at where it is read."""
         return file.archived_as is not None and (self.folder / file.archived_as).is_file()
 
     @contextmanager
     def opened(self, file: ReceivedFile) -> Iterator[Path]:
         """The file under the name it came with, its sidecar beside it, while the context lasts.
 
+        Both are compared with their checksums first. Raises StoreError where one is not as it was.
         What fails meanwhile because another process has begun to serve, and swept the archive,
         is an ShmError with `retry_after_s`: the file itself is not to blame.
         """
-        if file.archived_as is None or not self.holds(file):
-            raise StoreError(
-                f"{file.file_name} is not in the archive.",
-                remedy="Fetch a copy with `shm archive fetch`, or drop the file again.",
-            )
+        self.refuse_damaged(file)
+        assert file.archived_as is not None
         views = self.folder / ".open"
         views.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=views) as view:
@@ -140,7 +171,10 @@ class Archive:
             raise _explained(error, self.folder) from error
 
     def _place(self, temporary: Path, final: Path) -> None:
-        if not final.exists():
+        rotten = final.exists() and not is_whole(final)
+        if rotten:
+            log.warning("%s was damaged in the archive; the file that came again heals it", final)
+        if rotten or not final.exists():
             final.parent.mkdir(exist_ok=True)
             temporary.chmod(0o444)
             temporary.rename(final)

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
+from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Database, insert
 from shm.store.rows import (
     Event,
@@ -105,7 +106,7 @@ class Files(Database):
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
         with self.reading() as connection:
-            return tuple(recording_from(row) for row in connection.execute(query))
+            return tuple(readable(connection.execute(query), recording_from))
 
 
 def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
@@ -138,16 +139,18 @@ def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:
-    file = ReceivedFile(
-        row.sha256,
-        row.file_name,
-        row.size_bytes,
-        row.arrival,
-        row.archived_as,
-        row.sidecar_as,
-        row.modified_at,
-    )
-    return StoredRecording(row.id, file, row.received_at, Stage(row.stage), row.hanger, row.reason)
+    with decoding(recordings, row, row.hanger):
+        file = ReceivedFile(
+            row.sha256,
+            row.file_name,
+            row.size_bytes,
+            row.arrival,
+            row.archived_as,
+            row.sidecar_as,
+            row.modified_at,
+        )
+        stage, reason = Stage(row.stage), loads(row.reason)
+        return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
 
 
 def begin_again(connection: Connection, recording_id: int, at: datetime) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -13,6 +13,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import test_document
 from shm.store.blobs import test_from_document
+from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.files import counts, in_force, write_event
 from shm.store.hold_rows import Decision, Hold
@@ -90,7 +91,7 @@ class Holding(Queries):
             )
             told = f"discarded by {who}" + (f": {why}" if why else ".")
             remedy = "The raw file stays in the archive; drop it again to have it judged anew."
-            discarded = {**(reason or {}), "message": told, "remedy": remedy}
+            discarded = {**(loads(reason) or {}), "message": told, "remedy": remedy}
             connection.execute(by_id.values(stage=Stage.REFUSED, reason=discarded))
             write_step(connection, recording_id, Stage.REFUSED, at)
             return _decide(connection, replace(hold, decision=Decision.DISCARDED), who, why, at)
@@ -196,12 +197,14 @@ def _confirmed(
     doubts = {test.position: test.doubts for test in hold.tests}.get(row.position, ())
     if time is None and not any(doubt.time_unknown for doubt in doubts):
         return {}
-    test = replace(test_from_document(row.document, row.hanger), time=time)
+    with decoding(tests, row, row.hanger):
+        test = replace(test_from_document(loads(row.document), row.hanger), time=time)
+        notes = loads(row.notes)
     return {
         "document": test_document(test),
         "taken_at": time,
         "time": time or row.received_at,
-        "notes": [*row.notes, time_note(hold, time, who)],
+        "notes": [*notes, time_note(hold, time, who)],
     }
 
 
@@ -232,15 +235,20 @@ def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime
 
 
 def _hold(row: Row[Any]) -> Hold:
+    with decoding(holds, row, row.hanger):
+        return _whole_hold(row, loads(row.document))
+
+
+def _whole_hold(row: Row[Any], document: Mapping[str, Any]) -> Hold:
     return Hold(
         id=row.id,
         recording_id=row.recording_id,
         file_name=row.file_name,
         hanger=row.hanger,
         held_at=row.held_at,
-        message=row.document["message"],
-        tests=held_tests_from(row.document),
-        sidecar_as=row.document["sidecar_as"],
+        message=document["message"],
+        tests=held_tests_from(document),
+        sidecar_as=document["sidecar_as"],
         decision=None if row.decision is None else Decision(row.decision),
         decided_at=row.decided_at,
         who=row.who or "",

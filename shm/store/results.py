@@ -153,14 +153,21 @@ def _test_values(
     connection: Connection, item: IdentifiedTest, recording: Row[Any]
 ) -> dict[str, Any]:
     name = _free_name(connection, item, recording)
-    response = item.frequency_response
     return {
         "recording_id": recording.id,
         "position": item.position,
         "name": name,
-        "hanger": item.test.hanger,
         "time": item.test.time or recording.received_at,
         "stage": Stage.IDENTIFIED,
+        **test_contents(item, name),
+    }
+
+
+def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:
+    """What an identification gave, by column."""
+    response = item.frequency_response
+    return {
+        "hanger": item.test.hanger,
         "document": test_document(replace(item.test, id=name)),
         "frequency_response": None if response is None else pack_response(response),
         "notes": list(item.notes),
@@ -208,10 +215,25 @@ def insert_posterior(
     at: datetime,
 ) -> int:
     """Keeps a posterior of tests; its number."""
+    values = posterior_values(hanger, posterior, chosen, lineage, at)
+    posterior_id = insert(connection, posteriors, values)
+    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
+    connection.execute(sa.insert(posterior_tests), pairs)
+    return posterior_id
+
+
+def posterior_values(
+    hanger: int,
+    posterior: Posterior,
+    chosen: Sequence[StoredTest],
+    lineage: Lineage,
+    at: datetime,
+) -> Mapping[str, Any]:
+    """A posterior of tests, by column."""
     document = posterior_document(posterior)
     if lineage.described is not None:
         document[DESCRIBED] = dict(lineage.described)
-    values: Mapping[str, Any] = {
+    return {
         **lineage.columns,
         "hanger": hanger,
         "model": posterior.model,
@@ -223,10 +245,6 @@ def insert_posterior(
         "seed": posterior.seed,
         "updated_at": at,
     }
-    posterior_id = insert(connection, posteriors, values)
-    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
-    connection.execute(sa.insert(posterior_tests), pairs)
-    return posterior_id
 
 
 def insert_selection(

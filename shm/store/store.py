@@ -15,6 +15,7 @@ from shm.store.acknowledging import Acknowledging
 from shm.store.adopting import Adopting
 from shm.store.alert_rows import AlertRows
 from shm.store.archive_copies import ArchiveCopies
+from shm.store.damage import Damage
 from shm.store.database import make_engine
 from shm.store.holding import Holding
 from shm.store.listing import Listing
@@ -43,6 +44,7 @@ class Store(
     Tokens,
     ArchiveCopies,
     Upkeep,
+    Damage,
 ):
     """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
 

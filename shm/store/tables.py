@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0007"
+SCHEMA = "0008"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -122,6 +122,7 @@ tests = sa.Table(
     sa.Column("stage", sa.String(16), nullable=False, index=True),
     sa.Column("document", Document, nullable=False),
     sa.Column("frequency_response", sa.LargeBinary),
+    sa.Column("frequency_response_checksum", sa.BigInteger),
     sa.Column("notes", Document, nullable=False),
     sa.Column("quality", Document),
     sa.Column("set_aside", Document),
@@ -383,3 +384,18 @@ tokens = sa.Table(
     sa.Column("last_used_at", UtcTime),
     _unique_where("revoked_at", "tokens", "name"),
 )
+
+# Columns that are kept under a checksum of their own, NAME_checksum, by table: see `checksums`.
+APART = {"tests": "frequency_response"}
+
+# Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
+# and what commits fills it in. The index holds those that are empty alone.
+for _table in metadata.tables.values():
+    _table.append_column(sa.Column("checksum", sa.BigInteger, onupdate=sa.null()))
+    _empty = sa.text("checksum IS NULL")
+    sa.Index(
+        f"ix_{_table.name}_unsealed",
+        _table.c.checksum,
+        sqlite_where=_empty,
+        postgresql_where=_empty,
+    )

@@ -11,7 +11,9 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.errors import DamagedRow
 from shm.store.blobs import alert_from_document, watch_document, watch_from
+from shm.store.checksums import decoding, loads, note_damage, whole
 from shm.store.database import Database, insert
 from shm.store.files import in_force
 from shm.store.outbox import raise_alert
@@ -40,11 +42,16 @@ from shm.store.tables import (
 from shm.values import Alert, Drift, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
-_WATCH_COLUMNS = ("id", "test_id", "baseline_id", "hanger", "time", "document")
-_outbox = sa.select(deliveries, alerts.c.document).join(alerts)
 stored_alerts = sa.select(
-    alerts, *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at"))
-).outerjoin(acknowledgements)
+    alerts,
+    tests.c.name.label("test"),
+    *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
+).select_from(alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id))
+
+_OWED = ("id", "hook", "state", "attempts", "next_attempt_at", "last_error", "ended_at")
+_outbox = stored_alerts.add_columns(
+    *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
+).join(deliveries, deliveries.c.alert_id == alerts.c.id)
 
 
 class Watching(Database):
@@ -83,7 +90,9 @@ class Watching(Database):
         query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
         with self.reading() as connection:
             row = connection.execute(query).one_or_none()
-        return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
+        if row is None or not whole(watch_states, row):
+            return None  # it may be thrown away at will
+        return KeptWatch(row.key, row.last_test_time, row.content)
 
     def forget_watch(self, baseline: Baseline) -> None:
         """Drops what the watch would go on from: it then begins anew at the next test."""
@@ -114,9 +123,8 @@ class Watching(Database):
 
     def watches_of(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
         """Watches that are `chosen` by their numbers, with their shifts, by time."""
-        of_watch = (watches.c[name] for name in _WATCH_COLUMNS)
         name = tests.c.name.label("test")
-        query: sa.Select[Any] = sa.select(*of_watch, name).select_from(watches).join(tests)
+        query: sa.Select[Any] = sa.select(watches, name).select_from(watches).join(tests)
         query = query.where(watches.c.id.in_(chosen))
         same_test = watches.c.test_id == drifts.c.test_id
         together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
@@ -238,14 +246,25 @@ def _watch_values(found: WatchedTest, test: StoredTest, baseline: Baseline) -> d
 
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
-    found = watch_from(row.document, row.test, row.time, shifts)
-    return StoredWatch(row.id, row.hanger, row.baseline_id, found)
+    with decoding(watches, row, row.hanger):
+        found = watch_from(loads(row.document), row.test, row.time, shifts)
+        return StoredWatch(row.id, row.hanger, row.baseline_id, found)
 
 
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
-    alert = alert_from_document(row.document)
-    return StoredAlert(row.id, alert, row.raised_at, acknowledgement_of(row))
+    return StoredAlert(row.id, _alert(row), row.raised_at, acknowledgement_of(row))
+
+
+def _alert(row: Row[Any]) -> Alert:
+    """An alert that was raised is told even where its document is damaged: as much as is left."""
+    try:
+        with decoding(alerts, row, row.hanger):
+            return alert_from_document(loads(row.document))
+    except DamagedRow as error:
+        note_damage(error)
+        message = f"{row.message} (Details are lost: {error.message})"
+        return Alert(row.key, row.hanger, row.test or "", row.time, message, ())
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
@@ -256,13 +275,5 @@ def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
 
 
 def _delivery(row: Row[Any]) -> Delivery:
-    return Delivery(
-        id=row.id,
-        alert=alert_from_document(row.document),
-        hook=row.hook,
-        state=DeliveryState(row.state),
-        attempts=row.attempts,
-        next_attempt_at=row.next_attempt_at,
-        last_error=row.last_error,
-        ended_at=row.ended_at,
-    )
+    owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
+    return Delivery(alert=_alert(row), **{**owed, "state": DeliveryState(row.owed_state)})

@@ -28,12 +28,13 @@ _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 def check_store(examined: Examined) -> Iterator[Finding]:
     """Whether the store is whole, as far as a quick look tells."""
     store = examined.store
-    troubles = quick_troubles(store)
+    troubles = (*quick_troubles(store), *(error.message for error in store.known_damage()))
     if troubles:
         yield fault(
             "store",
             f"{store.location} is damaged: {some(list(troubles))}",
-            "Stop the daemon, then `shm db restore FILE --replace`.",
+            "`shm db check` names each damaged row and what heals it; else stop the daemon, then "
+            "`shm db restore FILE --replace`.",
         )
     else:
         held = sum(store.stage_counts().values())

@@ -106,10 +106,13 @@ def _looked_at(site: Site, check: Callable[[Site], list[str]]) -> list[str]:
 def _store(site: Site) -> list[str]:
     try:
         site.store.alert_counts()
+        damage = site.store.known_damage()
     except ShmError as error:
         log.error("%s", error)
         return ["The store cannot be used."]
-    return []
+    of_hangers = sorted({each.hanger for each in damage if each.hanger is not None})
+    stopped = [f"Hanger {hanger} stands still: a row of it is damaged." for hanger in of_hangers]
+    return [*stopped, *(["A row of the store is damaged."] if damage and not stopped else [])]
 
 
 def _spool(site: Site) -> list[str]:
