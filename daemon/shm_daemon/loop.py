@@ -165,7 +165,7 @@ class Daemon:
         try:
             if time.monotonic() >= self._scan_at:
                 self._scan()
-            return self._flow.advance()
+            return self._flow.advance() or self._flow.suspects_due_s() is not None
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")
             self._flow.executor = self._make_executor()

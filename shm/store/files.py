@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from datetime import datetime
+from itertools import takewhile
 from typing import Any
 
 import sqlalchemy as sa
@@ -11,9 +12,18 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
 from shm.store.database import Database, insert
-from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
+from shm.store.rows import (
+    Death,
+    Deaths,
+    Event,
+    Outcome,
+    Receipt,
+    ReceivedFile,
+    Stage,
+    StoredRecording,
+)
 from shm.store.stepping import ARCHIVED, write_step
-from shm.store.tables import events, recordings, tests
+from shm.store.tables import events, recordings, steps, tests
 
 
 class Files(Database):
@@ -100,6 +110,44 @@ class Files(Database):
         with self.reading() as connection:
             counted = {Stage(row[0]): int(row[1]) for row in connection.execute(query)}
         return {stage: counted.get(stage, 0) for stage in Stage}
+
+    def died(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
+        """Notes that a process that worked on a recording died."""
+        with self.writing() as connection:
+            row = _by_id(connection, recording_id)
+            write_event(connection, at, death, row.id, row.file_name, message)
+
+    def deaths(self) -> dict[int, Deaths]:
+        """What is noted of the recordings that are on their way, since each last moved on."""
+        moved_at = (
+            sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
+            .group_by(steps.c.recording_id)
+            .subquery()
+        )
+        noted = (
+            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+            .join(recordings, recordings.c.id == events.c.recording_id)
+            .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
+            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(recordings.c.stage.not_in((Stage.DONE, Stage.REFUSED)))
+            .order_by(events.c.id)
+        )
+        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
+        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
+        killed = killed.order_by(events.c.id.desc())
+        found: dict[int, Deaths] = {}
+        with self.reading() as connection:
+            latest = connection.execute(killed.limit(100)).all()
+            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
+            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
+            for row in connection.execute(noted):
+                before = found.get(row.recording_id, Deaths(0, 0, row.at))
+                found[row.recording_id] = Deaths(
+                    before.by_itself + (row.kind == Death.BY_ITSELF),
+                    before.from_outside + (row.id in in_a_row),
+                    row.at,
+                )
+        return found
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
         """What was noticed on the way, oldest first; `kind` as duplicate or refused."""

@@ -31,13 +31,12 @@ from shm.read.apart.answers import (
     header_of,
 )
 from shm.read.limits import Limits
+from shm.resources import KILLING
 
 ARRAYS_AT_ONCE = 2
 """The arrays of an answer may be so many times what is read at once."""
 WALL_SECONDS = 3.0
 """A child may take so many times its processor time: beyond, it waits for something."""
-KILLING = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
-"""What operators, the kernel without memory and its helpers send; nothing that a parser does."""
 _GRACE_S = 5.0
 _START_S = 120.0
 _UNCONFINED_S = 60.0
