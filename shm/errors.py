@@ -3,7 +3,8 @@
 ShmError                      exit code 1
 ├── UsageError                2   the call itself is off
 ├── BadInput                  3   a file, channel, line or value that cannot be used
-│   └── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   ├── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   └── TooLarge              3   more bytes than are taken
 ├── NothingThere              4   a right question that has no answer yet
 ├── WorkerDied                1   a process died that worked on a file, perhaps not because of it
 ├── StoreError                5   the store cannot be used
@@ -77,6 +78,10 @@ class BadInput(ShmError):
 
 class NotIdentifiable(BadInput):
     """A recording that reads well but holds no mode that can be trusted."""
+
+
+class TooLarge(BadInput):
+    """A file of more bytes than are taken; it is neither copied nor read."""
 
 
 class NothingThere(ShmError):

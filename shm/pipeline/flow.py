@@ -28,6 +28,7 @@ from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Not
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Receipt, Store, StoredAlert, Workspace
+from shm.store.archive import Meanwhile, nothing
 from shm.values import Alert
 
 _MOST_DEATHS, _MOST_KILLS = 3, 5
@@ -65,8 +66,8 @@ class Flow:
     """Takes files in and brings them through all stages.
 
     `lanes` is how many steps may be under way at once; without a `notifier` alerts wait in the
-    outbox; `wake` is called, from any thread, whenever something under way has ended. Use a flow
-    while holding the workspace's lock.
+    outbox; `wake` is called, from any thread, whenever something under way has ended; `meanwhile`
+    again and again while a file is copied. Use a flow while holding the workspace's lock.
     """
 
     def __init__(
@@ -78,10 +79,11 @@ class Flow:
         notifier: Notifier | None = None,
         clock: Clock = utc_now,
         lanes: int = 1,
-        wake: Callable[[], object] = lambda: None,
+        wake: Callable[[], object] = nothing,
+        meanwhile: Meanwhile = nothing,
     ):
         self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
-        self.notifier, self.wake = notifier, wake
+        self.notifier, self.wake, self.meanwhile = notifier, wake, meanwhile
         self._running: dict[tuple[str, int], Running] = {}
         self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
         deaths = store.deaths()
@@ -107,7 +109,8 @@ class Flow:
 
     def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
-        receipt = receive(path, self.workspace, self.store, self.clock(), sharing)
+        now = self.clock()
+        receipt = receive(path, self.workspace, self.store, now, sharing, self.meanwhile)
         recording = receipt.recording
         about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
         log.info("%s: %s", recording.file.file_name, receipt.outcome, extra=about)
@@ -251,7 +254,8 @@ class Flow:
             name, archive = recording.file.file_name, self.workspace.archive
             if archive.holds(recording.file):
                 with archive.opened(recording.file) as path:
-                    self.workspace.quarantine.put(path, name, reason, sidecar_path(path))
+                    sidecar = sidecar_path(path)
+                    self.workspace.quarantine.put(path, name, reason, sidecar, self.meanwhile)
             self.store.refuse(recording_id, reason, now, job.tests, stage=job.stage)
             about = {**_about(job), "recording": recording_id, "file": name}
             why = (reason["message"], reason["remedy"])

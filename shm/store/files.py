@@ -73,6 +73,11 @@ class Files(Database):
             message = str(reason.get("message", ""))
             write_event(connection, at, "refused", row.id, row.file_name, message)
 
+    def refused_unread(self, file_name: str, message: str, at: datetime) -> None:
+        """Notes that a file was refused for its size, of which nothing else is known."""
+        with self.writing() as connection:
+            write_event(connection, at, "refused", None, file_name, message)
+
     def waits(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
         """Whether a recording, or its tests where some are named, are still at a stage."""
         with self.reading() as connection:
@@ -256,7 +261,7 @@ def write_event(
     connection: Connection,
     at: datetime,
     kind: str,
-    recording_id: int,
+    recording_id: int | None,
     file_name: str,
     message: str,
 ) -> None:

@@ -1,4 +1,4 @@
-"""Workers that are killed again and again, at random moments, while healthy files come in."""
+"""Workers that are killed again and again, in the midst of a step, while healthy files come in."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import random
 import signal
 import threading
 import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from shm.pipeline import steps
@@ -18,54 +18,41 @@ from shm_daemon.execution import Workers
 from tests.helpers import quick_update
 from tests.helpers.workspaces import write_test
 
-_SLOW_S = 0.15
+_SLOW_S = 0.1
 
 
-def prepare_worker() -> None:
-    """The stand-in for the sampler, and reading that takes long enough to be killed in it."""
+def prepare_worker(busy: Path) -> None:
+    """The stand-in for the sampler; every step says in a folder that it is at work, and is slow."""
     for verb in ("update", "refresh", "select"):
-        setattr(steps, verb, getattr(quick_update, verb))
-    load = steps.load_modes
-
-    def slow_load(*arguments: object) -> object:
-        time.sleep(_SLOW_S)
-        return load(*arguments)  # type: ignore[arg-type]
-
-    steps.load_modes = slow_load  # type: ignore[assignment]
+        setattr(steps, verb, partial(_at_work, busy, getattr(quick_update, verb)))
+    for verb in ("load_modes", "watch_newest"):
+        setattr(steps, verb, partial(_at_work, busy, getattr(steps, verb)))
 
 
-def children() -> list[int]:
-    """The processes that work for us: workers and what reads for them, not what forks them."""
-    found = []
-    for folder in Path("/proc").iterdir():
-        try:
-            words = (
-                (folder / "stat").read_text().rpartition(")")[2].split()
-                if folder.name.isdigit()
-                else []
-            )
-            command = (folder / "cmdline").read_bytes() if words else b""
-        except OSError:
-            continue
-        if words and words[0] != "Z" and b"multiprocessing" in command or b"serving" in command:
-            found.append((int(folder.name), int(words[1])))
-    ours = {os.getpid()}
-    helpers = {pid for pid, parent in found if parent == os.getpid()}  # forkserver, tracker
-    workers = {pid for pid, parent in found if parent in helpers}
-    readers = {pid for pid, parent in found if parent in workers}
-    return sorted((workers | readers) - ours)
+def _at_work(busy: Path, verb: object, *arguments: object) -> object:
+    mark = busy / str(os.getpid())
+    mark.touch()
+    time.sleep(_SLOW_S)
+    found = verb(*arguments)  # type: ignore[operator]
+    mark.unlink(missing_ok=True)
+    return found
 
 
 def kill_workers(
-    workspace: Workspace, files: int, kills: int, rng: random.Random, pause_s: float, most_s: float
-) -> tuple[int, float]:
-    """Drops files while a daemon works and its workers are killed; kills that struck, seconds."""
+    workspace: Workspace, files: int, kills: int, rng: random.Random, most_s: float
+) -> int:
+    """Lets a daemon do so many healthy files and kills its workers at work; the kills that struck.
+
+    Raises TimeoutError where the files are not through in time.
+    """
     for number in range(files):
-        write_test(workspace.spool / f"t{number:03}.modes.json", workspace, day=number / 10)
-    bell, began, struck = Bell(), time.monotonic(), 0
+        write_test(workspace.spool / f"t{number:04}.modes.json", workspace, day=number / 10)
+    busy = workspace.folder / "busy"
+    busy.mkdir()
+    bell, end, struck = Bell(), time.monotonic() + most_s, 0
 
     def make(settings: Settings) -> Workers:
-        return Workers(settings.workers, prepare_worker)
+        return Workers(settings.workers, partial(prepare_worker, busy))
 
     daemon = threading.Thread(
         target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": make}
@@ -73,33 +60,38 @@ def kill_workers(
     daemon.start()
     try:
         while not _all_through(workspace, files):
-            if time.monotonic() - began > most_s:
-                raise TimeoutError(f"after {most_s} s: {_counts(workspace)}, {struck} kills")
-            time.sleep(rng.uniform(0.0, 2 * pause_s))
-            for pid in rng.sample(living, 1) if (living := children()) and struck < kills else ():
-                struck += _killed(pid)
+            if time.monotonic() > end:
+                raise TimeoutError(f"{struck} kills, and then: {stage_counts(workspace)}")
+            wait_until = time.monotonic() + 1.0
+            while struck < kills and time.monotonic() < wait_until:
+                struck += _kill_one(busy, rng)
+            time.sleep(0.0 if struck < kills else 0.5)
     finally:
         bell.stop()
         daemon.join()
-    return struck, time.monotonic() - began
+    return struck
 
 
-def _killed(pid: int) -> bool:
+def _kill_one(busy: Path, rng: random.Random) -> bool:
+    """Kills one that is at work, after a moment; whether it was still there."""
+    marks = sorted(busy.iterdir())
+    time.sleep(rng.uniform(0.0, _SLOW_S))
+    if not marks:
+        return False
+    mark = rng.choice(marks)
+    mark.unlink(missing_ok=True)
     try:
-        os.kill(pid, signal.SIGKILL)
+        os.kill(int(mark.name), signal.SIGKILL)
     except ProcessLookupError:
         return False
     return True
 
 
-def _counts(workspace: Workspace) -> dict[Stage, int]:
+def stage_counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return store.stage_counts()
+        return {stage: count for stage, count in store.stage_counts().items() if count}
 
 
 def _all_through(workspace: Workspace, files: int) -> bool:
-    counts = _counts(workspace)
-    return counts[Stage.DONE] + counts[Stage.REFUSED] == files
-
-
-Kill = Callable[[Workspace], tuple[int, float]]
+    counts = stage_counts(workspace)
+    return counts.get(Stage.DONE, 0) + counts.get(Stage.REFUSED, 0) == files
