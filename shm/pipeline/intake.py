@@ -117,8 +117,10 @@ def _set_aside(
         "time": at,
         "sha256": None,
     }
-    workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    store.refused_unread(name, error.message, at)
+    lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
+    said = {(event.file_name, event.message) for event in store.events("refused")}
+    if lies != path or (name, error.message) not in said:  # what stays is met at each start
+        store.refused_unread(name, error.message, at)
 
 
 def _place(path: Path, spool: Path) -> tuple[Path, bool]:
