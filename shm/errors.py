@@ -3,8 +3,10 @@
 ShmError                      exit code 1
 ├── UsageError                2   the call itself is off
 ├── BadInput                  3   a file, channel, line or value that cannot be used
-│   └── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   ├── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   └── TooLarge              3   more bytes than are taken
 ├── NothingThere              4   a right question that has no answer yet
+├── WorkerDied                1   a process died that worked on a file, perhaps not because of it
 ├── StoreError                5   the store cannot be used
 │   ├── SchemaOutdated        5   mend: `shm db upgrade`
 │   ├── StoreDamaged          5   its bytes are not those that were written
@@ -81,10 +83,27 @@ class NotIdentifiable(BadInput):
     """A recording that reads well but holds no mode that can be trusted."""
 
 
+class TooLarge(BadInput):
+    """A file of more bytes than are taken; it is neither copied nor read."""
+
+
 class NothingThere(ShmError):
     """Nothing has been stored yet that answers the question."""
 
     exit_code = 4
+
+
+class WorkerDied(ShmError):
+    """A process that worked on a file died: of the file, or killed by somebody else.
+
+    `how` is the signal or the exit code; `from_outside` where it was killed, and nothing shows that
+    the file was the reason.
+    """
+
+    def __init__(self, message: str, *, how: str = "", from_outside: bool = False):
+        super().__init__(message, remedy="It is tried again.")
+        self.how = how
+        self.from_outside = from_outside
 
 
 class StoreError(ShmError):

@@ -23,6 +23,7 @@ from shm.store import (
     StoredRecording,
     Workspace,
 )
+from shm.store.archive import refuse_oversize
 from shm.values import Alert
 from shm_cli.again import rerun_document, send_back
 from shm_cli.common import json_option, open_workspace, show, show_table, table
@@ -98,6 +99,8 @@ def command(
         return _again(workspace, about["again"], stage, as_json)
     if together:
         folder = Path(ctx.with_resource(TemporaryDirectory()))
+        most = workspace.settings.max_file_bytes
+        refuse_oversize(sum(path.stat().st_size for path in files), most)
         files = (bundle(files, folder / f"{files[0].stem}.zip"),)
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
@@ -40,4 +41,7 @@ def finish(flow: Flow, ids: Sequence[int]) -> None:
             bar.update(task, completed=through)
 
         flow.drain(count)
+        while (wait_s := flow.suspects_due_s()) is not None:  # its process died
+            time.sleep(wait_s)
+            flow.drain(count)
         count()

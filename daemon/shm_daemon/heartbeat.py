@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import socket
 import time
@@ -13,6 +14,8 @@ from shm.store import Workspace
 
 HEARTBEAT = "daemon.heartbeat"
 """A file of the workspace that the active daemon touches at each turn."""
+LONGEST_REST_S = 2.0
+"""How long at most between two signs, whatever there is to do or to wait for."""
 _PATIENCE_S = 60.0
 _BEATS_A_WATCHDOG = 3
 
@@ -24,6 +27,21 @@ def beat(workspace: Workspace) -> None:
     with suppress(OSError):  # a full or read-only disk is waited out elsewhere
         (workspace.folder / HEARTBEAT).touch()
     tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=watching {workspace.spool}")
+
+
+class Pulse:
+    """Beats where that is due, however often it is asked; for what takes long, piece by piece."""
+
+    def __init__(self, workspace: Workspace):
+        self._workspace, self._beaten_at = workspace, -math.inf
+
+    def __call__(self) -> None:
+        if time.monotonic() - self._beaten_at > LONGEST_REST_S / 2:
+            self.beat()
+
+    def beat(self) -> None:
+        beat(self._workspace)
+        self._beaten_at = time.monotonic()
 
 
 def tell_systemd(*said: str) -> None:
@@ -47,7 +65,8 @@ def tell_systemd(*said: str) -> None:
 def longest_wait_s() -> float:
     """How long the loop may rest between two signs: systemd ends a service that gives none."""
     limit_us = os.environ.get("WATCHDOG_USEC", "")
-    return int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else float("inf")
+    asked_s = int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else math.inf
+    return min(asked_s, LONGEST_REST_S)
 
 
 def seconds_since_beat(workspace: Workspace) -> float | None:

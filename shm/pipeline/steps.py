@@ -19,7 +19,7 @@ from shm.plausibility import fingerprint_of
 from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
-from shm.store.archive import MODES_SUFFIX
+from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import Alert, Averaged, Hanger, ModalTest, Posterior, Selection, WatchedTest
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
@@ -52,11 +52,7 @@ def identify_file(
 def _refuse_size(size_bytes: int, limit_bytes: int) -> None:
     if size_bytes == 0:
         raise BadInput("the file is empty.", remedy="Check the logger and send the file again.")
-    if size_bytes > limit_bytes:
-        raise BadInput(
-            f"{size_bytes} bytes are more than the {limit_bytes} of setting max_file_bytes.",
-            remedy="Send it in parts, or raise the setting.",
-        )
+    refuse_oversize(size_bytes, limit_bytes)
 
 
 def _tests_in(path: Path, limits: Limits) -> tuple[IdentifiedTest, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from datetime import datetime
+from itertools import takewhile
 from typing import Any
 
 import sqlalchemy as sa
@@ -13,6 +14,9 @@ from shm.errors import NothingThere
 from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Database, insert
 from shm.store.rows import (
+    ENDED,
+    Death,
+    Deaths,
     Event,
     ReceivedFile,
     Stage,
@@ -20,7 +24,7 @@ from shm.store.rows import (
     counts_by_name,
 )
 from shm.store.stepping import write_step
-from shm.store.tables import events, recordings, tests
+from shm.store.tables import events, recordings, steps, tests
 
 
 class Files(Database):
@@ -58,6 +62,11 @@ class Files(Database):
             message = str(reason.get("message", ""))
             write_event(connection, at, "refused", row.id, row.file_name, message)
 
+    def refused_unread(self, file_name: str, message: str, at: datetime) -> None:
+        """Notes that a file was refused for its size, of which nothing else is known."""
+        with self.writing() as connection:
+            write_event(connection, at, "refused", None, file_name, message)
+
     def waits(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
         """Whether a recording, or its tests where some are named, are still at a stage."""
         with self.reading() as connection:
@@ -94,6 +103,44 @@ class Files(Database):
         query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
         with self.reading() as connection:
             return counts_by_name(Stage, connection.execute(query))
+
+    def died(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
+        """Notes that a process that worked on a recording died."""
+        with self.writing() as connection:
+            row = by_id(connection, recording_id)
+            write_event(connection, at, death, row.id, row.file_name, message)
+
+    def deaths(self) -> dict[int, Deaths]:
+        """What is noted of the recordings that are on their way, since each last moved on."""
+        moved_at = (
+            sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
+            .group_by(steps.c.recording_id)
+            .subquery()
+        )
+        noted = (
+            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+            .join(recordings, recordings.c.id == events.c.recording_id)
+            .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
+            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(recordings.c.stage.not_in(ENDED))
+            .order_by(events.c.id)
+        )
+        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
+        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
+        killed = killed.order_by(events.c.id.desc())
+        found: dict[int, Deaths] = {}
+        with self.reading() as connection:
+            latest = connection.execute(killed.limit(100)).all()
+            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
+            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
+            for row in connection.execute(noted):
+                before = found.get(row.recording_id, Deaths(0, 0, row.at))
+                found[row.recording_id] = Deaths(
+                    before.by_itself + (row.kind == Death.BY_ITSELF),
+                    before.from_outside + (row.id in in_a_row),
+                    row.at,
+                )
+        return found
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
         """What was noticed on the way, oldest first; `kind` as duplicate or refused."""
@@ -174,7 +221,7 @@ def write_event(
     connection: Connection,
     at: datetime,
     kind: str,
-    recording_id: int,
+    recording_id: int | None,
     file_name: str,
     message: str,
 ) -> None:

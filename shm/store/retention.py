@@ -205,8 +205,8 @@ def _refused(reason: Path) -> Refused | None:
     try:
         told: Any = json.loads(reason.read_text(encoding="utf-8"))
         sha256, refused_at = str(told["sha256"]), datetime.fromisoformat(str(told["time"]))
-        if checksum(path) != sha256:
-            return None
+        if told["sha256"] is None or checksum(path) != sha256:
+            return None  # too large to have been read: it lies nowhere else
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return Refused(path, reason, refused_at, _size(path), sha256)

@@ -8,7 +8,7 @@ import json
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import pytest
 
@@ -71,8 +71,8 @@ def test_a_file_that_changes_while_it_is_read_is_not_kept(
     source = a_source(tmp_path)
     copy = archive._copy_hashed
 
-    def copy_and_append(reading: BinaryIO, target: Path) -> tuple[str, int]:
-        result = copy(reading, target)
+    def copy_and_append(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
+        result = copy(reading, target, *more)
         with source.open("ab") as file:
             file.write(b"1,2\n")
         return result
@@ -187,10 +187,10 @@ def test_a_name_given_to_a_link_while_it_is_read_is_noticed(
     source, secret = a_source(tmp_path), a_source(tmp_path, "secret.csv", b"secret\n")
     copy, copied = archive._copy_hashed, []
 
-    def swap_and_copy(reading: BinaryIO, target: Path) -> tuple[str, int]:
+    def swap_and_copy(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
         source.unlink()
         source.symlink_to(secret)
-        sha256, size = copy(reading, target)
+        sha256, size = copy(reading, target, *more)
         copied.append(target.read_bytes())
         return sha256, size
 

@@ -20,7 +20,12 @@ from shm_daemon.doctor.flowing import (
     check_under_way,
 )
 from shm_daemon.doctor.folders import check_disks, check_folders
-from shm_daemon.doctor.installed import check_extras, check_models, check_versions
+from shm_daemon.doctor.installed import (
+    check_confinement,
+    check_extras,
+    check_models,
+    check_versions,
+)
 from shm_daemon.doctor.keeping import check_backup, check_clock, check_hangers, check_store
 from shm_daemon.doctor.telling import check_deliveries, check_hooks
 
@@ -56,6 +61,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
     findings += _found("disk", partial(check_disks, folder, workspace.settings))
     findings += _found("models", partial(check_models, workspace))
     findings += _found("extras", partial(check_extras, workspace))
+    findings += _found("confinement", check_confinement)
     findings += _found("hooks", partial(check_hooks, workspace))
     return (*findings, *_of_store(workspace, now))
 

@@ -14,8 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from shm.errors import BadInput, NothingThere, ShmError, StoreError, UsageError
-from shm_daemon.landing import TooLarge
+from shm.errors import BadInput, NothingThere, ShmError, StoreError, TooLarge, UsageError
 from shm_daemon.web.frame import for_a_person, problem
 
 log = logging.getLogger(__name__)

@@ -14,7 +14,8 @@ from starlette.requests import ClientDisconnect
 from shm.documents import parse_time
 from shm.errors import BadInput, NothingThere
 from shm.store import Stage, Store, StoredRecording
-from shm_daemon.landing import Incoming, Landed, TooLarge, landing_name
+from shm.store.archive import refuse_oversize
+from shm_daemon.landing import Incoming, Landed, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import UPLOADS
 from shm_daemon.web.faults import Refused, answers
@@ -183,11 +184,7 @@ def _refuse_form(request: Request) -> None:
 
 def _refuse_large(request: Request, max_bytes: int) -> None:
     """Before a byte of it is sent, where the sender says how much it is and waits for our word."""
-    if int(request.headers.get("content-length", 0)) > max_bytes:
-        raise TooLarge(
-            f"more than {max_bytes} bytes are not taken.",
-            remedy="Send less at once, or raise the setting max_file_bytes.",
-        )
+    refuse_oversize(int(request.headers.get("content-length", 0)), max_bytes)
 
 
 def _land(
