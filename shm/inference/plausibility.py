@@ -108,8 +108,9 @@ _OFF_SHIFT = 0.01
 _MISTAKEN, _MISTAKEN_DENSITY, _MOST_MISTAKEN = 0.02, 2.5, 2
 """Probability that a mode is another peak or has another's order, within 20 % to either side."""
 
-_MASSES = 0.01, 0.15
-"""Probability that something was hung on the bar; share by which Rayleigh's quotient errs."""
+_MASSES, _MASS_ERROR = (0.01, 0.15), 2e-3
+"""Probability that something was hung on the bar; share by which Rayleigh's quotient errs, and the
+error of each mode besides."""
 _MASS_SHARES = np.geomspace(0.003, 2.0, 11)
 _MASS_PLACES = np.linspace(0.05, 0.5, 10)
 
@@ -312,11 +313,11 @@ class _Candidate:
         return np.asarray((1 - _TOGETHER) * own + _TOGETHER * along * across)
 
     def _with_mass(self, mask: BoolArray) -> float:
-        """With something of any mass at any place, and a third of an ordinary test's errors."""
+        """With something of any mass at any place hung on it."""
         share, place = (a.ravel() for a in np.meshgrid(_MASS_SHARES, _MASS_PLACES))
         shift = np.repeat(_by_mass(share, place)[:, None], 2, axis=1)[:, mask]
         way, (_, sds) = self.sensitivity[mask], self.changes[0]
-        covariance = (way * sds**2) @ way.T + np.diag(self.off.variance[mask] + 1e-3**2)
+        covariance = (way * sds**2) @ way.T + np.diag(self.off.variance[mask] + _MASS_ERROR**2)
         wide = covariance + (_MASSES[1] * shift)[:, :, None] ** 2 * np.eye(shift.shape[1])
         rest = self.off.log_f[mask] - shift
         _, size = np.linalg.slogdet(wide)
@@ -389,7 +390,7 @@ def _candidates(
         if at in before:
             rivals[origin] = _as_before(now[at].over(before[at]), fits.sensitivity(origin))
     if id_ not in before:
-        return fits.described(mine), _with_priors(rivals, len(others))
+        return replace(fits.described(mine), masses=True), _with_priors(rivals, len(others))
     shift, way = seen.over(before[id_]), fits.sensitivity(mine)
     for factor in FACTORS:
         rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)

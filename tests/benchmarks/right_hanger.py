@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import json
 import os
 import sys
 import tempfile
@@ -354,12 +355,22 @@ def main() -> None:
     parser.add_argument("--bridges", type=int, default=4, help="of each world")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--misses", action="store_true", help="print each wrong answer")
+    parser.add_argument("--out", type=Path, help="write all rows here, bridge by bridge")
     args = parser.parse_args()
     tasks = [
         (w, args.seed, i) for i in range(args.bridges) for w in ("finite_elements", "spectral")
     ]
+    rows: list[dict[str, Any]] = []
     with ProcessPoolExecutor(2) as pool:
-        rows = [row for part in pool.map(trial, tasks) for row in part]
+        for part in pool.map(trial, tasks):
+            rows += part
+            if args.out:
+                args.out.write_text(json.dumps(rows), encoding="utf-8")
+    report(rows, args.misses)
+
+
+def report(rows: list[dict[str, Any]], misses: bool) -> None:
+    """Shares of doubted tests by history and kind, each with its interval."""
     groups: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
     for row in rows:
         doubted, key = bool(row["doubt"]), row["kind"]
@@ -370,10 +381,10 @@ def main() -> None:
                 key += " strands" if row["strand"] else " rods"
                 ratio = abs(np.log(row["length_ratio"]))
                 key += " < 3 % in length" if ratio < 0.03 else ""
-        groups[row["history"], key].append(doubted)
+        groups[tuple(row["history"]), key].append(doubted)
         if row["kind"] != "swapped":
-            groups[row["history"], f"  {row['kind']} {row['which']}"].append(doubted)
-        if args.misses and doubted != (row["kind"] != "right") and not row["twins"]:
+            groups[tuple(row["history"]), f"  {row['kind']} {row['which']}"].append(doubted)
+        if misses and doubted != (row["kind"] != "right") and not row["twins"]:
             print({k: v for k, v in row.items() if k != "seconds"})
     for (history, key), each in sorted(groups.items()):
         print(f"{history}  {key:34s} doubted {interval(sum(each), len(each))}")
