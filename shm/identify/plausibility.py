@@ -23,8 +23,8 @@ PEAK_ACCELERATION_M_S2 = 1e-3, 1e4
 """From a tap with a pencil to a sledge; from the noise of a seismic sensor to a shock sensor."""
 
 MASS_OVER_DESCRIBED = 0.02, 50.0
-"""J/v over the hanger's mass: 0.3 to 2.3 in 40 simulated tests (tests/benchmarks/right_signals.py),
-widened by more than 15 for sensors near a node, hits that slip and parts that nobody described."""
+"""J/v over the hanger's mass: 0.3 to 2.7 in 120 tests of tests/benchmarks/right_signals.py, widened
+by more than 15 for sensors near a node, hits that slip and parts that nobody described."""
 
 MASS_OVER_EARLIER = 5.0
 """Factor between J/v of one crew's tests of a hanger; 9.81 is that of g for m/s^2."""
@@ -33,8 +33,8 @@ SENSORS_APART = 100.0
 """Factor between the velocities of sensors of one plane, at places that a crew reaches."""
 
 RINGS_MORE = 2.0
-"""Factor of a signal's ringing after its largest excursion: of accelerometers 5 times and more that
-of a hammer's force, double hits included."""
+"""Factor of the ringing after the largest excursion: of accelerometers 4.9 times and more that
+of a hammer, double hits included (40 tests of tests/benchmarks/right_signals.py)."""
 
 _AFTER_S, _RING_S = 0.02, 0.5
 _LOWEST_HZ, _HIGHEST_HZ = 2.0, 200.0

@@ -44,6 +44,9 @@ DOUBTED_FROM = 0.5
 FACTORS = (2.0, 0.5, 10.0, 0.1, 1.024, 1 / 1.024)
 """Of a wrong time base: the rate of every second sample, a decade, 1000 for 1024."""
 
+COARSE_FACTORS = tuple(factor for factor in FACTORS if abs(math.log(factor)) > 0.1)
+"""Those that a description can show: area, modulus and tape leave ln f open by some percent."""
+
 _LATEST = 5
 """Of a hanger's earlier tests, how many say where its modes lie now."""
 
@@ -379,7 +382,7 @@ def _candidates(
     seen, id_ = now[own.hanger.id], own.hanger.id
     rows.add(Origin("unknown bar"), own.hanger, seen, any_bar=True)
     if not own.tests:
-        for factor in FACTORS:
+        for factor in COARSE_FACTORS:
             origin = Origin("time base", factor=factor)
             rows.add(origin, own.hanger, seen.times(1 / factor))
     fits = rows.fitted()

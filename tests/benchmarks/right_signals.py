@@ -102,7 +102,7 @@ def main() -> None:
         found["g, by an earlier test"].append(bool(signal_doubts([in_g], hanger, [mass_kg])))
     for name, doubts in found.items():
         print(f"{name:38s} doubted {interval(sum(doubts), len(doubts))}")
-    print("J/v over the hanger's mass: {:.2f} to {:.2f}".format(min(masses), max(masses)))
+    print(f"J/v over the hanger's mass: {min(masses):.2f} to {max(masses):.2f}")
     print(f"accelerometers ring at least {min(apart):.1f} times as much as the force")
 
 

@@ -116,6 +116,17 @@ def test_a_wrong_rate_is_told_from_a_tension(factor: float, tests: int) -> None:
     assert "right sampling rate?" in found.text
 
 
+@pytest.mark.parametrize("factor", [2.0, 0.1])
+def test_a_first_test_at_a_rate_that_is_wrong_by_far_is_doubted(factor: float) -> None:
+    found = doubted(scaled(a_test(NINE), factor), NINE, 0)
+    assert found is not None
+    assert found.probability > 0.95
+
+
+def test_a_description_does_not_show_a_rate_that_is_wrong_by_two_percent() -> None:
+    assert doubted(scaled(a_test(NINE), 1.024), NINE, 0) is None
+
+
 def test_exchanged_planes_are_doubted_where_they_differ() -> None:
     test = a_test(NINE)
     other = {"transverse": "longitudinal", "longitudinal": "transverse"}
