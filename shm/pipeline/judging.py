@@ -17,12 +17,14 @@ from shm.store import (
     Judged,
     Store,
     StoredRecording,
+    StoredTest,
     Workspace,
 )
 from shm.store.holding import time_note
-from shm.values import Alert
+from shm.values import Alert, Hanger
 
 _LATEST = 10  # of a hanger's tests: what it does from test to test, without reading years of them
+_LATEST_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
 
 
 def judge(
@@ -85,7 +87,16 @@ def _candidate(
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
         copies=store.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        others=[
+            (other, [each.test for each in _latest_of(store, other, recording)])
+            for other in workspace.bridge.hangers
+            if other.id != hanger.id
+        ],
     )
+
+
+def _latest_of(store: Store, hanger: Hanger, recording: StoredRecording) -> Sequence[StoredTest]:
+    return store.latest_tests_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
 
 
 def _possible(time: datetime | None) -> datetime | None:

@@ -32,7 +32,8 @@ class Candidate:
     `built` is when the bridge was; `tolerance` how far ahead of the receipt a clock may be.
     `reference` are the tests of the hanger's baseline in force, the latest taken at
     `reference_at`; `earlier` its latest tests that count, by time; `baseline` the posterior that
-    later tests are compared with. `copies` are recordings that may hold the same samples.
+    later tests are compared with. `copies` are recordings that may hold the same samples,
+    `others` the other hangers of the bridge with their latest tests that count.
     """
 
     hanger: Hanger
@@ -50,6 +51,7 @@ class Candidate:
     baseline: Posterior | None = None
     fingerprint: Fingerprint | None = None
     copies: Sequence[KnownSamples] = ()
+    others: Sequence[tuple[Hanger, Sequence[ModalTest]]] = ()
 
 
 _MOST_ORDERS = 20  # higher ones say next to nothing of the tension

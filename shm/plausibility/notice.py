@@ -16,7 +16,8 @@ def notice_of(
     Where its modes themselves are not in doubt, what they imply leads: a wrong clock must not hide
     a loss.
     """
-    loss = "" if any(doubt.check == "copy" for doubt in doubts) else _loss(candidate, others)
+    of_others = any(doubt.check.startswith(("copy", "right")) for doubt in doubts)
+    loss = "" if of_others else _loss(candidate, others)
     states = "; ".join(doubt.state for doubt in doubts)
     held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}."
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"

@@ -30,6 +30,10 @@ PLAIN = Candidate(
     fingerprint=PRINT,
     copies=[KnownSamples("a.csv", 3, Fingerprint("1" * 64, np.eye(3, 256, 5)))],
 )
+HALVED = tuple(
+    replace(m, frequency_hz=m.frequency_hz / 2, frequency_sd_hz=m.frequency_sd_hz / 2)
+    for m in PLAIN.test.modes
+)
 DOUBTED = {
     "clock before the bridge": {"test": replace(PLAIN.test, time=datetime(1970, 1, 1, tzinfo=UTC))},
     "clock ahead": {"received_at": START + DAY},
@@ -39,6 +43,7 @@ DOUBTED = {
         "reference": [modelled_test("b", HANGER_3, tension=1.1)],
         "reference_at": START + 5 * DAY,
     },
+    "right time base": {"test": replace(PLAIN.test, modes=HALVED), "earlier": PLAIN.reference},
     "copy": {"copies": [KnownSamples("a.csv (recording 1)", 4, PRINT)]},
 }
 

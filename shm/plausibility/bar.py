@@ -1,0 +1,25 @@
+"""Whether the modes of a test are those of the hanger that it is filed under."""
+
+from __future__ import annotations
+
+from shm.plausibility.bars import Known, doubt_of
+from shm.plausibility.candidate import Candidate
+from shm.values import Doubt
+
+_ACTIONS = {
+    "hanger": "Discard it and drop it again with the right hanger's number, or confirm it",
+    "unknown bar": "Look at the hanger's number and at its description, then discard or confirm it",
+    "time base": "Correct the sampling rate in its sidecar and drop both again, or confirm it",
+    "planes": "Correct the plane in its sidecar and drop both again, or confirm it",
+}
+
+
+def of_another_bar(candidate: Candidate) -> Doubt | None:
+    """Modes of another hanger, of no described bar, of a wrong time base or of exchanged planes."""
+    own = Known(candidate.hanger, tuple(candidate.earlier))
+    others = [Known(hanger, tuple(tests)) for hanger, tests in candidate.others]
+    found = doubt_of(candidate.test, own, others)
+    if found is None:
+        return None
+    why = f"The probability that it is not what it is filed as is {found.probability:.2f}."
+    return Doubt(f"right {found.kind}", found.text.rstrip("?"), _ACTIONS[found.kind], why)
