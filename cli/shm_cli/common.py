@@ -92,7 +92,8 @@ _PEM = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 def tls_options(function: F) -> F:
     """`--certificate PEM --key PEM` of whatever serves the web interface."""
-    for name, text in (("key", "The key of the certificate."), ("certificate", "Serve HTTPS.")):
+    texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
+    for name, text in texts.items():
         function = click.option(f"--{name}", type=_PEM, metavar="PEM", help=text)(function)
     return function
 
