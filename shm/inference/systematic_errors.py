@@ -21,8 +21,8 @@ Ends: TypeAlias = tuple[EndWaves, EndWaves]
 """The deck's and the arch's."""
 
 _SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.05
-"""Accelerometers for structures with magnet, base and cable end: 20 to 90 g, seismic ones 0.2 kg and more,
-none where a laser looks on (makers' data sheets)."""
+"""Accelerometers for structures with magnet, base and cable end: 20 to 90 g, seismic ones
+more (makers' data sheets); none where a laser looks on."""
 
 _MOST_OF_BAR = 0.03
 """Of the bar's own mass: what is lighter than that is measured without touching it."""
