@@ -87,6 +87,7 @@ def _candidate(
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
         copies=store.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        signals=item.signals,
         others=[
             (other, [each.test for each in _latest_of(store, other, recording)])
             for other in workspace.bridge.hangers

@@ -10,6 +10,7 @@ from pathlib import Path
 from shm.bridge import Bridge
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
+from shm.identify.plausibility import signal_doubts
 from shm.inference import refresh, select, update
 from shm.models import build
 from shm.pipeline.calibrating import options_of
@@ -20,7 +21,16 @@ from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm.values import Alert, Averaged, Hanger, ModalTest, Posterior, Selection, WatchedTest
+from shm.values import (
+    Alert,
+    Averaged,
+    Hanger,
+    ModalTest,
+    Posterior,
+    Recording,
+    Selection,
+    WatchedTest,
+)
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
@@ -69,6 +79,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     options = identify_options(settings, bridge)
     result = identify(records, options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
+    measured = [each for each in records if isinstance(each, Recording)]
     return IdentifiedTest(
         result.test,
         frequency_response=result.frequency_response,
@@ -77,6 +88,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
         set_aside=result.set_aside,
         times=tuple(record.time for record in records if record.time is not None),
         fingerprint=fingerprint_of(records),
+        signals=tuple(each.text for each in signal_doubts(measured, hanger)),
     )
 
 

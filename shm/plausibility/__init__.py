@@ -38,6 +38,7 @@ CHECKS: tuple[Check, ...] = (
     clock.before_the_baseline,
     copies.copied,
     bar.of_another_bar,
+    bar.of_other_signals,
 )
 
 

@@ -1,4 +1,5 @@
-"""Whether the modes of a test are those of the hanger that it is filed under."""
+"""Whether the modes of a test are those of the hanger that it is filed under, and its signals what
+their channels say."""
 
 from __future__ import annotations
 
@@ -23,3 +24,15 @@ def of_another_bar(candidate: Candidate) -> Doubt | None:
         return None
     why = f"The probability that it is not what it is filed as is {found.probability:.2f}."
     return Doubt(f"right {found.kind}", found.text.rstrip("?"), _ACTIONS[found.kind], why)
+
+
+def of_other_signals(candidate: Candidate) -> Doubt | None:
+    """A unit that is wrong by 1000, or an accelerometer in the hammer's place."""
+    if not candidate.signals:
+        return None
+    return Doubt(
+        "right signals",
+        "; ".join(text.rstrip("?.") for text in candidate.signals),
+        "Correct units and channels in its sidecar and drop both again, or confirm it",
+        "The hits, the motion after them and the hanger's mass do not fit together.",
+    )

@@ -33,7 +33,8 @@ class Candidate:
     `reference` are the tests of the hanger's baseline in force, the latest taken at
     `reference_at`; `earlier` its latest tests that count, by time; `baseline` the posterior that
     later tests are compared with. `copies` are recordings that may hold the same samples,
-    `others` the other hangers of the bridge with their latest tests that count.
+    `others` the other hangers of the bridge with their latest tests that count. `signals` says
+    which of its channels are doubtful.
     """
 
     hanger: Hanger
@@ -52,6 +53,7 @@ class Candidate:
     fingerprint: Fingerprint | None = None
     copies: Sequence[KnownSamples] = ()
     others: Sequence[tuple[Hanger, Sequence[ModalTest]]] = ()
+    signals: Sequence[str] = ()
 
 
 _MOST_ORDERS = 20  # higher ones say next to nothing of the tension

@@ -155,7 +155,8 @@ class IdentifiedTest:
     """A test to be stored: its place in its file, its frequency response, what was dropped.
 
     `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
-    of the test, `fingerprint` is that of their samples, None where the modes were given.
+    of the test, `fingerprint` is that of their samples, None where the modes were given; `signals`
+    says which channels are doubtful.
     """
 
     test: ModalTest
@@ -166,6 +167,7 @@ class IdentifiedTest:
     set_aside: tuple[ForeignMode, ...] = ()
     times: tuple[datetime, ...] = ()
     fingerprint: Fingerprint | None = None
+    signals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

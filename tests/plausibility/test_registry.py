@@ -44,6 +44,7 @@ DOUBTED = {
         "reference_at": START + 5 * DAY,
     },
     "right time base": {"test": replace(PLAIN.test, modes=HALVED), "earlier": PLAIN.reference},
+    "right signals": {"signals": ["acc_1 moves as 7 g would: right unit?"]},
     "copy": {"copies": [KnownSamples("a.csv (recording 1)", 4, PRINT)]},
 }
 
