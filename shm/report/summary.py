@@ -12,6 +12,7 @@ from shm.report import words
 from shm.report.content import HangerReport, Interval
 from shm.report.diagnosis.summary import next_step, verdict
 from shm.report.diagnosis.tensions import AFTER, tension_of
+from shm.report.redescription import redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
@@ -71,20 +72,6 @@ def summary(data: HangerReport) -> str:
         *advice(data),
     )
     return " ".join(sentence for sentence in sentences if sentence)
-
-
-def redescribed(data: HangerReport) -> str:
-    """That the description has changed since the baseline, and what to do; empty where not."""
-    if not data.redescribed:
-        return ""
-    changed, more = data.redescribed[:_MOST_NAMED], data.redescribed[_MOST_NAMED:]
-    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
-    number = data.hanger.id
-    return (
-        f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`. "
-        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
-    )
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:

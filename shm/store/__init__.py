@@ -2,6 +2,7 @@
 
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
+from shm.store.deaths import Death, Deaths
 from shm.store.glances import (
     AlertRow,
     BaselineGlance,
@@ -20,8 +21,6 @@ from shm.store.rows import (
     Acknowledgement,
     Adoption,
     Baseline,
-    Death,
-    Deaths,
     Delivery,
     DeliveryState,
     Event,

@@ -13,10 +13,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere
 from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Database, insert
+from shm.store.deaths import Death, Deaths
 from shm.store.rows import (
     ENDED,
-    Death,
-    Deaths,
     Event,
     ReceivedFile,
     Stage,

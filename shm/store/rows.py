@@ -384,26 +384,6 @@ class Rerun:
     of_baseline: tuple[str, ...]
 
 
-class Death(StrEnum):
-    """How a process died that worked on a recording, as a kind of event; the first two: alone."""
-
-    BY_ITSELF = "worker died"
-    FROM_OUTSIDE = "worker killed"
-    BESIDE_OTHERS = "worker died beside others"
-
-
-@dataclass(frozen=True)
-class Deaths:
-    """How often a process that worked on a recording alone died since the recording last moved on.
-
-    `from_outside` counts those in a row: it begins anew where another recording's was killed.
-    """
-
-    by_itself: int
-    from_outside: int
-    last_at: datetime
-
-
 @dataclass(frozen=True)
 class Event:
     """Something noticed on the way: a duplicate, a file reopened or refused."""

@@ -390,12 +390,9 @@ APART = {"tests": "frequency_response"}
 
 # Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
 # and what commits fills it in. The index holds those that are empty alone.
+_empty: dict[str, Any] = {
+    f"{n}_where": sa.text("checksum IS NULL") for n in ("sqlite", "postgresql")
+}
 for _table in metadata.tables.values():
     _table.append_column(sa.Column("checksum", sa.BigInteger, onupdate=sa.null()))
-    _empty = sa.text("checksum IS NULL")
-    sa.Index(
-        f"ix_{_table.name}_unsealed",
-        _table.c.checksum,
-        sqlite_where=_empty,
-        postgresql_where=_empty,
-    )
+    sa.Index(f"ix_{_table.name}_unsealed", _table.c.checksum, **_empty)
