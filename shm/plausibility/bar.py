@@ -9,19 +9,18 @@ from shm.values import Doubt
 
 _ACTIONS = {
     "hanger": "Discard it and drop it again with the right hanger's number, or confirm it",
-    "unknown bar": "Look at the hanger's number and at its description, then discard or confirm it",
     "time base": "Correct the sampling rate in its sidecar and drop both again, or confirm it",
     "planes": "Correct the plane in its sidecar and drop both again, or confirm it",
 }
 
 
 def of_another_bar(candidate: Candidate) -> Doubt | None:
-    """Modes of another hanger, of no described bar, of a wrong time base or of exchanged planes."""
+    """Modes of another hanger, of a wrong time base or of exchanged planes."""
     own = Known(candidate.hanger, tuple(candidate.earlier))
     others = [Known(hanger, tuple(tests)) for hanger, tests in candidate.others]
     found = doubt_of(candidate.test, own, others)
-    if found is None:
-        return None
+    if found is None or found.kind == "unknown bar":
+        return None  # of such a bar the first line of its posterior says that it does not fit
     why = f"The probability that it is not what it is filed as is {found.probability:.2f}."
     return Doubt(f"right {found.kind}", found.text.rstrip("?"), _ACTIONS[found.kind], why)
 
