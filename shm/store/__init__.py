@@ -2,7 +2,6 @@
 
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
-from shm.store.deaths import Death, Deaths
 from shm.store.glances import (
     AlertRow,
     BaselineGlance,
@@ -13,11 +12,8 @@ from shm.store.glances import (
     TestRow,
     TrendPoint,
 )
-from shm.store.hold_rows import Decision, HeldTest, Hold
-from shm.store.judging import Judged
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
-    ENDED,
     Acknowledgement,
     Adoption,
     Baseline,
@@ -51,7 +47,6 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM",
-    "ENDED",
     "Acknowledgement",
     "ActiveLock",
     "Adoption",
@@ -59,9 +54,6 @@ __all__ = [
     "Archive",
     "Baseline",
     "BaselineGlance",
-    "Death",
-    "Deaths",
-    "Decision",
     "Delivery",
     "DeliveryRow",
     "DeliveryState",
@@ -70,10 +62,7 @@ __all__ = [
     "FormerPosterior",
     "FormerTest",
     "HangerEvent",
-    "HeldTest",
-    "Hold",
     "IdentifiedTest",
-    "Judged",
     "KeptWatch",
     "Lineage",
     "Numbers",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from datetime import datetime
@@ -13,7 +12,6 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store.checksums import decoding, loads
 from shm.store.database import Database, insert
 from shm.store.queries import selection_in_force
 from shm.store.results import insert_baseline, insert_posterior, insert_selection
@@ -28,8 +26,6 @@ from shm.store.rows import (
 from shm.store.tables import adoptions, diagnoses, posteriors, selection_entries
 from shm.values import Diagnosis, Posterior
 
-log = logging.getLogger(__name__)
-
 _ADOPTION = tuple(field.name for field in fields(Adoption))
 _in_force = adoptions.c.undone_at.is_(None)
 
@@ -42,7 +38,7 @@ class Adopting(Database):
     ) -> StoredDiagnosis:
         """Keeps a diagnosis, which is the hanger's latest from now on."""
         values = {
-            **lineage.columns,
+            **vars(lineage),
             "hanger": hanger,
             "diagnosed_at": at,
             "tests": list(diagnosis.tests),
@@ -53,19 +49,11 @@ class Adopting(Database):
         return StoredDiagnosis(id_, hanger, diagnosis, at, lineage)
 
     def latest_diagnosis(self, hanger: int) -> StoredDiagnosis | None:
-        """The latest diagnosis of a hanger; None where there is none that this version reads."""
+        """The latest diagnosis of a hanger; None where there is none."""
         query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)
         with self.reading() as connection:
             row = connection.execute(query.order_by(diagnoses.c.id.desc()).limit(1)).one_or_none()
-        if row is None:
-            return None
-        with decoding(diagnoses, row, hanger):
-            document = loads(row.document)
-        try:
-            return _diagnosis(row, diagnosis_of(document))
-        except (KeyError, TypeError, ValueError):
-            log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
-            return None
+        return None if row is None else _diagnosis(row)
 
     def adopt(
         self,
@@ -162,22 +150,21 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
 
 
 def _adoption(row: Row[Any]) -> StoredAdoption:
-    with decoding(adoptions, row, row.hanger):
-        return StoredAdoption(
-            id=row.id,
-            adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-            adopted_at=row.adopted_at,
-            undone_at=row.undone_at,
-            undone_why=row.undone_why or "",
-            undone_who=row.undone_who or "",
-        )
+    return StoredAdoption(
+        id=row.id,
+        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
+        adopted_at=row.adopted_at,
+        undone_at=row.undone_at,
+        undone_why=row.undone_why or "",
+        undone_who=row.undone_who or "",
+    )
 
 
-def _diagnosis(row: Row[Any], diagnosis: Diagnosis) -> StoredDiagnosis:
+def _diagnosis(row: Row[Any]) -> StoredDiagnosis:
     return StoredDiagnosis(
         id=row.id,
         hanger=row.hanger,
-        diagnosis=diagnosis,
+        diagnosis=diagnosis_of(row.document),
         diagnosed_at=row.diagnosed_at,
         lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
     )

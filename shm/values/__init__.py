@@ -47,7 +47,6 @@ from shm.values.hanger import (
     Thresholds,
     Turnbuckle,
 )
-from shm.values.held import Doubt, Fingerprint, KnownSamples
 from shm.values.kinds import (
     NAN,
     PLANES,
@@ -118,13 +117,11 @@ __all__ = [
     "Channel",
     "ComplexArray",
     "Diagnosis",
-    "Doubt",
     "Drift",
     "EffectEstimate",
     "EffectPrior",
     "End",
     "EndPlate",
-    "Fingerprint",
     "FloatArray",
     "ForeignMode",
     "FrequencyResponse",
@@ -132,7 +129,6 @@ __all__ = [
     "Hanger",
     "IntArray",
     "Kind",
-    "KnownSamples",
     "Leads",
     "Limits",
     "Mark",

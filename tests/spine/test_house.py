@@ -77,7 +77,6 @@ ROOMS = (
     "report",
     "simulate",
     "pipeline",
-    "plausibility",
 )
 
 
