@@ -119,7 +119,7 @@ def test_a_reading_without_a_standard_deviation_is_taken_as_an_ordinary_lift_off
     assert np.isnan(test.tension_read_sd_n)
     reading = reading_of([test])
     assert reading is not None
-    assert (reading.tension_n, reading.sd) == (6e5, UNKNOWN_READING_SD)
+    assert reading == reading_of([replace(test, tension_read_sd_n=UNKNOWN_READING_SD * 6e5)])
 
 
 def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:
