@@ -102,6 +102,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "at_bounds": list(posterior.at_bounds),
         "misfit_percent": posterior.misfit_percent,
         "log_occam": posterior.log_occam,
+        "tension_of_other_ends_n": posterior.tension_of_other_ends_n,
         "caveats": list(posterior.caveats),
     }
 

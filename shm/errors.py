@@ -3,10 +3,14 @@
 ShmError                      exit code 1
 ├── UsageError                2   the call itself is off
 ├── BadInput                  3   a file, channel, line or value that cannot be used
-│   └── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   ├── NotIdentifiable       3   a readable recording in which no mode can be trusted
+│   └── TooLarge              3   more bytes than are taken
 ├── NothingThere              4   a right question that has no answer yet
+├── WorkerDied                1   a process died that worked on a file, perhaps not because of it
 ├── StoreError                5   the store cannot be used
 │   ├── SchemaOutdated        5   mend: `shm db upgrade`
+│   ├── StoreDamaged          5   its bytes are not those that were written
+│   │   └── DamagedRow        5   one row of it; all others can be used
 │   └── StoreBusy             5   passing: try again after `retry_after_s`
 └── GateNotMet                6   a validation or a blind trial missed its mark
 """
@@ -14,6 +18,7 @@ ShmError                      exit code 1
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 
 class ShmError(Exception):
@@ -78,10 +83,27 @@ class NotIdentifiable(BadInput):
     """A recording that reads well but holds no mode that can be trusted."""
 
 
+class TooLarge(BadInput):
+    """A file of more bytes than are taken; it is neither copied nor read."""
+
+
 class NothingThere(ShmError):
     """Nothing has been stored yet that answers the question."""
 
     exit_code = 4
+
+
+class WorkerDied(ShmError):
+    """A process that worked on a file died: of the file, or killed by somebody else.
+
+    `how` is the signal or the exit code; `from_outside` where it was killed, and nothing shows that
+    the file was the reason.
+    """
+
+    def __init__(self, message: str, *, how: str = "", from_outside: bool = False):
+        super().__init__(message, remedy="It is tried again.")
+        self.how = how
+        self.from_outside = from_outside
 
 
 class StoreError(ShmError):
@@ -92,6 +114,29 @@ class StoreError(ShmError):
 
 class SchemaOutdated(StoreError):
     """The store was written by another version of shm."""
+
+
+class StoreDamaged(StoreError):
+    """The store holds other bytes than were written into it."""
+
+
+class DamagedRow(StoreDamaged):
+    """One row cannot be read, or is not as it was written: its table, number and hanger.
+
+    All other rows can be used. `hanger` is None where the row is of none, or that is not known.
+    """
+
+    def __init__(self, table: str, id_: object, hanger: int | None, remedy: str):
+        of_hanger = "" if hanger is None else f" of hanger {hanger}"
+        super().__init__(
+            f"row {id_} of {table}{of_hanger} is damaged: it is not as it was written.",
+            remedy=remedy,
+            retry_after_s=60.0,  # it may be healed meanwhile
+        )
+        self.table, self.id, self.hanger = table, id_, hanger
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.table, self.id, self.hanger, self.remedy)
 
 
 class StoreBusy(StoreError):

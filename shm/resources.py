@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
+KILLING = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
+"""What operators, the kernel without memory and its helpers send; nothing that a parser does."""
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -50,6 +53,37 @@ def give_back_memory() -> None:
     trim = _malloc_trim()
     if trim is not None:
         trim(0)
+
+
+def memory_in_use(pid: int | str = "self") -> int:
+    """Resident memory of a process, in bytes; 0 where the system does not tell, or it has gone."""
+    try:
+        pages = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]
+    except OSError:
+        return 0
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+@cache
+def memory_of_machine() -> int:
+    """The memory of the machine or, where that is less, of our control group, in bytes.
+
+    0 where the system does not tell.
+    """
+    try:
+        known = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    except (ValueError, OSError):
+        return 0
+    try:  # version 2 alone; its last line is 0::/PATH
+        group = Path("/proc/self/cgroup").read_text(encoding="utf-8").split("0::/")[-1].strip()
+    except OSError:
+        return known[0]
+    for folder in (Path(group), *Path(group).parents):
+        try:
+            known.append(int(Path("/sys/fs/cgroup", folder, "memory.max").read_text("ascii")))
+        except (OSError, ValueError):  # no such file, or "max"
+            continue
+    return min(known)
 
 
 @cache

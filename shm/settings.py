@@ -96,7 +96,7 @@ class Settings:
         2.0, "s", "a file is whole once unchanged for so long", 0, 3600
     )
     future_tolerance_seconds: float = _row(
-        3600.0, "s", "how far ahead of the clock a test may claim to be", 0, None
+        86400.0, "s", "a test further ahead of the clock is held; zones differ by 14 hours", 0, None
     )
     max_file_bytes: int = _row(1_000_000_000, "bytes", "larger files are refused", 1, None)
     max_channels: int = _row(16, "", "accelerations that one file may hold", 1, 1000)
@@ -146,6 +146,13 @@ class Settings:
 
     web_hosts: str = _row(
         "", "", "names, parted by commas, by which the web interface may be called", None, None
+    )
+    web_proxies: str = _row(
+        "127.0.0.1,::1",
+        "",
+        "addresses, parted by commas, of proxies that are believed whom they were called by",
+        None,
+        None,
     )
     mqtt_url: str = _row(
         "", "", "broker to take recordings from, as mqtts://user@host:8883", None, None

@@ -8,6 +8,7 @@ import rich_click as click
 
 from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import utc_now
+from shm.pipeline.rebuilding import rebuild
 from shm.store import Rerun, Stage, Store, Workspace
 from shm_cli.working import finish, working
 
@@ -20,8 +21,10 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
     """
     with workspace.store() as store:
         recording_id, test = store.recording_named(which)
-        if stage is Stage.IDENTIFIED:
+        if stage is Stage.IDENTIFIED or store.damaged_tests(recording_id):
             _refuse_without_raw_file(workspace, store, recording_id)
+        for made in rebuild(workspace, store, recording_id, utc_now()):
+            click.echo(made, err=True)
         rerun = store.again(recording_id, stage, utc_now(), test)
     for sentence in sentences(rerun, stage):
         click.echo(sentence, err=True)
@@ -34,10 +37,13 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
 
 
 def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: int) -> None:
-    """Raises NothingThere, saying where the raw file lies, where it is not in the archive."""
+    """Raises NothingThere, saying where the raw file lies, where it is not in the archive.
+
+    And StoreError where it is damaged there: nothing is superseded for want of it.
+    """
     file = store.recording(recording_id).file
     if workspace.archive.holds(file):
-        return
+        return workspace.archive.refuse_damaged(file)
     folder = store.removed_to().get(recording_id)
     lies = f"; a copy lies in {folder}" if folder else ""
     raise NothingThere(

@@ -86,7 +86,7 @@ def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
     """
     with opened_store(ctx) as (workspace, store):
         recording = store.recording(store.recording_named(which)[0])
-        held = workspace.archive.holds(recording.file)
+        held = workspace.archive.holds_whole(recording.file)
         folder = None if held else fetch(store, workspace.archive, recording)
     if as_json:
         come_from = None if folder is None else str(folder)

@@ -32,6 +32,7 @@ from shm.errors import NothingThere, UsageError
 from shm.inference import METHODS, NOISE_FLOOR, UpdateOptions
 from shm.models import PRIORS, THESIS
 from shm.modes_document import load_modes
+from shm.plausibility.bars import Known, doubt_of
 from shm.values import Hanger, ModalTest
 from shm_cli import completers
 
@@ -84,6 +85,17 @@ log_file_option = click.option(
     metavar="FILE",
     help="Write the log there, not on stderr; it is put aside as it grows (log_files of them).",
 )
+
+
+_PEM = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def tls_options(function: F) -> F:
+    """`--certificate PEM --key PEM` of whatever serves the web interface."""
+    texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
+    for name, text in texts.items():
+        function = click.option(f"--{name}", type=_PEM, metavar="PEM", help=text)(function)
+    return function
 
 
 def hanger_option(required: bool = False) -> Callable[[F], F]:
@@ -243,6 +255,8 @@ def tests_and_hanger(
             hanger_id = tests[0].hanger
         hanger = one_hanger(ctx, hanger_file, hanger_id)
         _say_if_another(tests[0], hanger)
+        for test in tests:
+            tell_doubt(test, hanger)
         return tests, hanger
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
@@ -252,6 +266,13 @@ def tests_and_hanger(
             f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
         )
     return (stored[-1].test,), hanger
+
+
+def tell_doubt(test: ModalTest, hanger: Hanger) -> None:
+    """Says on stderr, before any result, that a test is probably not of the described hanger."""
+    doubt = doubt_of(test, Known(hanger), [])
+    if doubt is not None:
+        click.echo(f"Doubtful: test {test.id}. {doubt.text}", err=True)
 
 
 def _say_if_another(test: ModalTest, hanger: Hanger) -> None:

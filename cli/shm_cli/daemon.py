@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rich_click as click
 
-from shm_cli.common import log_file_option, open_workspace
-from shm_daemon import run
-from shm_daemon.logs import begin_logging
-from shm_daemon.unit import unit_text
-from shm_daemon.web.address import Address
-from shm_daemon.web.beside import web_beside
+from shm.errors import UsageError
+from shm_cli.common import log_file_option, open_workspace, tls_options
+
+if TYPE_CHECKING:
+    from shm_daemon.web.address import Address
 
 
 @click.command()
@@ -26,6 +26,7 @@ from shm_daemon.web.beside import web_beside
 @click.option(
     "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="Its port."
 )
+@tls_options
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
 @log_file_option
 @click.option(
@@ -41,6 +42,8 @@ def command(
     web: bool,
     host: str,
     port: int,
+    certificate: Path | None,
+    key: Path | None,
     workers: int | None,
     log_file: Path | None,
     print_unit: bool,
@@ -53,20 +56,39 @@ def command(
     \b
     Example: shm --workspace arch daemon
     """
+    from shm_daemon.logs import begin_logging
+    from shm_daemon.unit import unit_text
+    from shm_daemon.web.address import Address
+    from shm_daemon.web.beside import web_beside
+
+    tls = {"--certificate": certificate, "--key": key}
+    if not web and any(tls.values()):
+        raise UsageError("--certificate and --key are for --web.", remedy="Give --web as well.")
     workspace = open_workspace(ctx, workers=workers)
     if print_unit:
-        options = _options(standby, web, host, port, workers)
+        options = _options(standby, web, Address(host, port), tls, workers)
         click.echo(unit_text(workspace.folder, Path(sys.prefix), options), nl=False)
         return
     begin_logging(workspace.settings, log_file)
-    with web_beside(workspace, Address(host, port) if web else None, log_file):
+    address = Address(host, port) if web else None
+    with web_beside(workspace, address, log_file, certificate, key):
+        from shm_daemon.loop import run  # while the interface, which needs less, begins
+
         run(workspace, once=once, standby=standby)
 
 
-def _options(standby: bool, web: bool, host: str, port: int, workers: int | None) -> Sequence[str]:
-    """The options as they are typed."""
+def _options(
+    standby: bool,
+    web: bool,
+    address: Address,
+    tls: Mapping[str, Path | None],
+    workers: int | None,
+) -> Sequence[str]:
+    """The options as they are typed, with paths that hold from everywhere."""
+    place = ["--web", "--host", address.host, "--port", str(address.port)]
+    files = [str(word) for name, file in tls.items() if file for word in (name, file.resolve())]
     return [
         *(["--standby"] if standby else []),
-        *(["--web", "--host", host, "--port", str(port)] if web else []),
+        *([*place, *files] if web else []),
         *(["--workers", str(workers)] if workers is not None else []),
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import StoreError
+from shm.errors import DamagedRow, StoreError
 from shm.store import Archive, Store, Workspace
 from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
@@ -61,6 +61,7 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
+            store.drop_damaged()
             hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
             made = sum(store.keep_summaries(hanger) for hanger in hangers)
             location = store.location
@@ -93,6 +94,7 @@ def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
             "store": location,
             "tables": [asdict(each) for each in checked.tables],
             "archive": asdict(archive) if archive else None,
+            "damaged": [_damage_document(each) for each in checked.damaged],
             "troubles": list(troubles),
         }
         show(document)
@@ -102,7 +104,12 @@ def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
         click.echo(f"The store has the present schema and holds {held} recordings.")
         if archive is not None:
             click.echo(_archive_said(archive))
-    _raise_troubles(troubles, "Restore the store, or its raw files, from a backup.")
+    _raise_troubles(
+        troubles,
+        "What cannot be made again is restored, store or raw files, from a backup."
+        if checked.damaged
+        else "Restore the store, or its raw files, from a backup.",
+    )
 
 
 @command.command()
@@ -123,7 +130,7 @@ def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -
     workspace = open_workspace(ctx)
     copied, noted = None, 0
     with workspace.store() as store, progress_bar("backup") as tell:
-        tables = back_up(store, file, tell)
+        written = back_up(store, file, tell)
         if copies is not None:
             target, removed = Archive(copies), store.removed_names(workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
@@ -131,12 +138,16 @@ def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -
             noted = store.note_copies(target, datetime.now(UTC))
         store.note_backup(file.resolve(), datetime.now(UTC))
     if as_json:
-        show({"file": str(file), **_document(tables, copied), "newly_noted": noted})
+        document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
+        show({**document, "troubles": list(written.troubles)})
     else:
-        _show_tables(tables)
+        _show_tables(written.tables)
         click.echo(f"Wrote {file}.")
         _say_copied(copied)
-    _raise_troubles(copied.troubles if copied else (), "Run `shm db check --archive`.")
+    _raise_troubles(
+        (*written.troubles, *(copied.troubles if copied else ())),
+        "The backup holds all else. Keep the older ones, and run `shm db check --archive`.",
+    )
 
 
 @command.command("restore")
@@ -198,6 +209,10 @@ def copy(ctx: click.Context, target: str, as_json: bool) -> None:
         click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
 
 
+def _damage_document(row: DamagedRow) -> dict[str, object]:
+    return {"table": row.table, "id": row.id, "hanger": row.hanger, "remedy": row.remedy}
+
+
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:
     if copies is None:
         return None
@@ -234,4 +249,5 @@ def _archive_said(archive: CheckedArchive) -> str:
 
 def _raise_troubles(troubles: Sequence[str], remedy: str) -> None:
     if troubles:
-        raise StoreError(f"{'; '.join(troubles)}.", remedy=remedy)
+        said = "; ".join(each.removesuffix(".") for each in troubles)
+        raise StoreError(f"{said}.", remedy=remedy)

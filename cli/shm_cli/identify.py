@@ -13,11 +13,12 @@ import rich_click as click
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
+from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
 from shm.read.apart import read_test
 from shm.report import TestSheet, test_figures, test_page, test_text
 from shm.settings import Settings
-from shm.values import Hanger
+from shm.values import Hanger, Recording
 from shm_cli.common import (
     counting_bar,
     drawing,
@@ -27,6 +28,7 @@ from shm_cli.common import (
     one_hanger,
     readable_width,
     show,
+    tell_doubt,
 )
 from shm_cli.writable import NewFile
 
@@ -196,6 +198,8 @@ def _identified(
 ) -> TestSheet:
     """One test; it is of the described hanger where its records do not say."""
     records = [record for path in group for record in read_test(path)]
+    for doubt in signal_doubts([r for r in records if isinstance(r, Recording)], hanger):
+        click.echo(f"Doubtful: {doubt.text}", err=True)
     found = identify(records, options, test_id=group[0].stem, hanger=hanger)
     named = found.test.hanger
     if hanger is not None and named is None:
@@ -206,6 +210,8 @@ def _identified(
             file=group[0],
             remedy="Give the description of its hanger, or correct the file.",
         )
+    if hanger is not None:
+        tell_doubt(found.test, hanger)
     return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 

@@ -14,11 +14,22 @@ from shm.documents import alert_document
 from shm.errors import BadInput, ShmError, StoreError, UsageError
 from shm.pipeline import Flow
 from shm.read import bundle
-from shm.store import AGAIN_FROM, Outcome, Receipt, Stage, StoredRecording, Workspace
+from shm.store import (
+    AGAIN_FROM,
+    Decision,
+    Outcome,
+    Receipt,
+    Stage,
+    StoredRecording,
+    Workspace,
+)
+from shm.store.archive import refuse_oversize
 from shm.values import Alert
 from shm_cli.again import rerun_document, send_back
 from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli.held import Time, decide, decided_words, hold_document, show_held
 from shm_cli.peek import show_peeks
+from shm_cli.record import Words
 from shm_cli.working import finish, working
 
 
@@ -44,35 +55,52 @@ from shm_cli.working import finish, working
     type=click.Choice([stage.value for stage in AGAIN_FROM]),
     help="With --again: the first stage that is done again.  [default: identified]",
 )
+@click.option("--held", is_flag=True, help="Instead of files: show what is held, and why.")
+@click.option("--confirm", metavar="ID", help="Instead of files: what is held counts from now on.")
+@click.option("--discard", metavar="ID", help="Instead of files: what is held is not to count.")
+@click.option("--time", type=Time(), help="With --confirm: the true time of the test.")
+@click.option("--why", type=Words(), help="With --confirm or --discard: for the record.")
+@click.option("--who", show_default="the user's name", help="With --confirm or --discard.")
 @json_option
 @click.pass_context
 def command(
     ctx: click.Context,
+    /,
     files: tuple[Path, ...],
     together: bool,
     look: bool,
-    again: str | None,
-    stage: str | None,
     as_json: bool,
+    **about: Any,
 ) -> int:
     """Take recordings in, look into them with --peek, or do one again with --again.
 
     Each file is archived, identified, updated and watched as the daemon would; it may also be a
     *.modes.json. The files stay where they are. Exit code 3 when any was refused.
 
+    What is implausible is held and counts in nothing: --held shows it, --confirm and --discard
+    answer it.
+
     \b
     Example: shm ingest hanger3_*.csv
     Example: shm ingest --again t7 --from updated
+    Example: shm ingest --confirm 12 --time 2026-05-01T10:00Z --why "clock was dead"
     """
-    _refuse_mixture(files, again, stage, together or look)
+    _refuse_mixture(files, about, together or look)
     if look:
         return show_peeks(files, as_json)
     logging.getLogger("shm").addHandler(logging.NullHandler())  # all is said in the table
     workspace = open_workspace(ctx)
-    if again is not None:
-        return _again(workspace, again, Stage(stage or Stage.IDENTIFIED), as_json)
+    if about["held"]:
+        return show_held(workspace, as_json)
+    if about["confirm"] or about["discard"]:
+        return _decide(workspace, about, as_json)
+    if about["again"] is not None:
+        stage = Stage(about["stage"] or Stage.IDENTIFIED)
+        return _again(workspace, about["again"], stage, as_json)
     if together:
         folder = Path(ctx.with_resource(TemporaryDirectory()))
+        most = workspace.settings.max_file_bytes
+        refuse_oversize(sum(path.stat().st_size for path in files), most)
         files = (bundle(files, folder / f"{files[0].stem}.zip"),)
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}
@@ -87,15 +115,49 @@ def command(
     return BadInput.exit_code if refused else 0
 
 
-def _refuse_mixture(
-    files: Sequence[Path], again: str | None, stage: str | None, about_files: bool
-) -> None:
-    if again is None and not files:
-        raise UsageError("no file is named.", remedy="Give FILE..., or --again ID.")
-    if again is None and stage is not None:
-        raise UsageError("--from goes with --again.", remedy="Give --again ID as well.")
-    if again is not None and (files or about_files):
-        raise UsageError("--again takes no files.", remedy="Give either FILE... or --again ID.")
+_INSTEAD = ("again", "held", "confirm", "discard")
+_GOES_WITH = {
+    "stage": ("--from", ("again",)),
+    "time": ("--time", ("confirm",)),
+    "why": ("--why", ("confirm", "discard")),
+    "who": ("--who", ("confirm", "discard")),
+}
+
+
+def _refuse_mixture(files: Sequence[Path], about: Mapping[str, Any], about_files: bool) -> None:
+    chosen = [name for name in _INSTEAD if about[name] not in (None, False)]
+    if not chosen and not files:
+        raise UsageError(
+            "no file is named.", remedy="Give FILE..., --again ID, --held, --confirm or --discard."
+        )
+    for name, (option, owners) in _GOES_WITH.items():
+        if about[name] is not None and not set(chosen) & set(owners):
+            needed = " or ".join(f"--{owner}" for owner in owners)
+            raise UsageError(f"{option} goes with {needed}.", remedy=f"Give {needed} ID as well.")
+    if len(chosen) > 1:
+        raise UsageError(
+            f"--{chosen[0]} and --{chosen[1]} at once.", remedy="Give one after the other."
+        )
+    if chosen and (files or about_files):
+        raise UsageError(
+            f"--{chosen[0]} takes no files.", remedy=f"Give either FILE... or --{chosen[0]}."
+        )
+
+
+def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> int:
+    decision = Decision.CONFIRMED if about["confirm"] else Decision.DISCARDED
+    which, record = about["confirm"] or about["discard"], (about["who"], about["why"])
+    hold, raised = decide(workspace, which, decision, record, about["time"])
+    with workspace.store() as store:
+        stage = store.recording(hold.recording_id).stage
+    if as_json:
+        alerts = [alert_document(stored.alert) for stored in raised]
+        show({**hold_document(hold), "stage": stage.value, "alerts": alerts})
+        return 0
+    click.echo(decided_words(hold, stage))
+    for stored in raised:
+        click.echo(f"Alert: {stored.alert.message}", err=True)
+    return 0
 
 
 def _again(workspace: Workspace, which: str, stage: Stage, as_json: bool) -> int:
@@ -137,11 +199,11 @@ def _received(
 
 
 def _row(path: Path, outcome: Outcome, recording: StoredRecording) -> dict[str, object]:
-    refused = recording.stage is Stage.REFUSED
+    ended = {Stage.REFUSED: _REFUSED, Stage.HELD: "held"}
     return {
         "file": path.name,
         "known_as": recording.file.file_name,
-        "outcome": _REFUSED if refused else _OUTCOMES[outcome],
+        "outcome": ended.get(recording.stage, _OUTCOMES[outcome]),
         "stage": recording.stage.value,
         "hanger": recording.hanger,
         "sha256": recording.file.sha256,
@@ -156,7 +218,7 @@ def _sentence(reason: Mapping[str, Any]) -> str:
     """Line and channel where they are known, what is wrong, what to do."""
     line = f"line {reason['line']}: " if reason["line"] is not None else ""
     channel = f"channel {reason['channel']}: " if reason["channel"] else ""
-    return f"{line}{channel}{reason['message']} {reason['remedy']}"
+    return f"{line}{channel}{reason['message']} {reason['remedy']}".strip()
 
 
 _OUTCOMES = {
@@ -164,6 +226,7 @@ _OUTCOMES = {
     Outcome.RESUMED: "taken in",
     Outcome.DUPLICATE: "known already",
     Outcome.REOPENED: "tried again",
+    Outcome.REDESCRIBED: "done again",
 }
 
 
@@ -183,4 +246,5 @@ def _show(
         if row["reason"]:
             click.echo(f"{row['file']}: {row['reason']}", err=True)
     for alert in raised:
-        click.echo(f"Alert: {alert.message}", err=True)
+        if "held" not in alert.kinds:  # told beside its file
+            click.echo(f"Alert: {alert.message}", err=True)

@@ -10,15 +10,16 @@ from typing import Any
 
 import rich_click as click
 
+from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.words import model_class
-from shm.store import DeliveryState, Stage, Store, Workspace
-from shm_cli.common import json_option, opened_store, show, show_table, table
+from shm.store import ENDED, DeliveryState, Store, Workspace
+from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
+from shm_cli.held import hold_document
 from shm_cli.stages import show_stages
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 
 
@@ -49,6 +50,8 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     for row in document["hangers"]:
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+        if row["damage"] is not None:
+            click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
 
 
 def _show(document: dict[str, Any]) -> None:
@@ -64,25 +67,37 @@ def _show(document: dict[str, Any]) -> None:
     click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
     click.echo(f"waiting: {document['spool']} in the spool, {document['under_way']} stored{since}")
     click.echo(f"in quarantine: {document['quarantine']}")
+    if document["held"]:
+        click.echo(f"held until you decide: {len(document['held'])}; see `shm ingest --held`")
     click.echo(
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     made = table(
-        "hangers", "hanger", "tests", "latest", "model class", "baseline since", "open alerts"
+        "hangers",
+        "hanger",
+        "tests",
+        "held",
+        "latest",
+        "model class",
+        "baseline since",
+        "open alerts",
     )
     for row in document["hangers"]:
         latest, since = row["latest_test"], row["baseline_since"]
         made.add_row(
             str(row["hanger"]),
             str(row["tests"]),
+            str(row["held"] or ""),
             f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
             model_class(row["model"]) if row["model"] else "none yet",
             f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
             str(row["open_alerts"] or ""),
         )
     show_table(made)
+    for each in document["held"]:
+        click.echo(f"held, recording {each['recording']}: {paragraph(each['message'])}")
 
 
 def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
@@ -120,21 +135,23 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     alerts, deliveries = store.alerts(), store.delivery_counts()
     open_at = Counter(each.alert.hanger for each in alerts if each.acknowledgement is None)
     counts = store.stage_counts()
-    ended = counts[Stage.DONE] + counts[Stage.REFUSED]
+    ended = sum(counts[stage] for stage in ENDED)
+    held = store.holds()
     return {
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
-        "recordings": {stage.value: n for stage, n in counts.items()},
+        "recordings": counts,
         "under_way": sum(counts.values()) - ended,
         "oldest_waiting_at": store.oldest_waiting(),
         "spool": len(scan(workspace.spool)),
         "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
         "alerts": len(alerts),
         "open_alerts": open_at.total(),
-        "deliveries": {state.value: n for state, n in deliveries.items()},
+        "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
-        "hangers": _hangers(workspace, store, open_at),
+        "held": [hold_document(hold) for hold in held],
+        "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),
     }
 
 
@@ -145,12 +162,17 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
 
 
 def _hangers(
-    workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
+    workspace: Workspace, store: Store, open_alerts: Mapping[int, int], held: Mapping[int, int]
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.selected_models(), store.latest_tests(), []
+    damage = {each.hanger: str(each) for each in store.known_damage()}
     for hanger in workspace.bridge.hangers:
-        found, baseline = latest.get(hanger.id), store.baseline(hanger.id)
-        adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+        found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
+        try:
+            baseline, watch = store.baseline(hanger.id), gap_watch(store, hanger.id)
+            adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+        except DamagedRow as error:
+            damage[hanger.id] = str(error)
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
@@ -163,7 +185,9 @@ def _hangers(
                 "baseline_set_at": baseline.set_at if baseline else None,
                 "baseline_since": (baseline.since or baseline.set_at) if baseline else None,
                 "open_alerts": open_alerts[hanger.id],
-                "gap": _gap(gap_watch(store, hanger.id)),
+                "held": held[hanger.id],
+                "gap": _gap(watch),
+                "damage": damage.get(hanger.id),
             }
         )
     return rows

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm_cli.common import log_file_option, open_workspace
-
-_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+from shm_cli.common import log_file_option, open_workspace, tls_options
 
 
 @click.command()
@@ -16,8 +14,7 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option(
     "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="The port."
 )
-@click.option("--certificate", type=_FILE, metavar="PEM", help="Serve HTTPS with this.")
-@click.option("--key", type=_FILE, metavar="PEM", help="The key of the certificate.")
+@tls_options
 @log_file_option
 @click.pass_context
 def command(
@@ -40,10 +37,11 @@ def command(
     """
     from shm_daemon.logs import begin_logging
     from shm_daemon.web.address import Address
-    from shm_daemon.web.serving import serve
+    from shm_daemon.web.serving import leaving, serve
 
     workspace, address = open_workspace(ctx), Address(host, port)
     begin_logging(workspace.settings, log_file)
     page = address.page(certificate is not None)
     said = f"The dashboard: {page}  (Ctrl+C ends it)"
-    serve(workspace, address, certificate, key, lambda: click.echo(said))
+    with leaving():
+        serve(workspace, address, certificate, key, lambda: click.echo(said))

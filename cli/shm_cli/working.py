@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 from shm.pipeline import Flow
-from shm.store import Stage, Workspace
+from shm.store import ENDED, Workspace
 from shm_cli.common import counting_bar
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.hooks import HookNotifier
@@ -32,13 +33,15 @@ def working(workspace: Workspace) -> Iterator[Flow]:
 
 def finish(flow: Flow, ids: Sequence[int]) -> None:
     """Works until nothing waits, and counts the recordings that are through."""
-    ended = {Stage.DONE, Stage.REFUSED}
     with counting_bar() as bar:
         task = bar.add_task("ingesting", total=len(ids))
 
         def count() -> None:
-            through = sum(flow.store.recording(recording_id).stage in ended for recording_id in ids)
+            through = sum(flow.store.recording(recording_id).stage in ENDED for recording_id in ids)
             bar.update(task, completed=through)
 
         flow.drain(count)
+        while (wait_s := flow.suspects_due_s()) is not None:  # its process died
+            time.sleep(wait_s)
+            flow.drain(count)
         count()

@@ -1,20 +1,39 @@
-"""Where steps run: a pool of processes that a crash of one step cannot take along, or a cluster."""
+"""Where steps run: processes of our own, of which each may die for itself, or a cluster."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import resource
 import signal
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
-from multiprocessing.connection import wait
+from multiprocessing.connection import Connection, wait
+from typing import Any, ParamSpec, TypeVar
 
-from shm.errors import ShmError
-from shm.resources import one_thread_a_process
+from shm.errors import ShmError, WorkerDied
+from shm.resources import KILLING, memory_in_use, memory_of_machine, one_thread_a_process
 from shm.settings import Settings
+
+_STEPS = "shm.pipeline.steps"
+_LOOK_S = 0.1
+_BEGIN_AGAIN_S = 5.0
+_MOST_OF_MEMORY = 0.8
+"""One step may have so much of the machine's memory; beyond, it is told that there is none."""
+_LARGE = 0.4
+"""A process that was killed with so much of the memory was probably killed for that."""
+
+_FORKSERVER_GONE = 255
+"""What multiprocessing says of a process whose end it cannot know."""
+_NOTHING: tuple[Any, BaseException | None] = (None, None)
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 def executor_of(settings: Settings) -> Executor:
@@ -24,7 +43,7 @@ def executor_of(settings: Settings) -> Executor:
     """
     one_thread_a_process()
     if not settings.scheduler:
-        return process_pool(settings.workers)
+        return Workers(settings.workers)
     try:
         from shm_daemon.cluster import Cluster
     except ImportError as error:
@@ -33,6 +52,162 @@ def executor_of(settings: Settings) -> Executor:
             remedy="`pip install shm[distributed]`, or leave the setting empty.",
         ) from error
     return Cluster(settings.scheduler)
+
+
+class Workers(Executor):
+    """Processes of our own, each of which does one step at a time and dies for itself alone.
+
+    A step whose process died raises WorkerDied; the others go on, and a new process takes the
+    place. Raises ShmError with `retry_after_s` where no process can be begun. `prepare` is called
+    in each new process.
+    """
+
+    def __init__(self, count: int, prepare: Callable[[], object] | None = None):
+        self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
+        self._prepare, self._idle, self._ended = prepare, list[_Worker](), False
+        self._threads.submit(self._begin_early)
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        return self._threads.submit(self._run, partial(fn, *args, **kwargs), fresh=False)
+
+    def submit_fresh(self, fn: Callable[[], T], /) -> Future[T]:
+        """The same in a process that has done nothing before and will do nothing after."""
+        return self._threads.submit(self._run, fn, fresh=True)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Ends the processes that are at rest; those at work end with their step, or with us."""
+        self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
+        self._ended = True
+        while self._idle:
+            self._idle.pop().end()
+
+    def _begin_early(self) -> None:
+        """The first process imports what it needs while we go on."""
+        with suppress(ShmError):
+            self._rest(_Worker(self._prepare))
+
+    def _run(self, step: Callable[[], T], *, fresh: bool) -> T:
+        while True:
+            worker = self._idle.pop() if self._idle and not fresh else _Worker(self._prepare)
+            try:
+                found: T = worker.do(step)
+            except WorkerDied:
+                if worker.begun or self._ended:
+                    raise
+            else:
+                return found
+            finally:
+                if fresh:
+                    worker.end()
+                else:
+                    self._rest(worker)
+
+    def _rest(self, worker: _Worker) -> None:
+        if worker.lives and not self._ended:
+            self._idle.append(worker)
+        else:
+            worker.end()
+
+
+class _Worker:
+    """One process, asked through a pipe; `begun` where it has taken on what it was asked last."""
+
+    begun = False
+
+    def __init__(self, prepare: Callable[[], object] | None):
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload([_STEPS])  # in a thread: nobody waits for it
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        try:
+            self._process.start()
+        except (OSError, EOFError) as error:
+            raise ShmError(
+                f"no process can be begun to work in: {error!r}.",
+                remedy="See memory and processes of this machine; it is tried again.",
+                retry_after_s=_BEGIN_AGAIN_S,
+            ) from error
+        finally:
+            theirs.close()
+
+    @property
+    def lives(self) -> bool:
+        return self._process.is_alive()
+
+    def do(self, step: Callable[[], Any]) -> Any:
+        """What the step gives or raises; raises WorkerDied."""
+        largest, self.begun = 0, False
+        try:
+            self._pipe.send(step)
+            self.begun = bool(self._pipe.recv())
+            while not wait([self._pipe, self._process.sentinel], _LOOK_S):
+                largest = max(largest, memory_in_use(self._process.pid or 0))
+            found, error = self._pipe.recv()
+        except (EOFError, ConnectionError):
+            raise self._death(largest) from None
+        if error is not None:
+            raise error
+        return found
+
+    def _death(self, largest: int) -> WorkerDied:
+        self.end()
+        code, ours = self._process.exitcode or 0, memory_of_machine()
+        killed = -code in KILLING or code == _FORKSERVER_GONE
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        large = bool(ours) and largest > _LARGE * ours
+        held = (
+            f" when it held {largest / 1e9:.1f} of {ours / 1e9:.1f} GB of memory" if large else ""
+        )
+        said = "was killed" if killed else "died"
+        return WorkerDied(
+            f"the process that worked on it {said} ({how}){held}.",
+            how=how,
+            from_outside=killed and not large,
+        )
+
+    def end(self) -> None:
+        """Closes the pipe, which ends a process at rest, and kills one that is not."""
+        self._pipe.close()
+        self._process.join(_LOOK_S)
+        self._process.kill()
+        self._process.join()
+
+
+def _work(pipe: Connection, prepare: Callable[[], object] | None) -> None:
+    """The whole life of a worker: it ends when the pipe is closed."""
+    _begin_worker()
+    _bound_memory()
+    if prepare is not None:
+        prepare()
+    with suppress(EOFError, ConnectionError):
+        while True:
+            step, answer = pipe.recv(), _NOTHING
+            pipe.send(True)  # from here on a death may be the step's doing
+            try:
+                answer = step(), None
+            except BaseException as error:  # noqa: BLE001 - whatever it is, it is the answer
+                error.add_note(traceback.format_exc())
+                answer = None, error
+            _answer(pipe, answer)
+            del step, answer
+
+
+def _answer(pipe: Connection, answer: tuple[Any, BaseException | None]) -> None:
+    try:
+        pipe.send(answer)
+    except ConnectionError:
+        raise
+    except Exception as error:  # noqa: BLE001 - what cannot be pickled raises anything
+        pipe.send((None, RuntimeError(f"an answer cannot be sent: {error!r}; {answer[1]!r}")))
+
+
+def _bound_memory() -> None:
+    """A step that grows without end gets a MemoryError before the machine has no memory left."""
+    most = int(_MOST_OF_MEMORY * memory_of_machine())
+    if most:
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        if hard == resource.RLIM_INFINITY or hard > most:
+            resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import socket
 import time
 from contextlib import suppress
+from datetime import timedelta
 
 from shm.store import Workspace
 
 HEARTBEAT = "daemon.heartbeat"
 """A file of the workspace that the active daemon touches at each turn."""
+LONGEST_REST_S = 2.0
+"""How long at most between two signs, whatever there is to do or to wait for."""
 _PATIENCE_S = 60.0
 _BEATS_A_WATCHDOG = 3
 
@@ -23,6 +27,21 @@ def beat(workspace: Workspace) -> None:
     with suppress(OSError):  # a full or read-only disk is waited out elsewhere
         (workspace.folder / HEARTBEAT).touch()
     tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=watching {workspace.spool}")
+
+
+class Pulse:
+    """Beats where that is due, however often it is asked; for what takes long, piece by piece."""
+
+    def __init__(self, workspace: Workspace):
+        self._workspace, self._beaten_at = workspace, -math.inf
+
+    def __call__(self) -> None:
+        if time.monotonic() - self._beaten_at > LONGEST_REST_S / 2:
+            self.beat()
+
+    def beat(self) -> None:
+        beat(self._workspace)
+        self._beaten_at = time.monotonic()
 
 
 def tell_systemd(*said: str) -> None:
@@ -46,7 +65,8 @@ def tell_systemd(*said: str) -> None:
 def longest_wait_s() -> float:
     """How long the loop may rest between two signs: systemd ends a service that gives none."""
     limit_us = os.environ.get("WATCHDOG_USEC", "")
-    return int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else float("inf")
+    asked_s = int(limit_us) / 1e6 / _BEATS_A_WATCHDOG if limit_us.isdecimal() else math.inf
+    return min(asked_s, LONGEST_REST_S)
 
 
 def seconds_since_beat(workspace: Workspace) -> float | None:
@@ -60,3 +80,12 @@ def seconds_since_beat(workspace: Workspace) -> float | None:
 def patience_s(workspace: Workspace) -> float:
     """After so long without a sign the daemon is taken to be down, or stuck."""
     return _PATIENCE_S + 2 * workspace.settings.spool_scan_seconds
+
+
+def told(age: timedelta) -> str:
+    """A duration as people say it."""
+    seconds = age.total_seconds()
+    for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"

@@ -18,9 +18,16 @@ from datetime import datetime
 from pathlib import Path, PurePosixPath
 
 from shm.documents import format_time
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput
 from shm.read import sidecar_path
-from shm.store.archive import MODES_SUFFIX, checksum, safe_name, suffix_of, sync
+from shm.store.archive import (
+    MODES_SUFFIX,
+    checksum,
+    refuse_oversize,
+    safe_name,
+    suffix_of,
+    sync,
+)
 
 _LEFT_ALONE = (".part", ".tmp", ".filepart", ".toml")
 _LEFTOVER_S = 86400.0
@@ -28,10 +35,6 @@ _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 Described = Mapping[str, object]
 """Keys and values of a sidecar: what the file itself cannot say."""
-
-
-class TooLarge(ShmError):
-    """More bytes than are taken."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +82,7 @@ class Incoming:
 
     def write(self, piece: bytes | bytearray) -> None:
         """Raises TooLarge before more is kept than is taken."""
-        if self.size_bytes + len(piece) > self._max_bytes:
-            raise TooLarge(
-                f"more than {self._max_bytes} bytes are not taken.",
-                remedy="Send less at once, or raise the setting max_file_bytes.",
-            )
+        refuse_oversize(self.size_bytes + len(piece), self._max_bytes)
         self._file.write(piece)
         self._digest.update(piece)
         self.size_bytes += len(piece)

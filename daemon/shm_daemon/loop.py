@@ -10,14 +10,21 @@ from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from shm.errors import ShmError, StoreBusy, StoreError
+from shm.errors import (
+    SchemaOutdated,
+    ShmError,
+    StoreBusy,
+    StoreDamaged,
+    StoreError,
+    TooLarge,
+)
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.active import ActiveLock
 from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
 from shm_daemon.execution import children_ended, executor_of
-from shm_daemon.heartbeat import beat, longest_wait_s, tell_systemd
+from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
@@ -57,7 +64,12 @@ def run(
                     if daemon.serve(once):
                         return
             except StoreError as error:
-                if not bell.stopped and (error.retry_after_s is None or not patience(error)):
+                waiting_helps = error.retry_after_s is not None
+                if once and isinstance(error, StoreDamaged):
+                    raise
+                if not bell.stopped and not (waiting_helps and patience(error)):
+                    if waiting_helps and bell.stopped:  # meanwhile: that is no failure
+                        return
                     raise
 
 
@@ -113,11 +125,12 @@ def _begin(
         clock=clock,
         lanes=settings.workers + 1,
         wake=bell.ring,
+        meanwhile=(pulse := Pulse(workspace)),
     )
     stack.callback(flow.close)
     stack.enter_context(rung_by_changes(bell, workspace.spool))
     stack.enter_context(messages(workspace))
-    daemon = Daemon(flow, bell, lock, lambda: make_executor(settings))
+    daemon = Daemon(flow, bell, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -127,35 +140,48 @@ class Daemon:
     """One turn after the other: take whole files in, advance the flow, wait for a ring."""
 
     def __init__(
-        self, flow: Flow, bell: Bell, lock: ActiveLock, make_executor: Callable[[], Executor]
+        self,
+        flow: Flow,
+        bell: Bell,
+        lock: ActiveLock,
+        pulse: Pulse,
+        make_executor: Callable[[], Executor],
     ):
-        self._flow, self._bell, self._lock = flow, bell, lock
+        self._flow, self._bell, self._lock, self._pulse = flow, bell, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
         self._described_at = _modified_ns(flow.workspace)
+        self._once = False
 
     def serve(self, once: bool) -> bool:
         """Takes turns until the bell is stopped or, with `once`, until nothing is left to do.
 
         False where the store is no longer ours: another may have begun what we had under way.
         """
+        self._once = once
         while not self._bell.stopped:
             if not self._lock.held():
                 log.warning("the right to the store was lost; it is asked for again")
                 return False
-            beat(self._flow.workspace)
+            self._pulse.beat()
             busy = self._turn()
             if once and not busy and not self._tracker.watching:
                 break
-            pause_s = max(0.0, self._scan_at - time.monotonic())
-            heard = self._bell.wait(min(pause_s, self._longest_wait_s))
-            if SPOOL in heard:
+            if SPOOL in self._rest():
                 self._scan_at = min(self._scan_at, time.monotonic() + _HINT_DELAY_S)
         log.info("ended")
         return True
+
+    def _rest(self) -> set[str]:
+        """Waits for a ring or until the next scan, with a sign from time to time."""
+        while (pause_s := self._scan_at - time.monotonic()) > self._longest_wait_s:
+            if (heard := self._bell.wait(self._longest_wait_s)) or self._bell.stopped:
+                return heard
+            self._pulse.beat()
+        return self._bell.wait(max(0.0, pause_s))
 
     def close(self) -> None:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
@@ -165,21 +191,34 @@ class Daemon:
         try:
             if time.monotonic() >= self._scan_at:
                 self._scan()
-            return self._flow.advance()
+            return self._flow.advance() or self._flow.suspects_due_s() is not None
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")
             self._flow.executor = self._make_executor()
         except ShmError as error:
-            if error.retry_after_s is None:
+            if self._is_fatal(error):
                 raise
             log.warning("%s", error)
-            self._scan_at = time.monotonic() + error.retry_after_s
+            self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
+        except Exception:
+            if self._once:
+                raise
+            # A service that ends by what it read reads it again when it is begun again.
+            log.exception("this turn failed; the next one is tried in %.0f s", _UNREADABLE_S)
+            self._scan_at = time.monotonic() + _UNREADABLE_S
         return True
+
+    def _is_fatal(self, error: ShmError) -> bool:
+        """Whether the service ends: not by what a damaged store answers, unless once is enough."""
+        if isinstance(error, StoreDamaged):
+            return self._once
+        mends = isinstance(error, StoreError) and not isinstance(error, SchemaOutdated)
+        return error.retry_after_s is None and (self._once or not mends)
 
     def _scan(self) -> None:
         self._heed_description()
-        until, sharing = time.monotonic() + _RECEIVING_S, Sharing()
-        for path in self._tracker.whole(scan(self._flow.workspace.spool)):
+        until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
+        for path in self._tracker.whole(scan(self._flow.workspace.spool, self._pulse)):
             if self._bell.stopped or time.monotonic() > until:
                 break
             self._receive(path, sharing)
@@ -194,6 +233,12 @@ class Daemon:
             self._flow.receive(path, sharing)
         except StoreError:
             raise
+        except TooLarge as error:
+            log.warning("%s is refused: %s %s", path.name, error.message, error.remedy)
+            if path.exists():
+                self._tracker.leave(path)
+            else:
+                self._tracker.forget(path)
         except (ShmError, OSError) as error:
             log.warning("%s is left for now: %s", path.name, error)
             wait_s = error.retry_after_s if isinstance(error, ShmError) else None

@@ -18,11 +18,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput, ShmError, TooLarge
 from shm.pipeline import utc_now
 from shm.read import FORMATS, sidecar_path
 from shm.store import Store, Workspace
-from shm.store.archive import MODES_SUFFIX
+from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm_daemon.extras import needing
 from shm_daemon.landing import Incoming, Landed, incoming, landing_name
 
@@ -221,35 +221,42 @@ class Listener:
         if message.connection != self._connection:
             return
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
-        largest = self._workspace.settings.mqtt_max_bytes
         with incoming(self._workspace.spool, len(message.payload)) as file:
             file.write(message.payload)
             name = _name(given, level, message.payload, file.sha256)
             if message.again and self._is_received(file.sha256):
                 self._acknowledge(message)
-            elif len(message.payload) > largest:
-                self._lay_out(file, name, largest)
+                return
+            try:
+                self._refuse_oversize(file)
+            except TooLarge as error:  # the broker would send it again for ever
+                self._lay_out(file, name, error)
                 self._acknowledge(message)
-            else:
-                hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
-                landed = file.land(name, {"hanger": hanger})
-                self._pending.append((replace(message, payload=b""), landed))
+                return
+            hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
+            landed = file.land(name, {"hanger": hanger})
+            self._pending.append((replace(message, payload=b""), landed))
 
-    def _lay_out(self, file: Incoming, name: str, largest: int) -> None:
-        """Lays a message that is too large in the quarantine, with the reason."""
+    def _refuse_oversize(self, file: Incoming) -> None:
+        settings = self._workspace.settings
+        for setting in ("max_file_bytes", "mqtt_max_bytes"):
+            refuse_oversize(file.size_bytes, getattr(settings, setting), setting=setting)
+
+    def _lay_out(self, file: Incoming, name: str, error: TooLarge) -> None:
+        """Moves a message that is too large into the quarantine, with the reason."""
         reason = {
             "schema": "shm.reason/1",
             "file": name,
             "line": None,
             "channel": None,
-            "message": f"a message of {file.size_bytes} bytes, where {largest} are taken.",
-            "remedy": "Raise the setting mqtt_max_bytes, or send it another way.",
+            "message": error.message,
+            "remedy": error.remedy,
             "time": utc_now(),
             "sha256": file.sha256,
         }
         path = file.whole()
-        self._workspace.quarantine.put(path, name, reason, sidecar_path(path))
-        log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"])
+        self._workspace.quarantine.move(path, name, reason, sidecar_path(path))
+        log.warning("%s is refused: %s %s", name, error.message, error.remedy)
 
     def _acknowledge_received(self) -> None:
         """Acknowledges what has left the spool for the store."""

@@ -31,10 +31,15 @@ class Look:
     sidecar_size_bytes: int = 0
 
 
-def scan(spool: Path) -> dict[Path, Look]:
-    """The files of the spool that may become recordings."""
-    looks = ((path, _look(path)) for path in _candidates(spool))
-    return {path: look for path, look in looks if look is not None}
+def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Path, Look]:
+    """The files of the spool that may become recordings; calls `meanwhile` at each."""
+    found = {}
+    for path in _candidates(spool):
+        meanwhile()
+        look = _look(path)
+        if look is not None:
+            found[path] = look
+    return found
 
 
 def left_alone(spool: Path) -> list[Path]:
@@ -80,11 +85,14 @@ class FileStabilityTracker:
         self._stable_s, self._clock = stable_s, clock
         self._seen: dict[Path, tuple[Look, float]] = {}
         self._put_off: dict[Path, float] = {}
+        self._left: dict[Path, Look] = {}
 
     def whole(self, looks: Mapping[Path, Look]) -> list[Path]:
         """Those of the files that are whole, the oldest first."""
         now = self._clock()
         known, self._seen = self._seen, {}
+        self._left = {path: look for path, look in self._left.items() if looks.get(path) == look}
+        looks = {path: look for path, look in looks.items() if path not in self._left}
         for path, look in looks.items():
             before, since = known.get(path, (look, now))
             self._seen[path] = look, since if before == look else now
@@ -95,6 +103,10 @@ class FileStabilityTracker:
     def put_off(self, path: Path, seconds: float) -> None:
         """Leaves a file that could not be taken alone for a while."""
         self._put_off[path] = self._clock() + seconds
+
+    def leave(self, path: Path) -> None:
+        """Leaves a file that was refused, and cannot be moved away, until it changes."""
+        self._left[path], _ = self._seen.pop(path)
 
     def forget(self, path: Path) -> None:
         """A file was taken."""

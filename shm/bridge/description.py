@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,7 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Bridge:
-    """What `bridge.toml` says."""
+    """What `bridge.toml` says; `built` is None where it does not say."""
 
     name: str
     hangers: tuple[Hanger, ...]
@@ -34,6 +36,7 @@ class Bridge:
     settings_table: Mapping[str, object]
     source: str
     disturbances: tuple[Disturbance, ...] = ()
+    built: date | None = None
 
     def hanger(self, hanger_id: int) -> Hanger:
         """The hanger of that number; raises BadInput when the bridge has none such."""
@@ -63,6 +66,7 @@ def load_bridge(path: Path) -> Bridge:
         disturbances=tuple(
             _disturbance(table, path) for table in _tables(document, "disturbance", path)
         ),
+        built=_built(document.get("bridge", {}), path),
     )
 
 
@@ -94,8 +98,12 @@ def _parse(path: Path) -> dict[str, Any]:
             f"cannot be read: {error.strerror}.", file=path, remedy="Check its permissions."
         ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        at = re.search(r"\(at line (\d+)", str(error))
         raise BadInput(
-            f"not a readable TOML file: {error}.", file=path, remedy="Correct the file."
+            f"not a readable TOML file: {error}.",
+            file=path,
+            line=int(at[1]) if at else None,
+            remedy="Correct the file.",
         ) from error
 
 
@@ -110,6 +118,18 @@ def _refuse_doubles(keys: list[Any], what: str, path: Path) -> None:
     for key in keys:
         if keys.count(key) > 1:
             raise BadInput(f"{what} {key} is given twice.", file=path, remedy="Keep one of them.")
+
+
+def _built(values: dict[str, Any], path: Path) -> date | None:
+    """The day from which on there can be tests; tests of before are held."""
+    found = values.get("built")
+    if found is None or (isinstance(found, date) and not isinstance(found, datetime)):
+        return found
+    raise BadInput(
+        f"bridge: built = {found!r} is not a date.",
+        file=path,
+        remedy="Write built = 1998-06-01, without quotation marks.",
+    )
 
 
 def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,8 @@ class Table:
 
     def refusal(self, problem: str, remedy: str) -> BadInput:
         """The error that says what is wrong with this table."""
-        return BadInput(f"{self.label}: {problem}.", file=self.path, remedy=remedy)
+        line = _line_of(self.path, self.label, problem)
+        return BadInput(f"{self.label}: {problem}.", file=self.path, line=line, remedy=remedy)
 
     def refuse_unknown(self, known: Iterable[str]) -> None:
         """Raises BadInput where a key is none of `known`."""
@@ -88,3 +90,44 @@ class Table:
             Table(values, f"{self.label} {key} {number}", self.path)
             for number, values in enumerate(found, start=1)
         ]
+
+
+_LABEL = re.compile(r"(?:\[\[)?(\w+)(?:\]\] id)? (\S+)")
+"""`[[hanger]] id 3 thresholds` or `hook mail`: which table, and the key or name that tells it."""
+
+
+def _line_of(path: Path, label: str, problem: str) -> int | None:
+    """The line of a table's key that a problem names, else that of the table; None where neither
+    is found. The parser of TOML tells no places of what it has read.
+    """
+    named = _LABEL.match(label)
+    if named is None:
+        return None
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return None
+    kind, key = named.groups()
+    tells = re.compile(rf"\s*(id|name)\s*=\s*[\"']?{re.escape(key)}[\"']?\s*(#.*)?$")
+    begins = [n for n, line in enumerate(lines) if line.strip().startswith(f"[[{kind}]]")]
+    for begin in begins:
+        end = next((n for n in range(begin + 1, len(lines)) if _other(lines[n], kind)), len(lines))
+        if any(tells.match(line) for line in lines[begin:end]):
+            return _line_within(lines, range(begin, end), f"{label} {problem}") + 1
+    return begins[0] + 1 if len(begins) == 1 else None
+
+
+def _other(line: str, kind: str) -> bool:
+    """Whether another table begins, which is no part of this one."""
+    header = line.strip()
+    return header.startswith("[") and not re.match(rf"\[+{kind}\.", header)
+
+
+def _line_within(lines: Sequence[str], block: range, said: str) -> int:
+    """The last line of a block that sets or opens something that is named."""
+    words = set(re.findall(r"\w+", said))
+    for number in reversed(block):
+        keys = re.findall(r"(\w+)\s*=", lines[number]) or re.findall(r"\.(\w+)\]", lines[number])
+        if words.intersection(keys) - {"id", "name"}:
+            return number
+    return block.start

@@ -76,7 +76,8 @@ class DescribedCoordinates:
         self.box = self._box()
         swaps = [pair for pair in model.swaps if set(pair) <= set(self._felt)]
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
-        self._details = EndDetails(self.box.names, model.springs)
+        round_ = isinstance(model.model, Beam) and self._hanger.plate is None
+        self._details = EndDetails(self.box.names, model.springs, round_, bool(model.swaps))
         self._reading = reading_of(tests)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
@@ -98,6 +99,17 @@ class DescribedCoordinates:
             bounds[SHEAR] = self.model.bounds[SHEAR]
         lower, upper = np.array(list(bounds.values()), dtype=float).T
         return Prior(tuple(bounds), lower, upper)
+
+    @property
+    def felt_springs(self) -> tuple[str, ...]:
+        """End springs of a beam in the planes measured."""
+        return self._felt if isinstance(self.model.model, Beam) else ()
+
+    def freedom(self, theta: FloatArray) -> FloatArray:
+        """Mean of 1/(1 + k L/EI) over the springs felt (n,): 0 for clamped ends, 1 for pins."""
+        columns = [self.names.index(name) for name in self.felt_springs]
+        unit = math.log10(self._hanger.bending_stiffness_n_m2 / self._hanger.length_m)
+        return np.asarray((1 / (1 + 10 ** (theta[:, columns] - unit))).mean(axis=1))
 
     # ------------------------------------------------ what is seen, and what is not
 

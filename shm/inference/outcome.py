@@ -28,6 +28,18 @@ _EDGE, _MANY = 0.02, 5.0
 a posterior as flat as the prior puts there."""
 
 
+_FREEDOM = (0.1, 0.35, 0.75)
+"""Between ends that clamp, give, turn and are pins, by the mean of 1/(1 + k L/EI): k L/EI of 9, 2
+and 1/3."""
+
+_AS_WELL = 2.0
+"""A log likelihood that is lower by less does not speak against ends of a kind (a likelihood ratio
+of 95 % of one parameter), however rare such ends are by the prior."""
+
+_MATERIAL = 0.1
+"""Of the width of the interval, what lies farther beyond it is another answer."""
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """Equal draws with sigma, `samples` (n, d + 1), what they predict (n, measurements), evidence.
@@ -106,6 +118,7 @@ def assembled(
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
         misfit_percent=_misfit_percent(problem, outcome.predicted),
+        tension_of_other_ends_n=_tension_of_other_ends_n(problem, outcome),
         log_occam=log_occam,
     )
 
@@ -202,6 +215,29 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
         names = prior.names
     outermost = np.maximum(np.mean(shares < _EDGE, axis=0), np.mean(shares > 1 - _EDGE, axis=0))
     return tuple(n for n, share in zip(names, outermost, strict=True) if share > _MANY * _EDGE)
+
+
+def _tension_of_other_ends_n(problem: Problem, outcome: Outcome) -> float:
+    """The median tension with ends of a kind that fits about as well as any, farthest off.
+
+    NaN where no such tension lies beyond the 90 % interval materially: else the prior of the ends
+    decides the tension, not the data.
+    """
+    coordinates = problem.coordinates
+    if not isinstance(coordinates, DescribedCoordinates) or not coordinates.felt_springs:
+        return math.nan
+    theta = outcome.samples[:, :-1]
+    kind = np.digitize(coordinates.freedom(theta), _FREEDOM)
+    fit = problem.likelihood.marginal(outcome.predicted)
+    tension_n = theta[:, 0] * problem.model.hanger.nominal_tension_n
+    low, high = np.quantile(tension_n, [0.05, 0.95])
+    beyond, found = _MATERIAL * (high - low), math.nan
+    for own in (kind == k for k in np.unique(kind[fit > fit.max() - _AS_WELL])):
+        median = float(np.median(tension_n[own]))
+        away = max(low - median, median - high)
+        if away > beyond:
+            beyond, found = away, median
+    return found
 
 
 def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:

@@ -26,6 +26,7 @@ from shm.values import FloatArray, Hanger, IntArray, ModalTest
 DEVIATIONS = (SECTION, DENSITY, MODULUS)
 
 _ALIKE_WITHIN, _MIDDLES = 0.09, 32
+_SAME_WITHIN = 0.02 / math.log10(RESTRAINT[1] / RESTRAINT[0])
 _STIFFEST = 1 / math.log10(RESTRAINT[1] / RESTRAINT[0])
 
 
@@ -129,16 +130,26 @@ class EndDetails:
     """The prior of springs together: the ends of one hanger are rarely each of another kind.
 
     They are independent, or all alike, or alike in each plane (a fork turns about one axis), or
-    made to clamp (welded, or a nut on a thick plate): all in the stiffest decade. A quarter each,
-    every spring's log10 k uniform over its range, or over that decade; alike is within
-    `_ALIKE_WITHIN` of the range, 0.4 decades. `columns` are those of the box's `names`.
+    made to clamp (welded, or a nut on a thick plate): all in the stiffest decade; or round (a nut,
+    a socket, a weld all around), the same in both planes, each end by itself or both alike. As
+    probable each, every spring's log10 k uniform over its range, or over that decade; alike is
+    within `_ALIKE_WITHIN` of the range, 0.4 decades, the same within `_SAME_WITHIN`, 0.02 decades.
+    `columns` are those of the box's `names`. Where the ends are `exchanged`, frequencies do not
+    tell which spring of a plane stands at which end: `round_ends` holds then either way.
     """
 
-    def __init__(self, names: Sequence[str], springs: Sequence[str]):
+    def __init__(
+        self,
+        names: Sequence[str],
+        springs: Sequence[str],
+        may_be_round: bool = True,
+        exchanged: bool = True,
+    ):
         self.columns: IntArray = np.array(
             [k for k, name in enumerate(names) if name in springs], dtype=int
         )
-        planes = [names[k] in ("log10_k1", "log10_k3") for k in self.columns]
+        own = [names[k] for k in self.columns]
+        planes = [name in ("log10_k1", "log10_k3") for name in own]
         whole = np.arange(len(planes))
         by_plane = [whole[np.equal(planes, side)] for side in (True, False)]
         self._kinds: list[list[IntArray]] = [
@@ -146,39 +157,79 @@ class EndDetails:
             [whole],
             [group for group in by_plane if len(group)],
         ]
+        self._ends: list[list[IntArray]] = []
+        if may_be_round and own == ["log10_k1", "log10_k2", "log10_k3", "log10_k4"]:
+            self._ends.append([whole[[0, 1]], whole[[2, 3]]])
+            if exchanged:
+                self._ends.append([whole[[0, 3]], whole[[2, 1]]])
+
+    @property
+    def _count(self) -> int:
+        """Of kinds: those of `_kinds`, made to clamp, and round ends each by itself or alike."""
+        return len(self._kinds) + 1 + 2 * bool(self._ends)
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Shares of the springs' ranges (n, springs)."""
         shares = rng.random((n, len(self.columns)))
-        kind = rng.integers(len(self._kinds) + 1, size=n)
+        kind = rng.integers(self._count, size=n)
         stiff = kind == len(self._kinds)
         shares[stiff] = 1 - _STIFFEST * shares[stiff]
         for index, groups in enumerate(self._kinds[1:], start=1):
             rows = np.flatnonzero(kind == index)
             for group in groups:
-                middle = rng.random((len(rows), 1))
-                away = _ALIKE_WITHIN * rng.standard_normal((len(rows), len(group)))
-                shares[np.ix_(rows, group)] = _reflected(middle + away)
+                shares[np.ix_(rows, group)] = _about(rng.random((len(rows), 1)), len(group), rng)
+        for alike in (False, True):
+            rows = np.flatnonzero(kind == len(self._kinds) + 1 + alike)
+            middles = rng.random((len(rows), 2))
+            if alike:
+                middles = _about(middles[:, :1], 2, rng)
+            way = rng.integers(max(len(self._ends), 1), size=len(rows))
+            for index, ends in enumerate(self._ends):
+                own = way == index
+                for end, middle in zip(ends, middles[own].T, strict=True):
+                    found = _about(middle[:, None], len(end), rng, _SAME_WITHIN)
+                    shares[np.ix_(rows[own], end)] = found
         return shares
 
     def log_density(self, shares: FloatArray) -> FloatArray:
         """Log density (n,) of shares (n, springs), over that of independent springs."""
-        middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
-        images = np.stack([shares, -shares, 2 - shares])
-        away = (images[..., None] - middles) / _ALIKE_WITHIN
-        own = np.exp(-0.5 * away**2).sum(axis=0) / (_ALIKE_WITHIN * math.sqrt(2 * math.pi))
+        own = _of_middles(shares)
         total = np.ones(len(shares))
         for groups in self._kinds[1:]:
             parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
             total = total + np.prod(parts, axis=0)
         stiff = (shares > 1 - _STIFFEST).all(axis=1)
         total = total + stiff * _STIFFEST ** -float(shares.shape[1])
-        return np.asarray(np.log(total / (len(self._kinds) + 1)))
+        for ends in self._ends:
+            same = np.prod([_same(shares[:, end]) for end in ends], axis=0)
+            middles = np.stack([shares[:, end].mean(axis=1) for end in ends], axis=1)
+            alike = _of_middles(middles).prod(axis=1).mean(axis=1)
+            total = total + same * (1 + alike) / len(self._ends)
+        return np.asarray(np.log(total / self._count))
 
 
-def _reflected(shares: FloatArray) -> FloatArray:
+def _about(
+    middle: FloatArray, count: int, rng: np.random.Generator, within: float = _ALIKE_WITHIN
+) -> FloatArray:
+    """Shares (n, count) about a middle (n, 1), reflected at the ends of the range."""
+    shares = middle + within * rng.standard_normal((len(middle), count))
     folded = np.abs(shares) % 2
     return np.where(folded > 1, 2 - folded, folded)
+
+
+def _of_middles(shares: FloatArray) -> FloatArray:
+    """Density of shares (n, k) about each of `_MIDDLES` middles (n, k, middles)."""
+    middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+    images = np.stack([shares, -shares, 2 - shares])
+    away = (images[..., None] - middles) / _ALIKE_WITHIN
+    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (_ALIKE_WITHIN * math.sqrt(2 * math.pi)))
+
+
+def _same(pair: FloatArray) -> FloatArray:
+    """Density (n,) of two shares (n, 2) that are the same, whatever they are."""
+    one, other = pair.T
+    away = np.stack([one - other, one + other, 2 - one - other]) / (math.sqrt(2) * _SAME_WITHIN)
+    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (_SAME_WITHIN * math.sqrt(4 * math.pi)))
 
 
 def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:

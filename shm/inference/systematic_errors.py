@@ -20,9 +20,9 @@ from shm.values import FloatArray, Hanger, IntArray
 Ends: TypeAlias = tuple[EndWaves, EndWaves]
 """The deck's and the arch's."""
 
-_SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.02
-"""Piezo-electric and MEMS accelerometers for structures with magnet, base and cable end: 20 to 90 g
-(makers' data sheets)."""
+_SENSOR_KG, _SENSOR_SD_KG = 0.05, 0.05
+"""Accelerometers for structures with magnet, base and cable end: 20 to 90 g, seismic ones
+more (makers' data sheets); none where a laser looks on."""
 
 _MOST_OF_BAR = 0.03
 """Of the bar's own mass: what is lighter than that is measured without touching it."""

@@ -150,6 +150,8 @@ def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     planes = {mode.plane for test in tests for mode in test.regular_modes}
     one = 1 / (1 + np.log10(RESTRAINT[1] / RESTRAINT[0]))
     # Springs each by itself, all alike, alike in each plane, or made to clamp (`EndDetails`): as
-    # many of these are beyond the stiffest decade as are in it.
+    # many of these are beyond the stiffest decade as are in it. Round ends each by itself or alike.
     shares = [one ** (2 * len(planes)), one, one ** len(planes), 0.5]
+    if len(planes) > 1 and model.hanger.plate is None:
+        shares += [one**2, one]
     return float(np.log(np.mean(shares)))

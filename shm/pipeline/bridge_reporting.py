@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 
 import shm
-from shm.errors import NothingThere
+from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.origins import settings_words, software
 from shm.report import Interval
 from shm.report.bridge.content import BridgeReport, Course, HangerLine
@@ -17,6 +17,7 @@ from shm.report.period import Period
 from shm.report.states import called_words
 from shm.report.summary import status_of
 from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
+from shm.store.listing import of_readable
 from shm.values import TENSION, Change, Drift, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
@@ -74,19 +75,24 @@ class _Kept:
     watches: Mapping[int, StoredWatch]
     called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
+    damaged: Mapping[int, DamagedRow]
 
     @classmethod
     def of(cls, store: Store, hangers: Sequence[Hanger]) -> _Kept:
+        damaged = {row.hanger: row for row in store.known_damage() if row.hanger is not None}
         return cls(
             store.latest_trends(hangers),
             store.baselines_in_force(hangers),
-            store.latest_watches(),
-            store.called_changes(),
+            of_readable(store.latest_watches, damaged),
+            of_readable(store.called_changes, damaged),
             store.open_alert_counts(),
+            damaged,
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
         opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
+        if hanger.id in self.damaged:  # no status: what would be said of it cannot be read
+            return HangerLine(hanger, None, called=str(self.damaged[hanger.id]), open_alerts=opened)
         if point is None:
             return HangerLine(hanger, None, open_alerts=opened)
         baseline = self.baselines.get(hanger.id)
@@ -155,7 +161,7 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
 
 def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]:
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
-    latest, before_c = store.latest_watches(), store.baseline_temperatures()
+    latest, before_c = of_readable(store.latest_watches, {}), store.baseline_temperatures()
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
     changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}

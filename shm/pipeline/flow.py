@@ -8,7 +8,6 @@ killed at any instant and simply goes on.
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -21,18 +20,23 @@ from concurrent.futures import (
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-from shm.errors import ShmError, StoreError
+from shm.errors import DamagedRow, ShmError, StoreError, WorkerDied
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
-from shm.store import Delivery, Receipt, Store, StoredAlert, Workspace
+from shm.store import Death, Deaths, Delivery, Receipt, Store, StoredAlert, Workspace
+from shm.store.archive import Meanwhile, nothing
 from shm.values import Alert
 
-_CRASHES = 2
+_MOST_DEATHS, _MOST_KILLS = 3, 5
+"""A recording is refused when so many processes died of it, or were killed at it alone in a row."""
+_FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
+"""2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
 _LONGEST_S = 86400.0
+_AGAIN_S = 60.0
 
 log = logging.getLogger(__name__)
 
@@ -49,14 +53,22 @@ class Running:
     job: Job
     step: Step
     future: Future[Any]
+    alone: bool = False
+
+
+@runtime_checkable
+class BeginsFresh(Protocol):
+    """An executor that can run a step in a process which does nothing else, before or after."""
+
+    def submit_fresh(self, fn: Callable[[], Any], /) -> Future[Any]: ...
 
 
 class Flow:
     """Takes files in and brings them through all stages.
 
     `lanes` is how many steps may be under way at once; without a `notifier` alerts wait in the
-    outbox; `wake` is called, from any thread, whenever something under way has ended. Use a flow
-    while holding the workspace's lock.
+    outbox; `wake` is called, from any thread, whenever something under way has ended; `meanwhile`
+    again and again while a file is copied. Use a flow while holding the workspace's lock.
     """
 
     def __init__(
@@ -68,14 +80,17 @@ class Flow:
         notifier: Notifier | None = None,
         clock: Clock = utc_now,
         lanes: int = 1,
-        wake: Callable[[], object] = lambda: None,
+        wake: Callable[[], object] = nothing,
+        meanwhile: Meanwhile = nothing,
     ):
         self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
-        self.notifier, self.wake = notifier, wake
+        self.notifier, self.wake, self.meanwhile = notifier, wake, meanwhile
         self._running: dict[tuple[str, int], Running] = {}
         self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
-        self._crashes: Counter[int] = Counter()
-        self._postponed: dict[int, datetime] = {}
+        self._damaged: dict[int, datetime] = {}  # hangers that stand still, and until when
+        deaths = store.deaths()
+        self._suspects = set(deaths)
+        self._postponed = {key: each.last_at + _pause(each) for key, each in deaths.items()}
         self.use(workspace)
         workspace.archive.sweep()
 
@@ -96,7 +111,8 @@ class Flow:
 
     def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
-        receipt = receive(path, self.workspace, self.store, self.clock(), sharing)
+        now = self.clock()
+        receipt = receive(path, self.workspace, self.store, now, sharing, self.meanwhile)
         recording = receipt.recording
         about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
         log.info("%s: %s", recording.file.file_name, receipt.outcome, extra=about)
@@ -119,6 +135,13 @@ class Flow:
         self._begin_steps()
         return bool(self._running)
 
+    def suspects_due_s(self) -> float | None:
+        """How long until a recording is tried again whose process died; None without such."""
+        times = [self._postponed[key] for key in self._suspects if key in self._postponed]
+        if not times:
+            return None
+        return max(0.0, (min(times) - self.clock()).total_seconds())
+
     # ------------------------------------------------------------ begin
 
     def _begin_deliveries(self) -> None:
@@ -130,22 +153,42 @@ class Flow:
     def _begin_steps(self) -> None:
         now = self.clock()
         held = {id_ for id_, until in self._postponed.items() if until > now}
+        damaged: set[int | None] = {
+            hanger for hanger, until in self._damaged.items() if until > now
+        }
         for job in self.jobs.waiting(2 * self.lanes, held):
+            if job.hanger in damaged or job.key in self._running:
+                continue
             if not self._has_room(job):
                 return
-            if job.key not in self._running:
+            try:
                 self._begin(job, self.executor)
+            except DamagedRow as error:
+                self._stop(job, error)
+                damaged |= {job.hanger} - {None}
+            except (ShmError, BrokenExecutor):
+                raise
+            except Exception:  # what one hanger's rows hold must not stop the others
+                log.exception("%s %s cannot begin", *job.key, extra=_about(job))
+                self._hold(job, _AGAIN_S)
+                damaged |= {job.hanger} - {None}
 
     def _has_room(self, job: Job) -> bool:
         """Whether a step may begin now; one whose process died before runs alone."""
         steps = [running.job for running in self._running.values() if not running.job.delivery]
-        suspects = [j for j in (*steps, job) if any(self._crashes[r] for r in j.recordings)]
+        suspects = any(self._is_suspect(each) for each in (*steps, job))
         return len(steps) < self.lanes and not (steps and suspects)
 
+    def _is_suspect(self, job: Job) -> bool:
+        return not self._suspects.isdisjoint(job.recordings)
+
     def _begin(self, job: Job, executor: Executor) -> None:
-        step = job.prepare()
-        future = executor.submit(step.run)
-        self._running[job.key] = Running(job, step, future)
+        step, alone = job.prepare(), self._is_suspect(job)
+        if alone and isinstance(executor, BeginsFresh):
+            future = executor.submit_fresh(step.run)
+        else:
+            future = executor.submit(step.run)
+        self._running[job.key] = Running(job, step, future, alone)
         future.add_done_callback(lambda _: self.wake())
 
     # ------------------------------------------------------------ finish
@@ -156,8 +199,8 @@ class Flow:
             self._keep(running)
         elif job.delivery is not None:
             self._put_off(job.delivery, error)
-        elif isinstance(error, BrokenExecutor):
-            self._note_crash(job, error)
+        elif isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
+            self._note_death(running, error)
         elif isinstance(error, ShmError) and error.retry_after_s is not None:
             until = self.clock() + timedelta(seconds=error.retry_after_s)
             self._postponed.update(dict.fromkeys(job.recordings, until))
@@ -176,24 +219,55 @@ class Flow:
                     extra=_about_alert(kept.alert),
                 )
             log.info("%s %d: done", *running.job.key, extra=_about(running.job))
+        except DamagedRow as error:
+            self._stop(running.job, error)
         except StoreError as error:
             if error.retry_after_s is not None:
                 raise
             self._refuse(running.job, error)
         self._forget(running.job)
 
+    def _stop(self, job: Job, error: DamagedRow) -> None:
+        """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""
+        self._hold(job, error.retry_after_s or _AGAIN_S)
+        if self.store.note_damage(error, self.clock()):
+            log.error("%s %s stands still: %s", *job.key, error, extra=_about(job))
+
+    def _hold(self, job: Job, seconds: float) -> None:
+        until = self.clock() + timedelta(seconds=seconds)
+        if job.hanger is None:
+            self._postponed.update(dict.fromkeys(job.recordings, until))
+        else:
+            self._damaged[job.hanger] = until
+
     def _forget(self, job: Job) -> None:
         """Earlier troubles of a job that has come to an end count no more."""
         for recording_id in job.recordings:
-            self._crashes.pop(recording_id, None)
+            self._suspects.discard(recording_id)
             self._postponed.pop(recording_id, None)
 
-    def _note_crash(self, job: Job, error: BaseException) -> None:
-        """A worker died: perhaps because of this job, perhaps because of one beside it."""
-        self._crashes.update(job.recordings)
-        log.warning("%s %s: the process that worked on it died", *job.key, extra=_about(job))
-        if any(self._crashes[recording_id] >= _CRASHES for recording_id in job.recordings):
-            self._refuse(job, error)
+    def _note_death(self, running: Running, error: BaseException) -> None:
+        """A process died: of what it worked on, of a neighbour's memory, or somebody killed it.
+
+        Its recording is tried again alone, after ever longer pauses, and only what happens to it
+        then is held against it. The store keeps account. Of several recordings at once none is
+        refused, for it cannot be said which it was.
+        """
+        job, now = running.job, self.clock()
+        log.warning("%s %s: %s", *job.key, _how_it_died(error), extra=_about(job))
+        outside = isinstance(error, WorkerDied) and error.from_outside
+        death = Death.FROM_OUTSIDE if outside else Death.BY_ITSELF
+        for recording_id in job.recordings:
+            noted = death if running.alone else Death.BESIDE_OTHERS
+            self.store.died(recording_id, noted, _how_it_died(error), now)
+        known = self.store.deaths()
+        deaths = [known.get(key, Deaths(0, 0, now)) for key in job.recordings]
+        if len(deaths) == 1 and _is_enough(deaths[0]):
+            self._refuse(job, _refusal(deaths[0], error))
+            return
+        self._suspects.update(job.recordings)
+        again_at = now + max(map(_pause, deaths))
+        self._postponed.update(dict.fromkeys(job.recordings, again_at))
 
     def _refuse(self, job: Job, error: BaseException) -> None:
         """Lays the files of a failed step in the quarantine, then marks them refused.
@@ -209,9 +283,14 @@ class Flow:
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
             name, archive = recording.file.file_name, self.workspace.archive
-            if archive.holds(recording.file):
+            try:
                 with archive.opened(recording.file) as path:
-                    self.workspace.quarantine.put(path, name, reason, sidecar_path(path))
+                    sidecar = sidecar_path(path)
+                    self.workspace.quarantine.put(path, name, reason, sidecar, self.meanwhile)
+            except StoreError as damage:
+                if damage.retry_after_s is not None:
+                    raise
+                log.error("%s is not laid in the quarantine: %s", name, damage)
             self.store.refuse(recording_id, reason, now, job.tests, stage=job.stage)
             about = {**_about(job), "recording": recording_id, "file": name}
             why = (reason["message"], reason["remedy"])
@@ -232,6 +311,38 @@ class Flow:
         log.warning(
             "hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error, extra=about
         )
+
+
+def _how_it_died(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "needs more memory than one step is given on this machine."
+    return error.message if isinstance(error, WorkerDied) else "the process that worked on it died."
+
+
+def _is_enough(deaths: Deaths) -> bool:
+    return deaths.by_itself >= _MOST_DEATHS or deaths.from_outside >= _MOST_KILLS
+
+
+def _pause(deaths: Deaths) -> timedelta:
+    """How long to wait before the next try: the longer, the more tries alone have failed."""
+    failed = max(deaths.by_itself, deaths.from_outside)
+    return timedelta(seconds=min(_FIRST_PAUSE_S * _PAUSE_GROWS**failed, _LONGEST_S))
+
+
+def _refusal(deaths: Deaths, error: BaseException) -> ShmError:
+    """Why a recording is given up of which processes died."""
+    how = _how_it_died(error).removesuffix(".")
+    if deaths.by_itself >= _MOST_DEATHS:
+        return ShmError(
+            f"{how}; so it went {deaths.by_itself} times, each time with nothing else at work.",
+            remedy="The file is damaged, too large or made to harm: export it anew from its "
+            "source, or split it. If it is sound, report this with the log.",
+        )
+    return ShmError(
+        f"{how}; so it went {deaths.from_outside} times in a row, and to no other file meanwhile.",
+        remedy="Find out who kills it: an operator, or a guard of the memory (`journalctl -k`, "
+        "earlyoom). Then drop the file again.",
+    )
 
 
 def _about(job: Job) -> dict[str, object]:

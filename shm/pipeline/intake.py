@@ -8,13 +8,20 @@ from __future__ import annotations
 import os
 import uuid
 from collections import Counter
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
-from shm.errors import BadInput
+from shm.errors import BadInput, TooLarge
 from shm.read import sidecar_path
 from shm.store import Receipt, ReceivedFile, Store, Workspace
-from shm.store.archive import Kept, entry_of, safe_name
+from shm.store.archive import (
+    Kept,
+    Meanwhile,
+    entry_of,
+    nothing,
+    refuse_oversize,
+    safe_name,
+)
 
 
 class Sharing:
@@ -24,7 +31,8 @@ class Sharing:
     ten thousand times.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, meanwhile: Meanwhile = nothing) -> None:
+        self._meanwhile = meanwhile
         self._waiting: dict[Path, Counter[Path]] = {}
 
     def others_need(self, sidecar: Path) -> bool:
@@ -37,24 +45,39 @@ class Sharing:
 
     def _of(self, folder: Path) -> Counter[Path]:
         if folder not in self._waiting:
-            pairs = ((entry, sidecar_path(entry)) for entry in folder.iterdir())
-            self._waiting[folder] = Counter(sidecar for entry, sidecar in pairs if entry != sidecar)
+            waiting: Counter[Path] = Counter()
+            for entry in folder.iterdir():
+                self._meanwhile()
+                sidecar = sidecar_path(entry)
+                waiting[sidecar] += entry != sidecar
+            self._waiting[folder] = waiting
         return self._waiting[folder]
 
 
 def receive(
-    path: Path, workspace: Workspace, store: Store, at: datetime, sharing: Sharing | None = None
+    path: Path,
+    workspace: Workspace,
+    store: Store,
+    at: datetime,
+    sharing: Sharing | None = None,
+    meanwhile: Meanwhile = nothing,
 ) -> Receipt:
     """Archives a whole file with its sidecar, enters it, and removes it where it was spooled.
 
-    Raises BadInput where a link leads out of the spool, ShmError with `retry_after_s` where the
-    file changes meanwhile or cannot be read, StoreError where archive or store cannot take it.
+    Raises TooLarge for a file, or a sidecar, beyond the setting max_file_bytes; where it was
+    spooled it lies in the quarantine then, or else where it was. Raises BadInput where a link leads
+    out of the spool, ShmError with `retry_after_s` where the file changes meanwhile or cannot be
+    read, StoreError where archive or store cannot take it.
     """
     name, spooled = _place(path, workspace.spool)
     path = path.parent.resolve() / path.name
-    sidecar, archive = sidecar_path(path), workspace.archive
-    kept_sidecar = archive.keep(sidecar) if _is_plain(sidecar) else None
-    kept = archive.keep(path, follow=not spooled)
+    sidecar, modified_at = sidecar_path(path), _modified(path)
+    try:
+        kept_sidecar, kept = _keep(path, sidecar, workspace, not spooled, meanwhile)
+    except TooLarge as error:
+        if spooled:
+            _set_aside(path, safe_name(name), error, workspace, store, at)
+        raise
     file = ReceivedFile(
         kept.sha256,
         safe_name(name),
@@ -62,11 +85,51 @@ def receive(
         kept.entry if spooled else uuid.uuid4().hex,
         kept.archived_as,
         kept_sidecar.archived_as if kept_sidecar else None,
+        modified_at,
     )
     receipt = store.receive(file, at)
     if spooled:
         _remove(path, kept, kept_sidecar, sharing or Sharing())
     return receipt
+
+
+def _modified(path: Path) -> datetime | None:
+    """When the file was last written; None where its folder says something impossible."""
+    try:
+        return datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    except (OSError, OverflowError, ValueError):
+        return None
+
+
+def _keep(
+    path: Path, sidecar: Path, workspace: Workspace, follow: bool, meanwhile: Meanwhile
+) -> tuple[Kept | None, Kept]:
+    archive, most = workspace.archive, workspace.settings.max_file_bytes
+    refuse_oversize(path.stat(follow_symlinks=follow).st_size, most, path)
+    kept_sidecar = None
+    if _is_plain(sidecar):
+        kept_sidecar = archive.keep(sidecar, most_bytes=most, meanwhile=meanwhile)
+    return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, meanwhile=meanwhile)
+
+
+def _set_aside(
+    path: Path, name: str, error: TooLarge, workspace: Workspace, store: Store, at: datetime
+) -> None:
+    """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
+    reason = {
+        "schema": "shm.reason/1",
+        "file": name,
+        "line": None,
+        "channel": None,
+        "message": error.message,
+        "remedy": error.remedy,
+        "time": at,
+        "sha256": None,
+    }
+    lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
+    said = {(event.file_name, event.message) for event in store.events("refused")}
+    if lies != path or (name, error.message) not in said:  # what stays is met at each start
+        store.refused_unread(name, error.message, at)
 
 
 def _place(path: Path, spool: Path) -> tuple[Path, bool]:

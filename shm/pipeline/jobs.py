@@ -13,6 +13,7 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
+from shm.pipeline.judging import judge
 from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import Taught, identify_lineage, update_terms
 from shm.pipeline.watching import to_watch
@@ -166,15 +167,17 @@ class Jobs:
         run = partial(step, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))
 
-    def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> None:
+    def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> object:
+        """What is implausible is held: kept with the rest, and counted in nothing."""
         lineage = identify_lineage(recording, found[0].test.hanger, self.workspace)
-        self.store.identified(recording.id, found, lineage, self.clock())
+        found, judged = judge(self.workspace, self.store, recording, found)
+        return self.store.identified(recording.id, found, lineage, self.clock(), judged)
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.test(test.id) for test in first]
         names = competing_names(hanger, self.workspace.settings.model_names)
         settings = self.workspace.settings
-        taught = self._taught(hanger, min(test.time for test in tests))
+        taught = self.taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
         plain = [test.test for test in tests]
         run = partial(run_step, "select_model", plain, hanger, names, terms)
@@ -189,7 +192,7 @@ class Jobs:
         test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id, model)
         # Not the latest posterior: a result must not depend on which tests were computed before.
         known = baseline.posterior if baseline else None
-        settings, taught = self.workspace.settings, self._taught(hanger, test.time)
+        settings, taught = self.workspace.settings, self.taught(hanger, test.time)
         terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
         run = partial(run_step, "update_test", test.test, hanger, model, known, terms)
         makes_baseline = self._makes_baseline(test, model)
@@ -201,7 +204,7 @@ class Jobs:
 
         return Step(run, keep)
 
-    def _taught(self, hanger: Hanger, before: datetime) -> Taught | None:
+    def taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """The last time before then that the hanger's own tension was read, else a sibling's."""
         if self.workspace.settings.priors != DESCRIPTION:
             return None

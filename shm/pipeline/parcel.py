@@ -27,19 +27,29 @@ class Parcel:
 
     content: bytes | None = field(repr=False)
     sidecar: bytes | None = field(repr=False)
+    damage: str = ""
 
     @classmethod
     def of(cls, archive: Archive, file: ReceivedFile, most_bytes: int) -> Self:
         """Packs an archived file; one that is larger will be refused, and is not packed."""
         fits = archive.holds(file) and file.size_bytes <= most_bytes
-        return cls(*(_bytes(archive, part, fits) for part in (file.archived_as, file.sidecar_as)))
+        if fits:
+            try:
+                archive.refuse_damaged(file)
+            except StoreError as error:
+                return cls(None, None, str(error))
+        content, sidecar = (
+            _bytes(archive, part, fits) for part in (file.archived_as, file.sidecar_as)
+        )
+        return cls(content, sidecar)
 
     @contextmanager
     def opened(self, file: ReceivedFile) -> Iterator[Path]:
         """The file as the archive would show it, in a folder of its own."""
         if self.content is None:
             raise StoreError(
-                f"{file.file_name} is not in the archive.", remedy="Drop the file again."
+                self.damage or f"{file.file_name} is not in the archive.",
+                remedy="" if self.damage else "Drop the file again.",
             )
         with tempfile.TemporaryDirectory(prefix="shm-") as folder:
             path = Path(folder) / Path(file.file_name).name

@@ -5,23 +5,32 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta
 from pathlib import Path
 
 from shm.bridge import Bridge
-from shm.documents import format_time
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
+from shm.identify.plausibility import signal_doubts
 from shm.inference import refresh, select, update
 from shm.models import build
 from shm.pipeline.calibrating import options_of
 from shm.pipeline.parcel import Opens
 from shm.pipeline.terms import Terms, competing, identify_settings, read_limits
+from shm.plausibility import fingerprint_of
 from shm.read.apart import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
-from shm.store.archive import MODES_SUFFIX
-from shm.values import Alert, Averaged, Hanger, ModalTest, Posterior, Selection, WatchedTest
+from shm.store.archive import MODES_SUFFIX, refuse_oversize
+from shm.values import (
+    Alert,
+    Averaged,
+    Hanger,
+    ModalTest,
+    Posterior,
+    Recording,
+    Selection,
+    WatchedTest,
+)
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
@@ -38,15 +47,13 @@ def identify_file(
     test, and so must every competing class where none is selected yet.
     """
     _refuse_size(recording.file.size_bytes, settings.max_file_bytes)
-    latest = recording.received_at + timedelta(seconds=settings.future_tolerance_seconds)
     with archive.opened(recording.file) as path:
         if path.name.lower().endswith(MODES_SUFFIX):
             found = _tests_in(path, read_limits(settings))
         else:
-            found = (_test_in(path, bridge, settings, latest),)
+            found = (_test_in(path, bridge, settings),)
     for item in found:
         hanger = _hanger(item.test.hanger, bridge)
-        _refuse_future(item.test.time, latest, f"test {item.test.id}")
         for model in competing(hanger, settings, selected):
             model.refuse(item.test)
     return found
@@ -55,11 +62,7 @@ def identify_file(
 def _refuse_size(size_bytes: int, limit_bytes: int) -> None:
     if size_bytes == 0:
         raise BadInput("the file is empty.", remedy="Check the logger and send the file again.")
-    if size_bytes > limit_bytes:
-        raise BadInput(
-            f"{size_bytes} bytes are more than the {limit_bytes} of setting max_file_bytes.",
-            remedy="Send it in parts, or raise the setting.",
-        )
+    refuse_oversize(size_bytes, limit_bytes)
 
 
 def _tests_in(path: Path, limits: Limits) -> tuple[IdentifiedTest, ...]:
@@ -70,20 +73,22 @@ def _tests_in(path: Path, limits: Limits) -> tuple[IdentifiedTest, ...]:
     return tuple(IdentifiedTest(test, position) for position, test in enumerate(tests))
 
 
-def _test_in(path: Path, bridge: Bridge, settings: Settings, latest: datetime) -> IdentifiedTest:
+def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     records = read_test(path, read_limits(settings))
     hanger = _hanger(records[0].hanger, bridge)
-    for record in records:
-        _refuse_future(record.time, latest, "the recording")
     options = identify_options(settings, bridge)
     result = identify(records, options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
+    measured = [each for each in records if isinstance(each, Recording)]
     return IdentifiedTest(
         result.test,
         frequency_response=result.frequency_response,
         notes=(*result.notes, *dropped),
         quality=result.quality,
         set_aside=result.set_aside,
+        times=tuple(record.time for record in records if record.time is not None),
+        fingerprint=fingerprint_of(records),
+        signals=tuple(each.text for each in signal_doubts(measured, hanger)),
     )
 
 
@@ -99,14 +104,6 @@ def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
             "the file names no hanger.", remedy="Give `hanger` in its header or its sidecar."
         )
     return bridge.hanger(hanger_id)
-
-
-def _refuse_future(time: datetime | None, latest: datetime, what: str) -> None:
-    if time is not None and time > latest:
-        raise BadInput(
-            f"{what} claims the time {format_time(time)}, ahead of the clock.",
-            remedy="Correct its `time`, or the clock of the logger.",
-        )
 
 
 def select_model(

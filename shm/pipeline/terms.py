@@ -88,7 +88,7 @@ def diagnosis_lineage(
     tests: Sequence[StoredTest], hanger: Hanger, terms: Mapping[str, Any]
 ) -> Lineage:
     """What a diagnosis depends on: tests, description, options, version."""
-    inputs = [[test.key, asdict(test.lineage)] for test in tests]
+    inputs = [[test.key, test.lineage.columns] for test in tests]
     return Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
 
 
@@ -104,10 +104,12 @@ def update_terms(
     seed = seed_of(settings.seed, [test.key for test in tests])
     terms = Terms(settings.samples, seed, settings.priors, taught)
     plain = {"samples": terms.samples, "seed": seed, "priors": terms.priors}
-    inputs: list[object] = [[test.key, asdict(test.lineage)] for test in tests]
+    inputs: list[object] = [[test.key, test.lineage.columns] for test in tests]
     from_others = [known, taught.posterior if taught else None]
     inputs += [hashlib.sha256(each.samples.tobytes()).hexdigest() for each in from_others if each]
-    return terms, Lineage.of(inputs, {"models": list(models), **plain, "hanger": asdict(hanger)})
+    described = asdict(hanger)
+    settled = {"models": list(models), **plain, "hanger": described}
+    return terms, Lineage.of(inputs, settled, described)
 
 
 def seed_of(seed: int, keys: Sequence[str]) -> int:

@@ -5,7 +5,6 @@ A sidecar NAME.toml beside NAME.zip may say hanger, time and temperature of the 
 
 from __future__ import annotations
 
-import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from shm.read.atomic import replace_file
 from shm.read.guard import guarded
 from shm.read.header import CHANNEL_KEYS, Header
 from shm.read.limits import limits
-from shm.read.packed import MOST_MEMBERS, checked_members, refusal, unpack
+from shm.read.packed import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
 from shm.read.sidecar import document_beside, sidecar_path, with_sidecar
 
 SUFFIX = ".zip"
@@ -40,9 +39,9 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
     Raises BadInput naming the member at fault.
     """
     members = checked_members(path)
-    with tempfile.TemporaryDirectory() as folder:
+    with unpacking_folder() as folder:
         with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
-            files = _unpack_all(archive, members, Path(folder))
+            files = _unpack_all(archive, members, folder)
         sidecars = {file for file in files if file.suffix == ".toml"}
         recordings = sorted(set(files) - sidecars, key=lambda file: natural(str(file)))
         _refuse_alone(sidecars, recordings, path)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import gzip
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 from shm.errors import BadInput
 from shm.read.base import Format
 from shm.read.limits import limits, too_large
+from shm.read.packed import unpacking_folder
 
 _HEAD_BYTES = 4096
 _MAGIC: tuple[tuple[bytes, str], ...] = (
@@ -114,9 +114,10 @@ def plain_file(path: Path, content: bytes) -> Iterator[Path]:
     if not is_gzipped(path):
         yield path
         return
-    with tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder, path.stem)
-        plain.write_bytes(content)
+    with unpacking_folder() as folder:
+        plain = folder / path.stem
+        with plain.open("xb") as file:
+            file.write(content)
         yield plain
 
 

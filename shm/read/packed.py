@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import stat
+import tempfile
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from shm.errors import BadInput
@@ -11,11 +15,33 @@ from shm.read.guard import guarded
 from shm.read.limits import limits, too_large
 
 MOST_MEMBERS = 200
+_given: ContextVar[Path | None] = ContextVar("given", default=None)
 _MOST_RATIO = 200
 _CHUNK = 1 << 20
 _ENCRYPTED = 0x1
 _ARCHIVES = (".zip", ".tar", ".tgz", ".7z", ".rar", ".bz2", ".xz", ".zst")
 _PACK_AGAIN = "Pack the plain files of one test anew."
+
+
+@contextmanager
+def unpacking_in(folder: Path | None) -> Iterator[None]:
+    """Whatever is unpacked within the context goes into a folder that somebody else removes."""
+    before = _given.set(folder)
+    try:
+        yield
+    finally:
+        _given.reset(before)
+
+
+@contextmanager
+def unpacking_folder() -> Iterator[Path]:
+    """A new folder to unpack in, which goes with the context unless somebody else removes it."""
+    given = _given.get()
+    if given is not None:
+        yield Path(tempfile.mkdtemp(dir=given))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
 
 
 def checked_members(path: Path) -> list[zipfile.ZipInfo]:

@@ -190,7 +190,8 @@ class HangerReport:
     sequential test has called since the baseline, `is_called` whether it has. `states` are empty
     where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
-    `settings` are those that decide the numbers, each with its unit.
+    `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
+    hanger's description has changed since the baseline, where that moves results.
     """
 
     bridge: str
@@ -216,6 +217,7 @@ class HangerReport:
     neighbours: BridgePattern | None = None
     period: Period | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
+    redescribed: tuple[str, ...] = ()
 
     @property
     def latest(self) -> ModalTest:

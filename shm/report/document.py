@@ -45,6 +45,7 @@ def json(data: HangerReport) -> dict[str, Any]:
         "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
+        "redescribed": list(data.redescribed),
         "temperature_coefficients": temperature_documents(data.states),
         "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
         "period": period_json(data.period),

@@ -12,6 +12,7 @@ from shm.report import words
 from shm.report.content import HangerReport, Interval
 from shm.report.diagnosis.summary import next_step, verdict
 from shm.report.diagnosis.tensions import AFTER, tension_of
+from shm.report.redescription import redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
@@ -57,6 +58,7 @@ def status_of(
 def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
+        redescribed(data),
         *data.averaged.caveats,
         _tension(data),
         *_repeats_and_limits(data),

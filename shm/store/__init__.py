@@ -2,6 +2,7 @@
 
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
+from shm.store.deaths import Death, Deaths
 from shm.store.glances import (
     AlertRow,
     BaselineGlance,
@@ -12,8 +13,11 @@ from shm.store.glances import (
     TestRow,
     TrendPoint,
 )
+from shm.store.hold_rows import Decision, HeldTest, Hold
+from shm.store.judging import Judged
 from shm.store.queries import WaitingTest, WatchedName
 from shm.store.rows import (
+    ENDED,
     Acknowledgement,
     Adoption,
     Baseline,
@@ -47,6 +51,7 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM",
+    "ENDED",
     "Acknowledgement",
     "ActiveLock",
     "Adoption",
@@ -54,6 +59,9 @@ __all__ = [
     "Archive",
     "Baseline",
     "BaselineGlance",
+    "Death",
+    "Deaths",
+    "Decision",
     "Delivery",
     "DeliveryRow",
     "DeliveryState",
@@ -62,7 +70,10 @@ __all__ = [
     "FormerPosterior",
     "FormerTest",
     "HangerEvent",
+    "HeldTest",
+    "Hold",
     "IdentifiedTest",
+    "Judged",
     "KeptWatch",
     "Lineage",
     "Numbers",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from datetime import datetime
@@ -12,6 +13,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
+from shm.store.checksums import decoding, loads
 from shm.store.database import Database, insert
 from shm.store.queries import selection_in_force
 from shm.store.results import insert_baseline, insert_posterior, insert_selection
@@ -26,6 +28,8 @@ from shm.store.rows import (
 from shm.store.tables import adoptions, diagnoses, posteriors, selection_entries
 from shm.values import Diagnosis, Posterior
 
+log = logging.getLogger(__name__)
+
 _ADOPTION = tuple(field.name for field in fields(Adoption))
 _in_force = adoptions.c.undone_at.is_(None)
 
@@ -38,7 +42,7 @@ class Adopting(Database):
     ) -> StoredDiagnosis:
         """Keeps a diagnosis, which is the hanger's latest from now on."""
         values = {
-            **vars(lineage),
+            **lineage.columns,
             "hanger": hanger,
             "diagnosed_at": at,
             "tests": list(diagnosis.tests),
@@ -49,11 +53,19 @@ class Adopting(Database):
         return StoredDiagnosis(id_, hanger, diagnosis, at, lineage)
 
     def latest_diagnosis(self, hanger: int) -> StoredDiagnosis | None:
-        """The latest diagnosis of a hanger; None where there is none."""
+        """The latest diagnosis of a hanger; None where there is none that this version reads."""
         query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)
         with self.reading() as connection:
             row = connection.execute(query.order_by(diagnoses.c.id.desc()).limit(1)).one_or_none()
-        return None if row is None else _diagnosis(row)
+        if row is None:
+            return None
+        with decoding(diagnoses, row, hanger):
+            document = loads(row.document)
+        try:
+            return _diagnosis(row, diagnosis_of(document))
+        except (KeyError, TypeError, ValueError):
+            log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
+            return None
 
     def adopt(
         self,
@@ -150,21 +162,22 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
 
 
 def _adoption(row: Row[Any]) -> StoredAdoption:
-    return StoredAdoption(
-        id=row.id,
-        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-        adopted_at=row.adopted_at,
-        undone_at=row.undone_at,
-        undone_why=row.undone_why or "",
-        undone_who=row.undone_who or "",
-    )
+    with decoding(adoptions, row, row.hanger):
+        return StoredAdoption(
+            id=row.id,
+            adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
+            adopted_at=row.adopted_at,
+            undone_at=row.undone_at,
+            undone_why=row.undone_why or "",
+            undone_who=row.undone_who or "",
+        )
 
 
-def _diagnosis(row: Row[Any]) -> StoredDiagnosis:
+def _diagnosis(row: Row[Any], diagnosis: Diagnosis) -> StoredDiagnosis:
     return StoredDiagnosis(
         id=row.id,
         hanger=row.hanger,
-        diagnosis=diagnosis_of(row.document),
+        diagnosis=diagnosis,
         diagnosed_at=row.diagnosed_at,
         lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
     )

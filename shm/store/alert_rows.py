@@ -13,7 +13,7 @@ from shm.store.database import Database
 from shm.store.glances import AlertRow, DeliveryRow
 from shm.store.rows import DeliveryState
 from shm.store.tables import acknowledgements, alerts, deliveries
-from shm.store.watching import acknowledgement_of, stored_alerts
+from shm.store.watching import acknowledgement_of, stored_alert, stored_alerts
 
 
 class AlertRows(Database):
@@ -77,14 +77,15 @@ def _deliveries(
 
 
 def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
+    alert = stored_alert(row).alert
     return AlertRow(
         id=row.id,
         hanger=row.hanger,
         raised_at=row.raised_at,
-        test=row.document["test"],
+        test=alert.test,
         test_time=row.time,
-        kinds=tuple(row.document.get("kinds", ())),  # absent from those of the first schema
-        message=row.message,
+        kinds=alert.kinds,
+        message=alert.message,
         acknowledgement=acknowledgement_of(row),
         deliveries=owed,
     )

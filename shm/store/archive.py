@@ -8,24 +8,32 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import logging
+import math
 import os
 import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from shm.documents import dump
-from shm.errors import BadInput, ShmError, StoreError
+from shm.errors import BadInput, ShmError, StoreError, TooLarge
 from shm.read import sidecar_path
 from shm.store.rows import ReceivedFile
 
+log = logging.getLogger(__name__)
+
 MODES_SUFFIX = ".modes.json"
+_FETCH = "Drop the file into the spool again, which heals it, or run `shm archive fetch`."
 _CHUNK = 1 << 20
+_HOLE = bytes(_CHUNK)
+_SYNC_BYTES = 16 << 20  # a slow memory card takes some 2 s for so much, and nobody waits longer
 _NAME_BYTES = 200  # file systems end at 255; the quarantine puts ".reason.json" behind
 _SUFFIX = re.compile(r"(\.[a-z0-9]{1,12}){1,2}")
 
@@ -47,10 +55,42 @@ def safe_name(path: Path) -> str:
     return Path(parent, short + suffix).as_posix()
 
 
-def checksum(path: Path) -> str:
+Meanwhile = Callable[[], object]
+"""What is called again and again while a file is copied or hashed, to show that all is well."""
+
+
+def nothing() -> None:
+    """Nothing to do meanwhile."""
+
+
+def refuse_oversize(
+    size_bytes: int, most_bytes: float, file: str | Path = "", setting: str = "max_file_bytes"
+) -> None:
+    """Raises TooLarge: the one judge of size for whatever comes in, on whatever way."""
+    if size_bytes > most_bytes:
+        raise TooLarge(
+            f"{size_bytes} bytes are more than the {most_bytes} that are taken.",
+            file=file,
+            remedy=f"Send it in parts, or raise the setting {setting}.",
+        )
+
+
+def checksum(path: Path, meanwhile: Meanwhile = nothing) -> str:
     """SHA-256 of a file, as 64 hexadecimal digits."""
+    digest = hashlib.sha256()
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+            meanwhile()
+    return digest.hexdigest()
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a file of an archive has the SHA-256 that it is named by."""
+    try:
+        return checksum(path) == path.name[:64]
+    except OSError:
+        return False
 
 
 @dataclass(frozen=True)
@@ -69,8 +109,18 @@ class Archive:
 
     folder: Path
 
-    def keep(self, source: Path, *, follow: bool = False) -> Kept:
+    def keep(
+        self,
+        source: Path,
+        *,
+        follow: bool = False,
+        most_bytes: float = math.inf,
+        meanwhile: Meanwhile = nothing,
+    ) -> Kept:
         """Copies a file in under its checksum; bytes that are there already are left alone.
+
+        Where those have rotted, which their name tells, the good ones take their place.
+        Raises TooLarge before a byte of a file of more than `most_bytes` is read.
 
         All is read from one descriptor. A link is refused unless it is to be followed: by one,
         whoever writes into the spool could send in any file of this machine. Raises BadInput where
@@ -79,8 +129,10 @@ class Archive:
         """
         with self._incoming() as temporary, _opened(source, follow) as reading:
             before = os.fstat(reading.fileno())
-            sha256, size = _copy_hashed(reading, temporary)
-            if _mark(source.stat(follow_symlinks=follow)) != _mark(before):
+            refuse_oversize(before.st_size, most_bytes, source)
+            sha256, size = _copy_hashed(reading, temporary, before.st_size, meanwhile)
+            now = source.stat(follow_symlinks=follow)
+            if _mark(now) != _mark(before) or size != before.st_size:
                 raise ShmError(
                     f"{source.name} changed while it was read.",
                     remedy="It is tried again.",
@@ -90,22 +142,40 @@ class Archive:
             self._place(temporary, self.folder / relative)
         return Kept(sha256, size, relative.as_posix(), entry_of(before))
 
+    def refuse_damaged(self, file: ReceivedFile) -> None:
+        """Raises StoreError where a file or its sidecar is missing or is not as it was kept."""
+        if file.archived_as is None or not self.holds(file):
+            raise StoreError(f"{file.file_name} is not in the archive.", remedy=_FETCH)
+        for name in (file.archived_as, file.sidecar_as):
+            if name is not None and not is_whole(self.folder / name):
+                raise StoreError(
+                    f"{file.file_name} is damaged in the archive: archive/{name} has not the "
+                    "SHA-256 that it is named by.",
+                    remedy=_FETCH,
+                )
+
+    def holds_whole(self, file: ReceivedFile) -> bool:
+        """Whether the file and its sidecar are there as they were kept; reads them."""
+        try:
+            self.refuse_damaged(file)
+        except StoreError:
+            return False
+        return True
+
     def holds(self, file: ReceivedFile) -> bool:
-        """Whether the file is there, as it should be."""
+        """Whether the file is there; what is in it is looked at where it is read."""
         return file.archived_as is not None and (self.folder / file.archived_as).is_file()
 
     @contextmanager
     def opened(self, file: ReceivedFile) -> Iterator[Path]:
         """The file under the name it came with, its sidecar beside it, while the context lasts.
 
+        Both are compared with their checksums first. Raises StoreError where one is not as it was.
         What fails meanwhile because another process has begun to serve, and swept the archive,
         is an ShmError with `retry_after_s`: the file itself is not to blame.
         """
-        if file.archived_as is None or not self.holds(file):
-            raise StoreError(
-                f"{file.file_name} is not in the archive.",
-                remedy="Fetch a copy with `shm archive fetch`, or drop the file again.",
-            )
+        self.refuse_damaged(file)
+        assert file.archived_as is not None
         views = self.folder / ".open"
         views.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=views) as view:
@@ -140,7 +210,10 @@ class Archive:
             raise _explained(error, self.folder) from error
 
     def _place(self, temporary: Path, final: Path) -> None:
-        if not final.exists():
+        rotten = final.exists() and not is_whole(final)
+        if rotten:
+            log.warning("%s was damaged in the archive; the file that came again heals it", final)
+        if rotten or not final.exists():
             final.parent.mkdir(exist_ok=True)
             temporary.chmod(0o444)
             temporary.rename(final)
@@ -154,28 +227,68 @@ class Quarantine:
 
     folder: Path
 
-    def put(self, source: Path, name: str, reason: Mapping[str, Any], sidecar: Path) -> Path:
+    def put(
+        self,
+        source: Path,
+        name: str,
+        reason: Mapping[str, Any],
+        sidecar: Path,
+        meanwhile: Meanwhile = nothing,
+    ) -> Path:
         """Lays a copy out with its reason and its sidecar, if there is one.
 
         Other files of that name are left as they are.
         """
-        target = self._free_place(Path(name).name, str(reason["sha256"]))
+        same = partial(self._holds, source, str(reason["sha256"]), meanwhile)
+        target = self._free_place(Path(name).name, str(reason["sha256"])[:8], same)
         try:
             if sidecar.is_file():
-                _copy_whole(sidecar, sidecar_path(target))
-            _copy_whole(source, target)
-            _write_whole(dump(reason) + "\n", target.with_name(f"{target.name}.reason.json"))
+                _copy_whole(sidecar, sidecar_path(target), meanwhile)
+            _copy_whole(source, target, meanwhile)
+            self._explain(target, reason)
         except OSError as error:
             raise _explained(error, self.folder) from error
         return target
 
-    def _free_place(self, name: str, sha256: str) -> Path:
-        """`name` itself, or with a piece of the checksum where another file has that name."""
+    def move(self, source: Path, name: str, reason: Mapping[str, Any], sidecar: Path) -> Path:
+        """Moves a file here with its reason and its sidecar, neither read nor copied.
+
+        Where that cannot be, as from another file system, it stays where it is, with its reason
+        here. Gives where it lies then.
+        """
+        entry = entry_of(source.lstat())
+        target = self._free_place(Path(name).name, entry, lambda there: not there.exists())
+        try:
+            self._explain(target, reason)  # first: a file here is never without
+            if sidecar.is_file() and not sidecar.is_symlink():
+                sidecar.rename(sidecar_path(target))
+            source.rename(target)
+            sync(self.folder)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise _explained(error, self.folder) from error
+            stays = f"It was left at {source}, as it cannot be moved ({error.strerror})."
+            self._explain(target, {**reason, "remedy": f"{reason['remedy']} {stays}"})
+            return source
+        return target
+
+    def _explain(self, target: Path, reason: Mapping[str, Any]) -> None:
+        _write_whole(dump(reason) + "\n", target.with_name(f"{target.name}.reason.json"))
+
+    def _free_place(self, name: str, mark: str, same: Callable[[Path], bool]) -> Path:
+        """`name` itself, or with a `mark` where another file than the same has that name."""
         target = self.folder / name
-        if not target.exists() or checksum(target) == sha256:
+        if not target.exists() or same(target):
             return target
         suffix = suffix_of(name)
-        return self.folder / f"{name[: len(name) - len(suffix)]}-{sha256[:8]}{suffix}"
+        return self.folder / f"{name[: len(name) - len(suffix)]}-{mark}{suffix}"
+
+    @staticmethod
+    def _holds(source: Path, sha256: str, meanwhile: Meanwhile, there: Path) -> bool:
+        """Whether a file holds the same as the source; one of another size is not read."""
+        if there.stat().st_size != source.stat().st_size:
+            return False
+        return checksum(there, meanwhile) == sha256
 
 
 def entry_of(status: os.stat_result) -> str:
@@ -207,23 +320,35 @@ def _opened(source: Path, follow: bool) -> Iterator[BinaryIO]:
         yield reading
 
 
-def _copy_hashed(reading: BinaryIO, target: Path) -> tuple[str, int]:
-    digest, size = hashlib.sha256(), 0
+def _copy_hashed(
+    reading: BinaryIO, target: Path, most_bytes: int, meanwhile: Meanwhile
+) -> tuple[str, int]:
+    """Copies no more than a chunk beyond `most_bytes`, should the file grow; holes stay holes."""
+    digest, size, synced = hashlib.sha256(), 0, 0
     with target.open("wb") as writing:
-        while chunk := reading.read(_CHUNK):
+        while size <= most_bytes and (chunk := reading.read(_CHUNK)):
             digest.update(chunk)
             size += len(chunk)
-            writing.write(chunk)
+            if chunk == _HOLE:
+                writing.seek(size)
+            else:
+                writing.write(chunk)
+            if size - synced >= _SYNC_BYTES:
+                writing.flush()
+                os.fdatasync(writing.fileno())
+                synced = size
+            meanwhile()
+        writing.truncate(size)
         writing.flush()
         os.fsync(writing.fileno())
     return digest.hexdigest(), size
 
 
-def _copy_whole(source: Path, target: Path) -> None:
+def _copy_whole(source: Path, target: Path, meanwhile: Meanwhile) -> None:
     temporary = target.with_name(f".{target.name}.part")
     temporary.unlink(missing_ok=True)
     with source.open("rb") as reading:
-        _copy_hashed(reading, temporary)
+        _copy_hashed(reading, temporary, os.fstat(reading.fileno()).st_size, meanwhile)
     temporary.rename(target)
     sync(target.parent)
 

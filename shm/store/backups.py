@@ -15,11 +15,11 @@ from tempfile import TemporaryDirectory
 import sqlalchemy as sa
 from sqlalchemy.engine import Engine
 
-from shm.errors import NothingThere, SchemaOutdated, StoreError, UsageError
+from shm.errors import NothingThere, SchemaOutdated, StoreDamaged, StoreError, UsageError
 from shm.store import schema
 from shm.store.archive import sync
-from shm.store.checking import check_store
-from shm.store.copying import TableContent, Tell, contents, copy_rows, delete_rows, row_counts
+from shm.store.checking import CheckedStore, check_store
+from shm.store.copying import TableContent, Tell, copy_rows, delete_rows, row_counts
 from shm.store.database import BUSY_SECONDS, Database, make_engine
 from shm.store.faults import translated
 
@@ -34,10 +34,11 @@ class Restored:
     kept: Path | None
 
 
-def back_up(store: Database, file: Path, tell: Tell) -> tuple[TableContent, ...]:
+def back_up(store: Database, file: Path, tell: Tell) -> CheckedStore:
     """Writes what the store holds at one instant into a new file; others go on meanwhile.
 
-    The file appears whole or not at all. Raises UsageError where it is there already.
+    The file appears whole or not at all, and what is damaged in the store is damaged in it too: all
+    else is worth keeping. Raises UsageError where it is there already.
     """
     if file.exists():
         raise UsageError(f"{file} is there already.", remedy="Give the backup another name.")
@@ -46,11 +47,11 @@ def back_up(store: Database, file: Path, tell: Tell) -> tuple[TableContent, ...]
         temporary = Path(folder) / "shm.db"
         if store.engine.dialect.name == "sqlite":
             _snapshot(Path(str(store.engine.url.database)), temporary, tell)
-            tables = _verified(temporary, tell)
         else:
-            tables = _copied(store.engine, temporary, tell)
+            _copied(store.engine, temporary, tell)
+        checked = _checked(temporary, tell)
         _into_place(temporary, file)
-    return tables
+    return checked
 
 
 def copy_store(store: Database, target: str | Path, tell: Tell) -> tuple[TableContent, ...]:
@@ -110,7 +111,7 @@ def _cleared(target: str | Path, keep_as: Path, tell: Tell, replace: bool) -> Pa
                 raise _holds(Database(engine).location, held)
             back_up(Database(engine), keep_as, tell)
     except StoreError as error:
-        mendable = error.retry_after_s is not None
+        mendable = error.retry_after_s is not None and not isinstance(error, StoreDamaged)
         if mendable or not replace or not isinstance(target, Path):
             raise
         _move_aside(target, keep_as)
@@ -147,9 +148,9 @@ def _must_be_whole(engine: Engine, file: Path, tell: Tell) -> None:
         )
 
 
-def _verified(path: Path, tell: Tell) -> tuple[TableContent, ...]:
-    with _opened(path) as engine, Database(engine).reading() as connection:
-        return contents(connection, tell)
+def _checked(path: Path, tell: Tell) -> CheckedStore:
+    with _opened(path) as engine:
+        return check_store(Database(engine), tell)
 
 
 @contextmanager

@@ -134,7 +134,7 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
 def _since_described(document: Mapping[str, Any]) -> dict[str, Any]:
     """What documents of before there were priors of a description lack: these were the thesis's."""
-    numbers = ("repeatability_sd_n", "misfit_percent", "log_occam")
+    numbers = ("repeatability_sd_n", "misfit_percent", "log_occam", "tension_of_other_ends_n")
     return {
         "priors": document.get("priors", "thesis"),
         "at_bounds": tuple(document.get("at_bounds", ())),

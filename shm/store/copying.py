@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, RowMapping
 
 from shm.errors import StoreError
+from shm.store.checksums import digest_of, plain_table
 from shm.store.columns import Document
 from shm.store.tables import metadata
 
 Tell = Callable[[str, float], None]
 """Is told what is being done and which fraction of all is done."""
+
+Rows = Sequence[RowMapping]
+Look = Callable[[sa.Table, Rows], None]
+"""Is shown rows of a table, their values as the database's driver gives them."""
 
 _ROWS_AT_ONCE = 50  # a row may hold a frequency response of some 100 kB
 
@@ -39,10 +42,15 @@ def row_counts(connection: Connection) -> dict[str, int]:
     return counted
 
 
-def contents(connection: Connection, tell: Tell) -> tuple[TableContent, ...]:
-    """Reads every row of every table."""
+def contents(
+    connection: Connection, tell: Tell, look: Look = lambda _table, _rows: None
+) -> tuple[TableContent, ...]:
+    """Reads every row of every table, as the database holds it, and shows each to `look`."""
     progress = _Progress(tell, "reading rows", sum(row_counts(connection).values()))
-    return tuple(_read(connection, table, progress) for table in metadata.sorted_tables)
+    return tuple(
+        _read(connection, table, progress, partial(look, table), plain_table(table.name))
+        for table in metadata.sorted_tables
+    )
 
 
 def copy_rows(source: Connection, target: Connection, tell: Tell) -> tuple[TableContent, ...]:
@@ -73,21 +81,21 @@ def delete_rows(connection: Connection) -> None:
         connection.execute(sa.delete(table))
 
 
-Rows = Sequence[RowMapping]
-
-
 def _read(
     connection: Connection,
     table: sa.Table,
     progress: _Progress,
     use: Callable[[Rows], None] | None = None,
+    columns: sa.TableClause | None = None,
 ) -> TableContent:
     rows, total = 0, 0
-    query = sa.select(_plain(table)).order_by(*(sa.column(c.name) for c in table.primary_key))
+    query = sa.select(_plain(table) if columns is None else columns).order_by(
+        *(sa.column(c.name) for c in table.primary_key)
+    )
     query = query.execution_options(yield_per=_ROWS_AT_ONCE)
     for some in connection.execute(query).mappings().partitions():
         rows += len(some)
-        total = (total + sum(map(_row_number, some))) % 2**256
+        total = (total + sum(int.from_bytes(digest_of(row), "big") for row in some)) % 2**256
         if use is not None:
             use(some)
         progress.advance(len(some))
@@ -108,21 +116,6 @@ def _plain(table: sa.Table) -> sa.TableClause:
             for c in table.columns
         ),
     )
-
-
-def _row_number(row: RowMapping) -> int:
-    """A row's SHA-256 as a number; the sum of such numbers is the same in any order."""
-    digest = hashlib.sha256()
-    for value in row.values():
-        content = value if isinstance(value, bytes) else repr(_same_zero(value)).encode()
-        digest.update(f"{type(value).__name__} {len(content)} ".encode())
-        digest.update(content)
-    return int.from_bytes(digest.digest(), "big")
-
-
-def _same_zero(value: Any) -> Any:
-    """SQLite has no negative zero."""
-    return value + 0.0 if isinstance(value, float) else value
 
 
 def _number_on(connection: Connection) -> None:

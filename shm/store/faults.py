@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
-from shm.errors import StoreBusy, StoreError
+from shm.errors import StoreBusy, StoreDamaged, StoreError
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,8 @@ class Fault:
     error: type[StoreError] = StoreError
     states: tuple[str, ...] = ()
 
+
+_RESTORE = "Restore it from a backup: `shm db restore FILE --replace`."
 
 FAULTS = (
     Fault(
@@ -72,8 +74,8 @@ FAULTS = (
     ),
     Fault(("disk i/o",), "cannot be read or written", "Check the disk.", 60.0, states=("58030",)),
     Fault(("unable to open",), "cannot be opened", "Check its path and permissions.", None),
-    Fault(("not a database",), "is not a database", "Restore it from a backup.", None),
-    Fault(("malformed",), "is damaged", "Restore it from a backup.", None, states=("XX001",)),
+    Fault(("not a database",), "is not a database", _RESTORE, 60.0, StoreDamaged),
+    Fault(("malformed",), "is damaged", _RESTORE, 60.0, StoreDamaged, states=("XX001", "XX002")),
 )
 
 UNREACHABLE = Fault(
@@ -90,6 +92,12 @@ def translated(location: str, errors: type[Exception] = sa.exc.SQLAlchemyError) 
     """Turns the database's own errors into ours, with remedy and time to wait."""
     try:
         yield
+    except UnicodeDecodeError as error:  # SQLite's message quotes a damaged schema
+        raise StoreDamaged(
+            f"the store {location} is damaged: its schema cannot be read.",
+            remedy=_RESTORE,
+            retry_after_s=60.0,
+        ) from error
     except errors as error:
         cause = " ".join(str(getattr(error, "orig", None) or error).split())
         fault = _meaning(error, cause.lower())

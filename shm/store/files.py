@@ -1,35 +1,33 @@
-"""Verbs on received files: take in, refuse, look up."""
+"""Verbs on received files: refuse, look up."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from datetime import datetime
+from itertools import takewhile
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere
+from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Database, insert
-from shm.store.rows import Event, Outcome, Receipt, ReceivedFile, Stage, StoredRecording
-from shm.store.stepping import ARCHIVED, write_step
-from shm.store.tables import events, recordings, tests
+from shm.store.deaths import Death, Deaths
+from shm.store.rows import (
+    ENDED,
+    Event,
+    ReceivedFile,
+    Stage,
+    StoredRecording,
+    counts_by_name,
+)
+from shm.store.stepping import write_step
+from shm.store.tables import events, recordings, steps, tests
 
 
 class Files(Database):
     """The part of the store that keeps account of the files."""
-
-    def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
-        """Enters a file that is safe in the archive. The same bytes are never entered twice."""
-        with self.writing() as connection:
-            known = _by_checksum(connection, file.sha256)
-            outcome = _outcome(known, file)
-            if known is None:
-                row_id = _enter(connection, file, at)
-            else:
-                row_id = known.id
-                _notice(connection, known, file, outcome, at)
-            return Receipt(outcome, recording_from(_by_id(connection, row_id)))
 
     def refuse(
         self,
@@ -46,7 +44,7 @@ class Files(Database):
         the step that failed here, or refused it already.
         """
         with self.writing() as connection:
-            row = _by_id(connection, recording_id)
+            row = by_id(connection, recording_id)
             if stage is not None and not _waits(connection, row, stage, test_ids):
                 return
             test_ids = _own(connection, recording_id, test_ids)
@@ -63,20 +61,25 @@ class Files(Database):
             message = str(reason.get("message", ""))
             write_event(connection, at, "refused", row.id, row.file_name, message)
 
+    def refused_unread(self, file_name: str, message: str, at: datetime) -> None:
+        """Notes that a file was refused for its size, of which nothing else is known."""
+        with self.writing() as connection:
+            write_event(connection, at, "refused", None, file_name, message)
+
     def waits(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
         """Whether a recording, or its tests where some are named, are still at a stage."""
         with self.reading() as connection:
-            return _waits(connection, _by_id(connection, recording_id), stage, test_ids)
+            return _waits(connection, by_id(connection, recording_id), stage, test_ids)
 
     def recording(self, recording_id: int) -> StoredRecording:
         """Raises NothingThere."""
         with self.reading() as connection:
-            return recording_from(_by_id(connection, recording_id))
+            return recording_from(by_id(connection, recording_id))
 
     def recording_of(self, sha256: str) -> StoredRecording | None:
         """The recording with these bytes, if it was received."""
         with self.reading() as connection:
-            row = _by_checksum(connection, sha256)
+            row = by_checksum(connection, sha256)
         return None if row is None else recording_from(row)
 
     def recordings(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
@@ -94,12 +97,49 @@ class Files(Database):
         query = sa.select(recordings).where(waiting, recordings.c.id.not_in(excluding))
         return self._recordings(query.order_by(recordings.c.id).limit(limit))
 
-    def stage_counts(self) -> dict[Stage, int]:
-        """How many recordings stand at each stage; every stage is named."""
+    def stage_counts(self) -> dict[str, int]:
+        """How many recordings stand at each stage; see `counts_by_name`."""
         query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
         with self.reading() as connection:
-            counted = {Stage(row[0]): int(row[1]) for row in connection.execute(query)}
-        return {stage: counted.get(stage, 0) for stage in Stage}
+            return counts_by_name(Stage, connection.execute(query))
+
+    def died(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
+        """Notes that a process that worked on a recording died."""
+        with self.writing() as connection:
+            row = by_id(connection, recording_id)
+            write_event(connection, at, death, row.id, row.file_name, message)
+
+    def deaths(self) -> dict[int, Deaths]:
+        """What is noted of the recordings that are on their way, since each last moved on."""
+        moved_at = (
+            sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
+            .group_by(steps.c.recording_id)
+            .subquery()
+        )
+        noted = (
+            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+            .join(recordings, recordings.c.id == events.c.recording_id)
+            .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
+            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(recordings.c.stage.not_in(ENDED))
+            .order_by(events.c.id)
+        )
+        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
+        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
+        killed = killed.order_by(events.c.id.desc())
+        found: dict[int, Deaths] = {}
+        with self.reading() as connection:
+            latest = connection.execute(killed.limit(100)).all()
+            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
+            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
+            for row in connection.execute(noted):
+                before = found.get(row.recording_id, Deaths(0, 0, row.at))
+                found[row.recording_id] = Deaths(
+                    before.by_itself + (row.kind == Death.BY_ITSELF),
+                    before.from_outside + (row.id in in_a_row),
+                    row.at,
+                )
+        return found
 
     def events(self, kind: str | None = None) -> tuple[Event, ...]:
         """What was noticed on the way, oldest first; `kind` as duplicate or refused."""
@@ -112,15 +152,15 @@ class Files(Database):
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
         with self.reading() as connection:
-            return tuple(recording_from(row) for row in connection.execute(query))
+            return tuple(readable(connection.execute(query), recording_from))
 
 
-def _by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
+def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
     query = sa.select(recordings).where(recordings.c.sha256 == sha256)
     return connection.execute(query).one_or_none()
 
 
-def _by_id(connection: Connection, recording_id: int) -> Row[Any]:
+def by_id(connection: Connection, recording_id: int) -> Row[Any]:
     query = sa.select(recordings).where(recordings.c.id == recording_id)
     row = connection.execute(query).one_or_none()
     if row is None:
@@ -145,58 +185,30 @@ def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:
-    file = ReceivedFile(
-        row.sha256, row.file_name, row.size_bytes, row.arrival, row.archived_as, row.sidecar_as
-    )
-    return StoredRecording(row.id, file, row.received_at, Stage(row.stage), row.hanger, row.reason)
-
-
-def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:
-    if known is None:
-        return Outcome.NEW
-    if known.arrival == file.arrival:
-        return Outcome.RESUMED
-    return Outcome.REOPENED if known.stage == Stage.REFUSED else Outcome.DUPLICATE
-
-
-def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
-    values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
-    row_id = insert(connection, recordings, values)
-    write_step(connection, row_id, ARCHIVED, at)
-    write_step(connection, row_id, Stage.RECEIVED, at)
-    return row_id
-
-
-def _notice(
-    connection: Connection, known: Row[Any], file: ReceivedFile, outcome: Outcome, at: datetime
-) -> None:
-    if outcome is Outcome.RESUMED:
-        return
-    message = "dropped again after its refusal; tried again."
-    if outcome is Outcome.REOPENED:
-        _reopen(connection, known.id, file, at)
-    else:
-        message = f"the same file as {known.file_name}; not stored twice."
-        if file.sidecar_as not in (None, known.sidecar_as):
-            message += " Its sidecar differs: the first one holds."
-    write_event(connection, at, outcome, known.id, file.file_name, message)
-
-
-def _reopen(connection: Connection, recording_id: int, file: ReceivedFile, at: datetime) -> None:
-    """A refused file starts anew; results it had before the refusal stay in force."""
-    refused = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.REFUSED)
-    connection.execute(sa.update(tests).where(refused, in_force(tests)).values(superseded_at=at))
-    connection.execute(
-        sa.update(recordings).where(recordings.c.id == recording_id).values(**vars(file))
-    )
-    begin_again(connection, recording_id, at)
+    with decoding(recordings, row, row.hanger):
+        file = ReceivedFile(
+            row.sha256,
+            row.file_name,
+            row.size_bytes,
+            row.arrival,
+            row.archived_as,
+            row.sidecar_as,
+            row.modified_at,
+        )
+        stage, reason = Stage(row.stage), loads(row.reason)
+        return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
 
 
 def begin_again(connection: Connection, recording_id: int, at: datetime) -> None:
     """A recording waits to be identified as if it had just come in."""
-    by_id = sa.update(recordings).where(recordings.c.id == recording_id)
-    connection.execute(by_id.values(stage=Stage.RECEIVED, reason=None))
+    own = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(own.values(stage=Stage.RECEIVED, reason=None))
     write_step(connection, recording_id, Stage.RECEIVED, at)
+
+
+def counts(table: sa.Table) -> sa.ColumnElement[bool]:
+    """What is neither refused nor held: all that is shown and computed with."""
+    return table.c.stage.not_in([Stage.REFUSED, Stage.HELD])
 
 
 def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
@@ -208,7 +220,7 @@ def write_event(
     connection: Connection,
     at: datetime,
     kind: str,
-    recording_id: int,
+    recording_id: int | None,
     file_name: str,
     message: str,
 ) -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Collection, Mapping
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 
 import sqlalchemy as sa
 
-from shm.errors import NothingThere
+from shm.errors import DamagedRow, NothingThere
 from shm.store.blobs import change_from
-from shm.store.files import in_force
+from shm.store.checksums import decoding, loads, note_damage
+from shm.store.files import counts, in_force
 from shm.store.glances import EventKind, HangerEvent, TestRow
 from shm.store.queries import Queries, baselines_now, plain_tests
 from shm.store.rows import Baseline, Stage, StoredTest, StoredWatch
@@ -20,6 +22,21 @@ from shm.values import Change
 
 _ROW = tuple(tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage"))
 _LATEST = 3
+_T = TypeVar("_T")
+
+
+def of_readable(
+    ask: Callable[[Collection[int]], Mapping[int, _T]], damaged: dict[int, DamagedRow]
+) -> Mapping[int, _T]:
+    """What `ask` says of all hangers but those with a damaged row, which are put into `damaged`."""
+    while True:
+        try:
+            return ask(damaged)
+        except DamagedRow as error:
+            if error.hanger is None or error.hanger in damaged:
+                raise
+            note_damage(error)
+            damaged[error.hanger] = error
 
 
 class Listing(Queries, Watching):
@@ -61,8 +78,11 @@ class Listing(Queries, Watching):
         with self.reading() as connection:
             return connection.scalar(former), connection.scalar(later)
 
-    def latest_watches(self) -> dict[int, StoredWatch]:
-        """What the watch says of each hanger's latest test against its baseline in force."""
+    def latest_watches(self, excluding: Collection[int] = ()) -> dict[int, StoredWatch]:
+        """What the watch says of each hanger's latest test against its baseline in force.
+
+        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
+        """
         held = baselines.alias()
         latest = (
             sa.select(watches.c.id)
@@ -75,7 +95,8 @@ class Listing(Queries, Watching):
             .limit(1)
             .scalar_subquery()
         )
-        ids = sa.select(latest).select_from(held).where(held.c.id.in_(baselines_now()))
+        wanted = held.c.id.in_(baselines_now()), held.c.hanger.not_in(excluding)
+        ids = sa.select(latest).select_from(held).where(*wanted)
         with self.reading() as connection:
             found = [id_ for id_ in connection.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self.watches_of(found)}
@@ -85,13 +106,17 @@ class Listing(Queries, Watching):
         chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
         return self.watches_of(chosen)
 
-    def called_changes(self) -> dict[int, tuple[Change, ...]]:
-        """The changes called of each hanger against its baseline in force, by time."""
-        query = sa.select(watches.c.hanger, watches.c.document).where(*_called())
+    def called_changes(self, excluding: Collection[int] = ()) -> dict[int, tuple[Change, ...]]:
+        """The changes called of each hanger against its baseline in force, by time.
+
+        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
+        """
+        query = sa.select(watches).where(*_called(), watches.c.hanger.not_in(excluding))
         found = defaultdict[int, list[Change]](list)
         with self.reading() as connection:
             for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
-                found[row.hanger].append(change_from(row.document))
+                with decoding(watches, row, row.hanger):
+                    found[row.hanger].append(change_from(loads(row.document)))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def telling_watches(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
@@ -127,7 +152,7 @@ class Listing(Queries, Watching):
 
 
 def _shown(hanger: int) -> sa.ColumnElement[bool]:
-    return (tests.c.hanger == hanger) & in_force(tests) & (tests.c.stage != Stage.REFUSED)
+    return (tests.c.hanger == hanger) & in_force(tests) & counts(tests)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

@@ -9,11 +9,13 @@ from datetime import datetime
 import sqlalchemy as sa
 
 from shm.store.database import Database
-from shm.store.files import in_force
-from shm.store.rows import DeliveryState, Stage
+from shm.store.files import counts, in_force
+from shm.store.rows import OTHER, DeliveryState, Stage, counts_by_name
+from shm.store.stepping import STEPS
 from shm.store.tables import acknowledgements, alerts, deliveries, recordings, steps, tests
 
-_ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
+"""Where recordings stand that are not through."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Measuring(Database):
 
     def oldest_waiting(self) -> datetime | None:
         """When the oldest recording came in that is not through yet; None where all are."""
-        query = sa.select(recordings.c.received_at).where(recordings.c.stage.in_(_ON_THE_WAY))
+        query = sa.select(recordings.c.received_at).where(recordings.c.stage.in_(ON_THE_WAY))
         with self.reading() as connection:
             row = connection.execute(query.order_by(recordings.c.id).limit(1)).first()
         return None if row is None else row.received_at
@@ -57,7 +59,7 @@ class Measuring(Database):
         query = (
             sa.select(recordings, reached)
             .outerjoin(steps, steps.c.recording_id == recordings.c.id)
-            .where(recordings.c.stage.in_(_ON_THE_WAY))
+            .where(recordings.c.stage.in_(ON_THE_WAY))
             .group_by(recordings.c.id)
             .order_by(recordings.c.id)
         )
@@ -76,7 +78,7 @@ class Measuring(Database):
 
     def latest_tests(self) -> dict[int, LatestTest]:
         """How many tests in force each hanger has, and when the latest was taken."""
-        shown = (tests.c.stage != Stage.REFUSED) & in_force(tests)
+        shown = counts(tests) & in_force(tests)
         counted = (tests.c.hanger, sa.func.count().label("tests"), sa.func.max(tests.c.time))
         with self.reading() as connection:
             rows = connection.execute(sa.select(*counted).where(shown).group_by(tests.c.hanger))
@@ -89,25 +91,29 @@ class Measuring(Database):
             noted = _count(connection, acknowledgements)
         return raised - noted, noted
 
-    def delivery_counts(self) -> dict[DeliveryState, int]:
-        """How many deliveries stand in each state; every state is named."""
+    def delivery_counts(self) -> dict[str, int]:
+        """How many deliveries stand in each state; see `counts_by_name`."""
         query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
         with self.reading() as connection:
-            counted = {row[0]: int(row[1]) for row in connection.execute(query)}
-        return {state: counted.get(state, 0) for state in DeliveryState}
+            return counts_by_name(DeliveryState, connection.execute(query))
 
-    def stage_seconds(self, since: datetime) -> dict[Stage, list[float]]:
-        """How long after the stage before each stage was reached, of steps made since then."""
+    def stage_seconds(self, since: datetime) -> dict[str, list[float]]:
+        """How long after the stage before each step was reached, of steps made since then.
+
+        By the name of the step, which need be no `Stage`; a name that this version does not know
+        is `OTHER`, so that what reads it has few names to keep.
+        """
         lately = sa.select(steps.c.recording_id).where(steps.c.at >= since)
         query = sa.select(steps).where(steps.c.recording_id.in_(lately)).order_by(steps.c.id)
-        found: defaultdict[Stage, list[float]] = defaultdict(list)
+        found: defaultdict[str, list[float]] = defaultdict(list)
         before: dict[tuple[int, int | None], datetime] = {}
         with self.reading() as connection:
             for row in connection.execute(query):
                 of_file, of_test = (row.recording_id, None), (row.recording_id, row.test_id)
                 began = before.get(of_test) or before.get(of_file)
                 if began is not None and row.at >= since and row.stage != Stage.RECEIVED:
-                    found[Stage(row.stage)].append((row.at - began).total_seconds())
+                    name = row.stage if row.stage in STEPS else OTHER
+                    found[name].append((row.at - began).total_seconds())
                 before[of_test] = row.at
         return dict(found)
 

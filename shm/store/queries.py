@@ -18,9 +18,11 @@ from shm.store.blobs import (
     test_from_document,
     unpack_response,
 )
+from shm.store.checksums import content_checksum, damaged, decoding, loads
 from shm.store.database import Database
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.rows import (
+    DESCRIBED,
     Baseline,
     Lineage,
     Stage,
@@ -137,7 +139,7 @@ class Queries(Database):
 
     def tests(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
         """The tests of a hanger, or of all, by time; those refused are left out."""
-        query = plain_tests.where(tests.c.stage != Stage.REFUSED, in_force(tests))
+        query = plain_tests.where(counts(tests), in_force(tests))
         if hanger is not None:
             query = query.where(tests.c.hanger == hanger)
         return self._tests(query.order_by(tests.c.time, tests.c.id))
@@ -147,7 +149,7 @@ class Queries(Database):
         query = plain_tests.where(
             tests.c.hanger.in_(hangers),
             tests.c.time < before,
-            tests.c.stage != Stage.REFUSED,
+            counts(tests),
             in_force(tests),
             _WEIGHED,
         )
@@ -174,13 +176,22 @@ class Queries(Database):
     def frequency_response(self, test: StoredTest) -> FrequencyResponse | None:
         """What the modes of a test were identified from; None where a file gave the modes."""
         query = (
-            sa.select(tests.c.frequency_response, recordings.c.file_name)
+            sa.select(
+                tests.c.id,
+                tests.c.frequency_response,
+                tests.c.frequency_response_checksum,
+                recordings.c.file_name,
+            )
             .join(recordings)
             .where(tests.c.id == test.id)
         )
         with self.reading() as connection:
-            blob, file_name = connection.execute(query).one()
-        return None if blob is None else unpack_response(blob, file_name, test.test)
+            row = connection.execute(query).one()
+        blob, stored = row.frequency_response, row.frequency_response_checksum
+        with decoding(tests, row, test.hanger):
+            if stored != content_checksum(blob):
+                raise damaged(tests, row.id, test.hanger)
+            return None if blob is None else unpack_response(blob, row.file_name, test.test)
 
     def posteriors(self, hanger: int) -> tuple[StoredPosterior, ...]:
         """The posteriors of a hanger in its selected class, by time."""
@@ -203,7 +214,7 @@ class Queries(Database):
         if row is None:
             what = f"hanger {hanger}" + (f", test {test}" if test else "")
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
-        return _posterior(row)
+        return posterior_of_row(row)
 
     def posterior_of(self, test: StoredTest) -> Posterior:
         """The posterior of a test known by its row; raises NothingThere."""
@@ -269,7 +280,9 @@ _BASELINE = ("id", "set_at", "who", "why", "since")
 
 def _baseline(row: Row[Any], hanger: int) -> Baseline:
     values = {name: getattr(row, f"b_{name}") for name in _BASELINE}
-    return Baseline(hanger=hanger, posterior=_posterior(row), **values)
+    posterior = posterior_of_row(row)
+    described = loads(row.document).get(DESCRIBED)
+    return Baseline(hanger=hanger, posterior=posterior, described=described, **values)
 
 
 def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
@@ -285,7 +298,7 @@ def selection_of(connection: Connection, hanger: int) -> StoredSelection | None:
     )
     ranked = connection.execute(entries).all()
     selection = Selection(
-        tuple(_posterior(entry) for entry in ranked),
+        tuple(posterior_of_row(entry) for entry in ranked),
         tuple(entry.probability for entry in ranked),
     )
     return StoredSelection(row.id, selection, row.selected_at, row.model)
@@ -353,24 +366,27 @@ def lineage_from(row: Row[Any]) -> Lineage:
 
 
 def _test(row: Row[Any]) -> StoredTest:
-    return StoredTest(
-        id=row.id,
-        recording_id=row.recording_id,
-        key=f"{row.sha256}/{row.position}",
-        hanger=row.hanger,
-        time=row.time,
-        stage=Stage(row.stage),
-        test=test_from_document(row.document, row.hanger),
-        notes=tuple(row.notes),
-        lineage=lineage_from(row),
-        quality=tuple(quality_from(entry) for entry in row.quality or ()),
-        set_aside=tuple(foreign_from(entry) for entry in row.set_aside or ()),
-    )
+    with decoding(tests, row, row.hanger):
+        return StoredTest(
+            id=row.id,
+            recording_id=row.recording_id,
+            key=f"{row.sha256}/{row.position}",
+            hanger=row.hanger,
+            time=row.time,
+            stage=Stage(row.stage),
+            test=test_from_document(loads(row.document), row.hanger),
+            notes=tuple(loads(row.notes)),
+            lineage=lineage_from(row),
+            quality=tuple(quality_from(entry) for entry in loads(row.quality) or ()),
+            set_aside=tuple(foreign_from(entry) for entry in loads(row.set_aside) or ()),
+        )
 
 
-def _posterior(row: Row[Any]) -> Posterior:
-    return posterior_from(row.document, row.samples)
+def posterior_of_row(row: Row[Any]) -> Posterior:
+    """The posterior of a whole row; raises DamagedRow."""
+    with decoding(posteriors, row, row.hanger):
+        return posterior_from(loads(row.document), row.samples)
 
 
 def _stored_posterior(row: Row[Any]) -> StoredPosterior:
-    return StoredPosterior(row.id, _posterior(row), row.time, lineage_from(row))
+    return StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))

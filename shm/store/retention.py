@@ -16,7 +16,7 @@ from typing import Any
 
 from shm.errors import NothingThere, StoreError
 from shm.read import sidecar_path
-from shm.store.archive import Archive, checksum
+from shm.store.archive import Archive, checksum, is_whole
 from shm.store.copying import Tell
 from shm.store.rows import Stage, StoredRecording
 from shm.store.store import Store
@@ -121,7 +121,7 @@ def fetch(store: Store, archive: Archive, recording: StoredRecording) -> str:
             f"no copy of {recording.file.file_name} is noted.", remedy="Drop the file again."
         )
     for folder in folders:
-        if all(_is_whole(Path(folder) / name) for name in _names(recording)):
+        if all(is_whole(Path(folder) / name) for name in _names(recording)):
             for name in _names(recording):
                 archive.keep(Path(folder) / name, follow=True)
             return folder
@@ -147,7 +147,7 @@ def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tupl
         if recording is not None and recording.file.archived_as is not None:
             places = [str(archive.folder), *folders[recording.id]]
             name = recording.file.archived_as
-            if any(_is_whole(Path(place) / name, file.path) for place in places):
+            if any(_is_copy(Path(place) / name, file.path) for place in places):
                 kept.append(file)
     return tuple(kept)
 
@@ -177,19 +177,19 @@ def _copy(archive: Archive, recording: StoredRecording, folders: Iterable[str]) 
     """The first folder with a whole copy of all files of a recording."""
     for folder in folders:
         pairs = [(Path(folder) / name, archive.folder / name) for name in _names(recording)]
-        if pairs and all(_is_whole(copy, original) for copy, original in pairs):
+        if pairs and all(_is_copy(copy, original) for copy, original in pairs):
             return folder
     return None
 
 
-def _is_whole(copy: Path, original: Path | None = None) -> bool:
+def _is_copy(copy: Path, original: Path) -> bool:
     """Whether a file has the SHA-256 that it is named by, and is not `original` itself."""
     try:
-        if original is not None and original.exists() and copy.samefile(original):
+        if original.exists() and copy.samefile(original):
             return False  # a link to what would be deleted is no copy of it
-        return checksum(copy) == copy.name[:64]
     except OSError:
         return False
+    return is_whole(copy)
 
 
 def _size(path: Path) -> int:
@@ -205,8 +205,8 @@ def _refused(reason: Path) -> Refused | None:
     try:
         told: Any = json.loads(reason.read_text(encoding="utf-8"))
         sha256, refused_at = str(told["sha256"]), datetime.fromisoformat(str(told["time"]))
-        if checksum(path) != sha256:
-            return None
+        if told["sha256"] is None or checksum(path) != sha256:
+            return None  # too large to have been read: it lies nowhere else
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return Refused(path, reason, refused_at, _size(path), sha256)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -15,6 +15,7 @@ from shm.values import (
     NAN,
     Alert,
     Diagnosis,
+    Fingerprint,
     ForeignMode,
     FrequencyResponse,
     ModalTest,
@@ -34,6 +35,11 @@ class Stage(StrEnum):
     WATCHED = "watched"
     DONE = "done"
     REFUSED = "refused"
+    HELD = "held"  # implausible: counts in nothing until a person has confirmed it
+
+
+ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
+"""Where a recording waits for no step: it is through, or for a person to look at."""
 
 
 class Outcome(StrEnum):
@@ -43,6 +49,7 @@ class Outcome(StrEnum):
     RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
     DUPLICATE = "duplicate"  # the same bytes dropped again
     REOPENED = "reopened"  # refused before, dropped again: tried again
+    REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
 
 
 class DeliveryState(StrEnum):
@@ -53,18 +60,53 @@ class DeliveryState(StrEnum):
     GIVEN_UP = "given up"
 
 
+OTHER = "other"
+"""Stands for whatever a row says that this version has no name for."""
+
+
+def counts_by_name(known: type[StrEnum], rows: Iterable[Sequence[Any]]) -> dict[str, int]:
+    """How many rows say what: each name of `known`, 0 where there is none, and `OTHER` where a row
+    says something else, as one of a newer version may.
+
+    `rows` are pairs of what is said and how often. Counting never fails for what a row says.
+    """
+    counted: dict[str, int] = {str(name): 0 for name in known}
+    for said, times in rows:
+        name = said if said in counted else OTHER
+        counted[name] = counted.get(name, 0) + int(times)
+    return counted
+
+
+DESCRIBED = "described"
+"""Of a posterior's document: the hanger as it was described when it was made."""
+
+
 @dataclass(frozen=True)
 class Lineage:
-    """Where a result comes from: checksums of its input and settings, and the version."""
+    """Where a result comes from: checksums of its input and settings, and the version.
+
+    `described` is the description of the hanger among those settings, where it is known: kept
+    beside a posterior, so that a later description can be compared with it.
+    """
 
     input_sha256: str
     settings_sha256: str
     version: str
+    described: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
 
     @classmethod
-    def of(cls, inputs: object, settings: object) -> Lineage:
+    def of(
+        cls, inputs: object, settings: object, described: Mapping[str, Any] | None = None
+    ) -> Lineage:
         """The lineage of a result computed now from JSON-able `inputs` and `settings`."""
-        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__)
+        return cls(checksum_of(inputs), checksum_of(settings), shm.__version__, described)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """What stands in columns of its own, and in the lineage of what is made from it."""
+        return {
+            name: getattr(self, name) for name in ("input_sha256", "settings_sha256", "version")
+        }
 
 
 def checksum_of(document: object) -> str:
@@ -74,7 +116,10 @@ def checksum_of(document: object) -> str:
 
 @dataclass(frozen=True)
 class ReceivedFile:
-    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive."""
+    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive.
+
+    `modified_at` is when the file was last written, as its folder says; copying resets that.
+    """
 
     sha256: str
     file_name: str
@@ -82,6 +127,7 @@ class ReceivedFile:
     arrival: str
     archived_as: str | None = None
     sidecar_as: str | None = None
+    modified_at: datetime | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +154,9 @@ class Receipt:
 class IdentifiedTest:
     """A test to be stored: its place in its file, its frequency response, what was dropped.
 
-    `quality` and `set_aside` are empty where a file gave the modes.
+    `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
+    of the test, `fingerprint` is that of their samples, None where the modes were given; `signals`
+    says which channels are doubtful.
     """
 
     test: ModalTest
@@ -117,6 +165,9 @@ class IdentifiedTest:
     notes: tuple[str, ...] = ()
     quality: tuple[QualityCheck, ...] = ()
     set_aside: tuple[ForeignMode, ...] = ()
+    times: tuple[datetime, ...] = ()
+    fingerprint: Fingerprint | None = None
+    signals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +219,8 @@ class Baseline:
     """The posterior that later tests of a hanger are compared with; who set it, when and why.
 
     `since` is the time from which on its tests were taken, where a person had the hanger compared
-    with itself anew; tests before it belong to the baseline before.
+    with itself anew; tests before it belong to the baseline before. `described` is the hanger as
+    it was described when the posterior was made; None of one of before that was kept.
     """
 
     id: int
@@ -178,6 +230,7 @@ class Baseline:
     who: str
     why: str
     since: datetime | None = None
+    described: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)

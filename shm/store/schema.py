@@ -7,6 +7,7 @@ from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import SchemaOutdated, StoreError
 from shm.resources import migrations_folder
+from shm.store.checksums import seal
 from shm.store.database import reading, writing
 from shm.store.location import shown
 from shm.store.tables import SCHEMA
@@ -32,6 +33,7 @@ def upgrade(engine: Engine) -> None:
                 f"the store {location} cannot be upgraded: {error}.",
                 remedy="Restore it from a backup.",
             ) from error
+        seal(connection)
 
 
 def check(engine: Engine) -> None:

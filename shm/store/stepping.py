@@ -9,11 +9,13 @@ from sqlalchemy.engine import Connection
 
 import shm
 from shm.store.database import Database
-from shm.store.rows import Step
+from shm.store.rows import Stage, Step
 from shm.store.tables import steps, tests
 
 ARCHIVED = "archived"
 NOTIFIED = "notified"
+STEPS = frozenset({*Stage, ARCHIVED, NOTIFIED})
+"""Names of all steps that this version writes."""
 
 
 class Stepping(Database):

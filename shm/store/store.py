@@ -15,10 +15,12 @@ from shm.store.acknowledging import Acknowledging
 from shm.store.adopting import Adopting
 from shm.store.alert_rows import AlertRows
 from shm.store.archive_copies import ArchiveCopies
+from shm.store.damage import Damage
 from shm.store.database import make_engine
-from shm.store.files import Files
+from shm.store.holding import Holding
 from shm.store.listing import Listing
 from shm.store.measuring import Measuring
+from shm.store.receiving import Receiving
 from shm.store.results import Results
 from shm.store.stepping import Stepping
 from shm.store.superseding import Superseding
@@ -28,8 +30,9 @@ from shm.store.upkeep import Upkeep
 
 
 class Store(
-    Files,
+    Receiving,
     Results,
+    Holding,
     Listing,
     AlertRows,
     Trends,
@@ -41,6 +44,7 @@ class Store(
     Tokens,
     ArchiveCopies,
     Upkeep,
+    Damage,
 ):
     """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
 

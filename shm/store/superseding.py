@@ -13,9 +13,10 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Database
 from shm.store.files import begin_again, in_force, recording_from, write_event
+from shm.store.holding import end_hold
 from shm.store.queries import lineage_from
 from shm.store.results import advance_recordings
-from shm.store.rows import FormerPosterior, FormerTest, Rerun, Stage
+from shm.store.rows import FormerPosterior, FormerTest, ReceivedFile, Rerun, Stage
 from shm.store.stepping import write_step
 from shm.store.tables import (
     baselines,
@@ -74,8 +75,7 @@ class Superseding(Database):
             own = _of_baselines(connection, chosen)
             counts = _supersede_results(connection, ids, stage, at)
             if stage is Stage.IDENTIFIED:
-                _mark(connection, tests, tests.c.id.in_(ids), at)
-                begin_again(connection, recording_id, at)
+                _identify_again(connection, recording_id, ids, at)
             else:
                 _send_back(connection, recording_id, ids, stage, at)
             kept = _kept_states(recording.hanger)
@@ -102,6 +102,34 @@ class Superseding(Database):
             for row in connection.execute(made):
                 by_test[row.test_id].append(_former_posterior(row))
         return tuple(_former_test(row, by_test[row.id]) for row in rows)
+
+
+def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: datetime) -> str:
+    """Does a recording again with another sidecar, from its identification on; what that replaces.
+
+    `known` is its row as it was.
+    """
+    query = sa.select(tests).where(tests.c.recording_id == known.id, in_force(tests))
+    rows = connection.execute(query).all()
+    ids = [row.id for row in rows]
+    of_baseline = sorted(row.name for row in rows if row.id in _of_baselines(connection, rows))
+    by_id = sa.update(recordings).where(recordings.c.id == known.id)
+    connection.execute(by_id.values(**vars(file)))
+    _supersede_results(connection, ids, Stage.IDENTIFIED, at)
+    _identify_again(connection, known.id, ids, at)
+    connection.execute(sa.delete(watch_states).where(_kept_states(known.hanger)))
+    told = f"the same bytes as {known.file_name} with another sidecar: done again with that."
+    if of_baseline:
+        told += f" The baseline made from {', '.join(of_baseline)} stays: `shm drift rebaseline`."
+    return told
+
+
+def _identify_again(
+    connection: Connection, recording_id: int, ids: Collection[int], at: datetime
+) -> None:
+    _mark(connection, tests, tests.c.id.in_(ids), at)
+    end_hold(connection, recording_id, at)
+    begin_again(connection, recording_id, at)
 
 
 _WITHOUT_SAMPLES = ("id", "model", "updated_at", "superseded_at")

@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0006"
+SCHEMA = "0008"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -78,6 +78,33 @@ recordings = sa.Table(
     sa.Column("hanger", sa.Integer),
     sa.Column("stage", sa.String(16), nullable=False, index=True),
     sa.Column("reason", Document),
+    sa.Column("modified_at", UtcTime),
+)
+
+# What the samples of a recording look like, to know a copy of them by; see `Fingerprint`.
+fingerprints = sa.Table(
+    "fingerprints",
+    metadata,
+    sa.Column("recording_id", sa.ForeignKey("recordings.id"), primary_key=True),
+    sa.Column("digest", sa.String(64), nullable=False, index=True),
+    sa.Column("shapes", sa.LargeBinary, nullable=False),
+)
+
+# Why a recording is held until a person has looked, and what came of that: who decided, when and
+# why, and the time that its test was given. The newest row of a recording holds.
+holds = sa.Table(
+    "holds",
+    metadata,
+    _id(),
+    _to("recordings"),
+    sa.Column("held_at", UtcTime, nullable=False),
+    sa.Column("document", Document, nullable=False),
+    sa.Column("decision", sa.String(16)),
+    sa.Column("decided_at", UtcTime),
+    sa.Column("who", sa.Text),
+    sa.Column("why", sa.Text),
+    sa.Column("time", UtcTime),
+    sa.Index(None, "recording_id"),
 )
 
 # One modal test. `time` is the test's own or, where it has none, the time of receipt. What is
@@ -95,6 +122,7 @@ tests = sa.Table(
     sa.Column("stage", sa.String(16), nullable=False, index=True),
     sa.Column("document", Document, nullable=False),
     sa.Column("frequency_response", sa.LargeBinary),
+    sa.Column("frequency_response_checksum", sa.BigInteger),
     sa.Column("notes", Document, nullable=False),
     sa.Column("quality", Document),
     sa.Column("set_aside", Document),
@@ -227,6 +255,7 @@ watch_states = sa.Table(
     sa.Column("content", sa.LargeBinary, nullable=False),
 )
 
+# `baseline_id` is empty of the notice that a test is held: it was compared with nothing.
 alerts = sa.Table(
     "alerts",
     metadata,
@@ -234,7 +263,7 @@ alerts = sa.Table(
     sa.Column("key", sa.String(255), nullable=False, unique=True),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     _to("tests"),
-    _to("baselines"),
+    _to("baselines", nullable=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("raised_at", UtcTime, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
@@ -355,3 +384,15 @@ tokens = sa.Table(
     sa.Column("last_used_at", UtcTime),
     _unique_where("revoked_at", "tokens", "name"),
 )
+
+# Columns that are kept under a checksum of their own, NAME_checksum, by table: see `checksums`.
+APART = {"tests": "frequency_response"}
+
+# Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
+# and what commits fills it in. The index holds those that are empty alone.
+_empty: dict[str, Any] = {
+    f"{n}_where": sa.text("checksum IS NULL") for n in ("sqlite", "postgresql")
+}
+for _table in metadata.tables.values():
+    _table.append_column(sa.Column("checksum", sa.BigInteger, onupdate=sa.null()))
+    sa.Index(f"ix_{_table.name}_unsealed", _table.c.checksum, **_empty)

@@ -24,13 +24,19 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import averaged_document, averaged_from
 from shm.errors import UsageError
-from shm.store.blobs import number, posterior_from
+from shm.store.blobs import number
+from shm.store.checksums import checksum_of, readable
 from shm.store.columns import Number
 from shm.store.database import Database
-from shm.store.files import in_force
+from shm.store.files import counts, in_force
 from shm.store.glances import BaselineGlance, Numbers, TrendPoint
-from shm.store.queries import baselines_now, hidden, selection_numbers, selection_of
-from shm.store.rows import Stage
+from shm.store.queries import (
+    baselines_now,
+    hidden,
+    posterior_of_row,
+    selection_numbers,
+    selection_of,
+)
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
 from shm.values import NAN, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
@@ -42,7 +48,11 @@ _HANGERS_KNOWN = 4096
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
 _NUMBERS_HELD = 1024
-_SUMMARY = (summaries.c.key, sa.type_coerce(summaries.c.document, sa.Text).label("summary"))
+_SUMMARY = (
+    summaries.c.key,
+    summaries.c.document.label("summary"),
+    summaries.c.checksum.label("sum"),
+)
 
 
 class Trends(Database):
@@ -89,6 +99,7 @@ class Trends(Database):
         return {
             row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
             for row in rows
+            if row.posterior_id in numbers
         }
 
     def baseline_temperatures(self) -> dict[int, float]:
@@ -123,7 +134,8 @@ class Trends(Database):
             with self.writing() as connection:
                 former = summaries.c.posterior_id.in_(some)
                 connection.execute(sa.delete(summaries).where(former))
-                connection.execute(sa.insert(summaries), rows)
+                if rows:
+                    connection.execute(sa.insert(summaries), rows)
             tell((begin + len(some)) / len(missing))
         return len(missing)
 
@@ -169,11 +181,13 @@ class Trends(Database):
         with self.reading() as connection:
             rows = [row for row in connection.execute(query) if row.hanger in known]
             numbers = _numbers(connection, rows, known)
-        return tuple(_point(row, numbers[row.posterior_id]) for row in rows)
+        # What is damaged has no numbers: it is noted, and `shm db check` names it.
+        read = [row for row in rows if row.posterior_id in numbers]
+        return tuple(_point(row, numbers[row.posterior_id]) for row in read)
 
 
 def _shown_tests() -> sa.Select[Any]:
-    return sa.select(tests.c.id).where(in_force(tests), tests.c.stage != Stage.REFUSED)
+    return sa.select(tests.c.id).where(in_force(tests), counts(tests))
 
 
 def _shown() -> tuple[sa.ColumnElement[bool], ...]:
@@ -193,7 +207,9 @@ def _numbers(
     selected = selection_numbers(connection)
     keys = {id_: key_of(hanger, selected.get(id_)) for id_, hanger in hangers.items()}
     kept = {
-        row.posterior_id: _from_text(row.summary) for row in rows if row.key == keys[row.hanger]
+        row.posterior_id: _from_text(row.summary)
+        for row in rows
+        if row.key == keys[row.hanger] and _is_whole(row)
     }
     missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
     for begin in range(0, len(missing), _AT_ONCE):
@@ -201,20 +217,27 @@ def _numbers(
     return kept
 
 
+def _is_whole(row: Row[Any]) -> bool:
+    """A damaged summary may be thrown away at will, as any other."""
+    told = {"posterior_id": row.posterior_id, "key": row.key, "document": row.summary}
+    return bool(row.sum == checksum_of(summaries, told))
+
+
 def _made(
     connection: Connection, ids: Sequence[int], hangers: Mapping[int, Hanger]
 ) -> dict[int, Numbers]:
-    columns = (posteriors.c[name] for name in ("id", "hanger", "document", "samples"))
-    query = sa.select(*columns).where(posteriors.c.id.in_(ids))
+    """Those that can be made: a damaged posterior, or one of a damaged selection, has none."""
+    query = sa.select(posteriors).where(posteriors.c.id.in_(ids))
     compared: dict[int, Selection | None] = {}
-    made = {}
-    for row in connection.execute(query).all():
+
+    def numbers(row: Row[Any]) -> tuple[int, Numbers]:
         if row.hanger not in compared:
             found = selection_of(connection, row.hanger)
             compared[row.hanger] = None if found is None else found.selection
-        posterior = posterior_from(row.document, row.samples)
-        made[row.id] = summarised(posterior, hangers[row.hanger], compared[row.hanger])
-    return made
+        posterior = posterior_of_row(row)
+        return row.id, summarised(posterior, hangers[row.hanger], compared[row.hanger])
+
+    return dict(readable(connection.execute(query).all(), numbers))
 
 
 def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
@@ -224,7 +247,7 @@ def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None
 
     try:
         stiffness = end_stiffness(posterior, hanger)
-    except UsageError as reason:  # its effect may have left the catalogue since
+    except UsageError as reason:  # its effect may have left the catalogue, or it is of before
         log.warning("no end stiffness of hanger %d: %s", hanger.id, reason)
         stiffness = {}
     most_probable = posterior.most_probable[posterior.names.index("theta_F")]

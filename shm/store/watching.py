@@ -11,10 +11,12 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document
+from shm.errors import DamagedRow
 from shm.store.blobs import alert_from_document, watch_document, watch_from
+from shm.store.checksums import decoding, loads, note_damage, whole
 from shm.store.database import Database, insert
 from shm.store.files import in_force
+from shm.store.outbox import raise_alert
 from shm.store.results import all_at, move
 from shm.store.rows import (
     Acknowledgement,
@@ -40,11 +42,16 @@ from shm.store.tables import (
 from shm.values import Alert, Drift, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
-_WATCH_COLUMNS = ("id", "test_id", "baseline_id", "hanger", "time", "document")
-_outbox = sa.select(deliveries, alerts.c.document).join(alerts)
 stored_alerts = sa.select(
-    alerts, *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at"))
-).outerjoin(acknowledgements)
+    alerts,
+    tests.c.name.label("test"),
+    *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
+).select_from(alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id))
+
+_OWED = ("id", "hook", "state", "attempts", "next_attempt_at", "last_error", "ended_at")
+_outbox = stored_alerts.add_columns(
+    *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
+).join(deliveries, deliveries.c.alert_id == alerts.c.id)
 
 
 class Watching(Database):
@@ -74,16 +81,18 @@ class Watching(Database):
             if state is not None:
                 _keep_state(connection, baseline, state)
             move(connection, [test], Stage.WATCHED, at)
-            if alert is None or _is_raised(connection, alert):
+            if alert is None:
                 return None
-            return _raise(connection, test, baseline, alert, hooks, at)
+            return raise_alert(connection, test.id, baseline.id, alert, hooks, at)
 
     def kept_watch(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
         query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
         with self.reading() as connection:
             row = connection.execute(query).one_or_none()
-        return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
+        if row is None or not whole(watch_states, row):
+            return None  # it may be thrown away at will
+        return KeptWatch(row.key, row.last_test_time, row.content)
 
     def forget_watch(self, baseline: Baseline) -> None:
         """Drops what the watch would go on from: it then begins anew at the next test."""
@@ -114,9 +123,8 @@ class Watching(Database):
 
     def watches_of(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
         """Watches that are `chosen` by their numbers, with their shifts, by time."""
-        of_watch = (watches.c[name] for name in _WATCH_COLUMNS)
         name = tests.c.name.label("test")
-        query: sa.Select[Any] = sa.select(*of_watch, name).select_from(watches).join(tests)
+        query: sa.Select[Any] = sa.select(watches, name).select_from(watches).join(tests)
         query = query.where(watches.c.id.in_(chosen))
         same_test = watches.c.test_id == drifts.c.test_id
         together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
@@ -196,32 +204,6 @@ def _drop_state(connection: Connection, baseline: Baseline) -> None:
     connection.execute(sa.delete(watch_states).where(former))
 
 
-def _is_raised(connection: Connection, alert: Alert) -> bool:
-    query = sa.select(alerts.c.id).where(alerts.c.key == alert.key)
-    return connection.execute(query).first() is not None
-
-
-def _raise(
-    connection: Connection,
-    test: StoredTest,
-    baseline: Baseline,
-    alert: Alert,
-    hooks: Sequence[str],
-    at: datetime,
-) -> StoredAlert:
-    values = {
-        **{name: getattr(alert, name) for name in ("key", "hanger", "time", "message")},
-        "test_id": test.id,
-        "baseline_id": baseline.id,
-        "raised_at": at,
-        "document": alert_document(alert),
-    }
-    alert_id = insert(connection, alerts, values)
-    for hook in hooks:
-        insert(connection, deliveries, _owed(alert_id, hook, at))
-    return StoredAlert(alert_id, alert, at)
-
-
 def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> bool:
     """Whether it was still owed: another process may have had an answer of the hook before."""
     owed = (deliveries.c.id == delivery.id) & (deliveries.c.state == DeliveryState.WAITING)
@@ -241,17 +223,6 @@ def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> 
         about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
         row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
         write_step(connection, row.recording_id, NOTIFIED, at, row.id)
-
-
-def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
-    return {
-        "alert_id": alert_id,
-        "hook": hook,
-        "state": DeliveryState.WAITING,
-        "attempts": 0,
-        "next_attempt_at": at,
-        "last_error": "",
-    }
 
 
 def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
@@ -275,14 +246,25 @@ def _watch_values(found: WatchedTest, test: StoredTest, baseline: Baseline) -> d
 
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
-    found = watch_from(row.document, row.test, row.time, shifts)
-    return StoredWatch(row.id, row.hanger, row.baseline_id, found)
+    with decoding(watches, row, row.hanger):
+        found = watch_from(loads(row.document), row.test, row.time, shifts)
+        return StoredWatch(row.id, row.hanger, row.baseline_id, found)
 
 
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
-    alert = alert_from_document(row.document)
-    return StoredAlert(row.id, alert, row.raised_at, acknowledgement_of(row))
+    return StoredAlert(row.id, _alert(row), row.raised_at, acknowledgement_of(row))
+
+
+def _alert(row: Row[Any]) -> Alert:
+    """An alert that was raised is told even where its document is damaged: as much as is left."""
+    try:
+        with decoding(alerts, row, row.hanger):
+            return alert_from_document(loads(row.document))
+    except DamagedRow as error:
+        note_damage(error)
+        message = f"{row.message} (Details are lost: {error.message})"
+        return Alert(row.key, row.hanger, row.test or "", row.time, message, ())
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
@@ -293,13 +275,5 @@ def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
 
 
 def _delivery(row: Row[Any]) -> Delivery:
-    return Delivery(
-        id=row.id,
-        alert=alert_from_document(row.document),
-        hook=row.hook,
-        state=DeliveryState(row.state),
-        attempts=row.attempts,
-        next_attempt_at=row.next_attempt_at,
-        last_error=row.last_error,
-        ended_at=row.ended_at,
-    )
+    owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
+    return Delivery(alert=_alert(row), **{**owed, "state": DeliveryState(row.owed_state)})

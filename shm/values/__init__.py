@@ -47,6 +47,7 @@ from shm.values.hanger import (
     Thresholds,
     Turnbuckle,
 )
+from shm.values.held import Doubt, Fingerprint, KnownSamples
 from shm.values.kinds import (
     NAN,
     PLANES,
@@ -117,11 +118,13 @@ __all__ = [
     "Channel",
     "ComplexArray",
     "Diagnosis",
+    "Doubt",
     "Drift",
     "EffectEstimate",
     "EffectPrior",
     "End",
     "EndPlate",
+    "Fingerprint",
     "FloatArray",
     "ForeignMode",
     "FrequencyResponse",
@@ -129,6 +132,7 @@ __all__ = [
     "Hanger",
     "IntArray",
     "Kind",
+    "KnownSamples",
     "Leads",
     "Limits",
     "Mark",

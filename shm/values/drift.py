@@ -163,7 +163,7 @@ class TemperatureCoefficient:
         return math.isfinite(self.mean) and not self.sd > _INFORMED * self.prior_sd
 
 
-AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "test"]
+AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "held", "test"]
 
 
 @dataclass(frozen=True)
@@ -171,6 +171,7 @@ class Alert:
     """A shift that its owner should know of. `key` makes its delivery idempotent.
 
     `kinds` are the rules that raised it; `change` is None where the sequential test had no part.
+    A `held` one says that a test is held until a person has looked, and what it would mean.
     A `test` alert is no finding: it shows that a hook works. `tension` is that by the test,
     averaged over the model classes; None where the alert does not say.
     """

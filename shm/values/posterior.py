@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
+from shm.values.force_units import force_unit
 from shm.values.hanger import Limits
 from shm.values.kinds import NAN, FloatArray, Plane
 
@@ -69,6 +71,8 @@ class Posterior:
     `at_bounds` are parameters of which many draws lie at an end of their prior; `misfit_percent`
     is the root mean square of predicted over measured frequencies less 1; `log_occam` the log
     evidence less the largest log likelihood, never above 0 where the sampler did its work.
+    `tension_of_other_ends_n` is the tension with ends of another kind, far off, where the data do
+    not speak against these; NaN where there is none.
     """
 
     model: str
@@ -93,6 +97,7 @@ class Posterior:
     at_bounds: tuple[str, ...] = ()
     misfit_percent: float = NAN
     log_occam: float = NAN
+    tension_of_other_ends_n: float = NAN
 
     @property
     def caveats(self) -> tuple[str, ...]:
@@ -117,6 +122,13 @@ class Posterior:
             found.append(
                 f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
                 "(root mean square): the description or the model class does not fit this hanger."
+            )
+        if math.isfinite(self.tension_of_other_ends_n):
+            other = force_unit(self.tension_of_other_ends_n)
+            found.append(
+                "The ends decide: ends of another stiffness fit about as well, with a tension of "
+                f"{other.of(self.tension_of_other_ends_n):.3g} {other.name}. A test with a known "
+                "mass, or a mode shape, tells which."
             )
         return tuple(found)
 

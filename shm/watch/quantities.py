@@ -18,6 +18,7 @@ from typing import overload
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from shm.errors import UsageError
 from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
 from shm.models.beam import Beam
 from shm.models.conditions import Conditions
@@ -124,6 +125,12 @@ def base_point(baseline: Posterior, model: Model) -> FloatArray:
     for name, lower, upper in zip(prior.names, prior.lower, prior.upper, strict=True):
         if name in springs:
             known[name] = float(np.clip(known[name], lower, upper))
+    lacking = [name for name in model.parameter_names if name not in known]
+    if lacking:
+        raise UsageError(
+            f"the baseline in {model.name} was made by a former shm, without {', '.join(lacking)}.",
+            remedy="Set it anew: `shm drift rebaseline`.",
+        )
     return np.array([known[name] for name in model.parameter_names])
 
 

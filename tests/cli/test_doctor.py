@@ -79,8 +79,8 @@ def test_the_daemon_logs_to_a_file_that_is_named(
     shm: Shm, empty: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[tuple[object, ...]] = []
-    monkeypatch.setattr("shm_cli.daemon.begin_logging", lambda *given: begun.append(given))
-    monkeypatch.setattr("shm_cli.daemon.run", lambda *given, **named: None)
+    monkeypatch.setattr("shm_daemon.logs.begin_logging", lambda *given: begun.append(given))
+    monkeypatch.setattr("shm_daemon.loop.run", lambda *given, **named: None)
     monkeypatch.setenv("SHM_LOG_FORMAT", "json")
     log = tmp_path / "shm.log"
     assert shm("--workspace", empty.folder, "daemon", "--log-file", log).code == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from shm.store import Workspace
 from tests.cli.conftest import Shm
 
@@ -27,3 +29,22 @@ def test_it_does_not_open_to_others_without_a_token(shm: Shm, empty: Workspace) 
         refused = shm("--workspace", empty.folder, *verb, "--host", "0.0.0.0")
         assert refused.code == 2
         assert "shm token create" in refused.err
+
+
+def test_the_daemon_serves_https_as_the_web_interface_alone_does(
+    shm: Shm, empty: Workspace, tmp_path: Path
+) -> None:
+    """What a warning tells to give can be given; a file that is no certificate is refused."""
+    pem = tmp_path / "some.pem"
+    pem.write_text("no certificate")
+    for verb in (("web",), ("daemon", "--web")):
+        refused = shm("--workspace", empty.folder, *verb, "--certificate", pem, "--key", pem)
+        assert refused.code == 3
+        assert "no certificate with a key that fits" in refused.err
+        alone = shm("--workspace", empty.folder, *verb, "--key", pem)
+        assert alone.code == 2
+    without = shm("--workspace", empty.folder, "daemon", "--certificate", pem)
+    assert without.code == 2
+    assert "--web" in without.err
+    given = ("daemon", "--web", "--certificate", pem, "--key", pem, "--print-unit")
+    assert f"--certificate {pem} --key {pem}" in shm("--workspace", empty.folder, *given).out

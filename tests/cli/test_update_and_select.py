@@ -219,6 +219,20 @@ def test_a_description_of_another_hanger_is_remarked(
     assert "the tests are of hanger 7, the description is of hanger 3" in ended.err
 
 
+def test_modes_that_no_such_hanger_can_have_are_doubted_before_any_result(
+    shm: Shm, hanger_file: Path, modes_file: Path, tmp_path: Path
+) -> None:
+    """A 12 m hanger's modes by the description of one of 9 m; by its own they are not doubted."""
+    shorter = tmp_path / "nine.toml"
+    shorter.write_text(hanger_file.read_text().replace("length_m = 12.0", "length_m = 9.0"))
+    ended = shm("update", modes_file, "--hanger-file", shorter, "--model", "beam1", *QUICK)
+    assert ended.code == 0
+    assert ended.err.startswith("Doubtful: test t9. No tension and no ends of hanger 3")
+    assert "right hanger, right description?" in ended.err
+    own = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
+    assert "Doubtful" not in own.err
+
+
 def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:
     ended = shm("--workspace", bridge.folder, "select", "--hanger", 4)
     assert ended.code == 4

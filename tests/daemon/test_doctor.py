@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+import sys
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -11,12 +12,14 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline.intake import receive
+from shm.read import apart
 from shm.store import Archive, DeliveryState, Stage, Workspace
 from shm_daemon.doctor import Finding, Level, examine, flowing, keeping
 from shm_daemon.heartbeat import HEARTBEAT, beat
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
 from tests.helpers.postgres import Databases
+from tests.helpers.taken_over import obeying_readers
 from tests.helpers.workspaces import make_workspace, put
 
 
@@ -53,6 +56,22 @@ def test_every_warning_and_fault_says_what_to_do(workspace: Workspace) -> None:
     troubled = [each for each in findings if each.level in (Level.WARNING, Level.FAULT)]
     assert len(troubled) >= 3
     assert all(each.remedy for each in troubled)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets a process confine itself")
+def test_bounds_of_reading_that_are_not_in_force_are_told_and_why(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert only(workspace, "confinement").level is Level.OK
+    why = {"Landlock": "this kernel has none; Linux has it from 5.13"}
+    monkeypatch.setattr(apart, "missing_bounds", lambda: why)
+    finding = only(workspace, "confinement")
+    assert finding.level is Level.WARNING
+    assert "without Landlock: this kernel has none" in finding.found
+    with obeying_readers("confinement._RESTRICT_SELF = 9999"):
+        monkeypatch.undo()
+        finding = only(workspace, "confinement")
+    assert (finding.level, "nothing is read" in finding.found) == (Level.FAULT, True)
 
 
 # ------------------------------------------------------------ broken stores

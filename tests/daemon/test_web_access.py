@@ -14,12 +14,15 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
-from shm_daemon.web.address import Address
-from shm_daemon.web.around import PROTECTION
+from shm_daemon.web.address import Address, caller_of
+from shm_daemon.web.around import HTTPS_ONLY, PROTECTION
 from shm_daemon.web.serving import refuse_unguarded
+from shm_daemon.web.throttle import MOST_WRONG, WITHIN_S, WrongTokens
 from tests.helpers.web_servers import Served, served
 
-READING = ("/api/status", "/api/hangers", "/api/hangers/3", "/api/alerts", "/metrics")
+READING = (
+    "/api/status", "/api/hangers", "/api/hangers/3", "/api/alerts", "/metrics", "/openapi.json",
+)  # fmt: skip
 UPLOAD = "/api/recordings?name=x.csv"
 ELSEWHERE = Address("0.0.0.0")
 
@@ -109,6 +112,87 @@ def test_every_answer_carries_the_protecting_headers(at_home: Served) -> None:
             assert "server" not in headers
 
 
+def test_who_came_by_https_is_told_to_come_by_nothing_else(at_home: Served) -> None:
+    """Also where a proxy took HTTPS off; a page that fails is protected as any other."""
+    with at_home.client(at_home.read_token) as client:
+        assert "Strict-Transport-Security" not in client.get("/").headers
+        for path in ("/", "/health", "/metrics", "/no/such/page", "/openapi.json"):
+            headers = client.get(path, headers={"X-Forwarded-Proto": "https"}).headers
+            assert headers["Strict-Transport-Security"] == HTTPS_ONLY["Strict-Transport-Security"]
+            assert {name: headers[name] for name in PROTECTION} == PROTECTION
+
+
+def test_an_error_of_ours_is_protected_as_well(
+    at_home: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr("shm_daemon.web.hangers.quarantined", broken)
+    with at_home.client() as client:
+        answer = client.get("/api/status")
+    assert answer.status_code == 500
+    assert {name: answer.headers[name] for name in PROTECTION} == PROTECTION
+
+
+def test_wrong_tokens_are_throttled_and_logged_by_address_without_the_token(
+    elsewhere: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    with elsewhere.client(elsewhere.read_token) as client:
+        assert client.get("/api/status").status_code == 200  # a neighbour that is known
+    with elsewhere.client("shm_guess") as client:
+        told = [client.get("/api/status").status_code for _ in range(MOST_WRONG + 3)]
+        refused = client.get("/api/status")
+    assert told == [401] * MOST_WRONG + [429] * 3
+    assert 0 < int(refused.headers["Retry-After"]) <= WITHIN_S
+    with elsewhere.client(elsewhere.write_token) as client:
+        assert client.get("/api/status").status_code == 429  # whether it is right is not told
+    with elsewhere.client(elsewhere.read_token) as client:
+        assert client.get("/api/status").status_code == 200
+    named = [line for line in caplog.messages if "127.0.0.1" in line]
+    assert len([line for line in named if "wrong or revoked" in line]) == MOST_WRONG
+    assert "has to wait" in named[-1]
+    assert "shm_guess" not in caplog.text
+
+
+def test_behind_a_proxy_the_callers_are_told_apart(
+    elsewhere: Served, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The proxy adds whom it was called by at the end; what stands before is anybody's word."""
+    for number in range(MOST_WRONG + 1):
+        forwarded = f"198.51.100.{number}, 203.0.113.9"
+        with elsewhere.client("shm_guess", **{"X-Forwarded-For": forwarded}) as client:
+            answer = client.get("/api/status")
+    assert answer.status_code == 429
+    with elsewhere.client("shm_guess", **{"X-Forwarded-For": "203.0.113.10"}) as client:
+        assert client.get("/api/status").status_code == 401
+    assert "203.0.113.9" in caplog.text
+    assert "198.51.100" not in caplog.text
+
+
+def test_whom_a_stranger_names_is_not_believed() -> None:
+    proxies = "127.0.0.1, 192.0.2.1"
+    assert caller_of("203.0.113.5", "198.51.100.7", proxies) == "203.0.113.5"
+    assert caller_of("127.0.0.1", "", proxies) == "127.0.0.1"
+    assert caller_of("127.0.0.1", "198.51.100.7, 192.0.2.1", proxies) == "198.51.100.7"
+    assert caller_of("127.0.0.1", "no address\n", proxies) == "127.0.0.1"
+
+
+def test_the_wrong_tokens_of_many_addresses_take_little_memory() -> None:
+    now = [0.0]
+    wrong = WrongTokens(lambda: now[0])
+    for number in range(20_000):
+        wrong.note_wrong(f"10.{number >> 16}.{number >> 8 & 255}.{number & 255}")
+        wrong.note_right(f"token {number}")
+    assert len(wrong._wrong) <= 4096
+    assert len(wrong._proven) <= 1024
+    for number in range(MOST_WRONG):
+        wrong.note_wrong(f"2001:db8::{number:x}")  # one owner, however many addresses
+    assert wrong.wait_s("2001:db8::ffff", "x") == WITHIN_S
+    now[0] = WITHIN_S
+    assert wrong.wait_s("2001:db8::ffff", "x") == 0
+
+
 def test_no_secret_reaches_the_log_or_the_disk(
     elsewhere: Served, workspace: Workspace, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -163,7 +247,7 @@ def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> Non
 
 
 def test_every_route_but_health_asks_for_a_token(elsewhere: Served) -> None:
-    with elsewhere.client() as client:
+    with elsewhere.client(elsewhere.read_token) as client:
         paths = client.get("/openapi.json").json()["paths"]
     guarded = {
         path for path, verbs in paths.items() if all("security" in verb for verb in verbs.values())

@@ -21,7 +21,7 @@ from shm_daemon.web import bridge_view
 from shm_daemon.web.address import Address
 from shm_daemon.web.bridge_drawing import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.bridge_view import HangerGlance
-from shm_daemon.web.site import Site
+from shm_daemon.web.site import Description, Site
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_loss
@@ -198,7 +198,7 @@ def test_two_hundred_hangers_have_room_and_alarms_keep_their_numbers(hanger: Han
 
 
 def test_a_hanger_long_not_tested_is_said(bridge: Workspace) -> None:
-    site = Site(bridge, Address())
+    site = Site(Description(bridge), Address())
     later = START + timedelta(days=bridge.settings.quiet_days + 1000)
     try:
         assert [each.is_quiet for each in bridge_view.glance(site, START).hangers] == [False, False]

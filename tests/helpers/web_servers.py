@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import httpx
 
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.app import make_app
-from shm_daemon.web.serving import make_server
+from shm_daemon.web.serving import context_of, make_app, make_server
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,20 @@ class Served:
 
 
 @contextmanager
-def served(workspace: Workspace, address: Address | None = None) -> Iterator[Served]:
-    """Serves until the end of the block, on this machine only, as if it listened at `address`."""
+def served(
+    workspace: Workspace,
+    address: Address | None = None,
+    certificate: tuple[Path, Path] | None = None,
+) -> Iterator[Served]:
+    """Serves until the end of the block, on this machine only, as if it listened at `address`;
+    over HTTPS with a certificate and its key.
+    """
     with workspace.store() as store:
         tokens = [store.create_token(scope, scope, utc_now()) for scope in Scope]
-    server = make_server(make_app(workspace, address), Address(port=0))
+    context = context_of(*certificate) if certificate else None
+    server = make_server(make_app(workspace, address), Address(port=0), context)
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        url = f"http{'s' if context else ''}://127.0.0.1:{listening.getsockname()[1]}"
         thread = threading.Thread(target=server.run, args=([listening],))
         thread.start()
         try:

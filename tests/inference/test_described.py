@@ -170,16 +170,33 @@ def test_every_spring_is_uniform_but_for_the_share_of_ends_made_to_clamp() -> No
         stiff = (shares[shares >= 1 - STIFFEST] - 1 + STIFFEST) / STIFFEST
         assert kstest(soft, "uniform").pvalue > 1e-4
         assert kstest(stiff, "uniform").pvalue > 1e-4
-        assert len(stiff) / len(shares) == pytest.approx(0.75 * STIFFEST + 0.25, abs=0.01)
+        assert len(stiff) / len(shares) == pytest.approx(5 / 6 * STIFFEST + 1 / 6, abs=0.01)
 
 
 def test_ends_alike_are_likelier_than_ends_of_different_kind() -> None:
     details = EndDetails(SPRINGS, SPRINGS)
-    alike, by_plane, mixed, stiff = np.array(
-        [[0.4] * 4, [0.3, 0.7, 0.3, 0.7], [0.1, 0.3, 0.5, 0.7], [0.99] * 4]
+    alike, round_ends, by_plane, mixed, stiff = np.array(
+        [
+            [0.4] * 4,
+            [0.3, 0.3, 0.7, 0.7],
+            [0.3, 0.7, 0.3, 0.7],
+            [0.1, 0.3, 0.5, 0.7],
+            [0.99] * 4,
+        ]
     )
-    log = details.log_density(np.array([alike, by_plane, mixed, stiff]))
-    assert log[3] > log[0] > log[1] > log[2] == pytest.approx(np.log(0.25), abs=0.1)
+    log = details.log_density(np.array([alike, round_ends, by_plane, mixed, stiff]))
+    assert log[4] > log[0] > log[1] > log[2] > log[3] == pytest.approx(np.log(1 / 6), abs=0.1)
+    plates = EndDetails(SPRINGS, SPRINGS, may_be_round=False).log_density(np.array([round_ends]))
+    assert plates[0] < log[2] - np.log(4 / 6) + 1
+
+
+def test_frequencies_do_not_tell_which_end_of_a_plane_is_which_but_unlike_fittings_do() -> None:
+    straight, crossed = np.array([[0.3, 0.3, 0.7, 0.7], [0.3, 0.7, 0.7, 0.3]])
+    either, own = (EndDetails(SPRINGS, SPRINGS, exchanged=each) for each in (True, False))
+    both = np.array([straight, crossed])
+    one, other = either.log_density(both)
+    assert one == pytest.approx(other)
+    assert own.log_density(both)[0] > own.log_density(both)[1] + 5
 
 
 # ------------------------------------------------ what the tension rests on

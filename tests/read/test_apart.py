@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import textwrap
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -19,12 +18,13 @@ import numpy as np
 import pytest
 
 from shm.documents import dump
-from shm.errors import BadInput
+from shm.errors import BadInput, WorkerDied
 from shm.modes_document import load_modes as load_modes_here
 from shm.modes_document import modes_document
 from shm.read import FORMATS, Format, apart, bundle, peek_test, read_test, write
 from shm.read.apart import asking
 from shm.values import FrequencyResponse, ModalTest, Mode, Recording
+from tests.helpers.taken_over import obey, obeying_readers
 
 formats = pytest.mark.parametrize("file_format", FORMATS, ids=lambda f: f.name)
 Child = Callable[..., object]
@@ -41,27 +41,10 @@ def csv(recording: Recording, tmp_path: Path) -> Path:
     return written(recording, tmp_path / "test.csv")
 
 
-VERB = """
-from shm.read.apart import serving
-known = serving._VERBS['read_test']
-def verb(path):
-    if path.suffix != '.py': return known(path)
-    space = {'path': path}
-    exec(path.read_text(), space)
-    return space['found']
-serving._VERBS['read_test'] = verb
-"""
-
-
 @pytest.fixture(scope="module", autouse=True)
 def reading_process_that_obeys() -> Iterator[None]:
-    """One reading process whose children run what a .py says: a reader that was taken over."""
-    asking._forget()
-    with pytest.MonkeyPatch.context() as patch:
-        begin, end = asking._CODE.split("from shm", 1)
-        patch.setattr(asking, "_CODE", f"{begin.rstrip('; ')}{VERB}from shm{end}")
+    with obeying_readers():
         yield
-        asking._forget()
 
 
 @pytest.fixture
@@ -69,9 +52,7 @@ def child(tmp_path: Path) -> Child:
     """Lets a child run some code, which may leave what it has `found`."""
 
     def does(code: str, limits: apart.Limits | None = None) -> object:
-        path = tmp_path / "trap.py"
-        path.write_text(f"import os, sys\n{textwrap.dedent(code)}\n")
-        return apart.read_test(path, limits)
+        return obey(tmp_path / "trap.py", code, limits)
 
     return does
 
@@ -282,8 +263,9 @@ def test_a_reading_process_killed_while_it_reads_is_begun_anew(
 
     with monkeypatch.context() as patched:
         patched.setattr(asking, "_received", killed)
-        with pytest.raises(BadInput, match="SIGKILL"):
+        with pytest.raises(WorkerDied, match="SIGKILL") as death:  # not the file's doing
             apart.read_test(csv)
+    assert death.value.from_outside
     assert apart.read_test(csv)
 
 

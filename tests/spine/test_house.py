@@ -77,6 +77,7 @@ ROOMS = (
     "report",
     "simulate",
     "pipeline",
+    "plausibility",
 )
 
 

@@ -8,13 +8,16 @@ from __future__ import annotations
 import sqlite3
 import sys
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.store import Adoption, IdentifiedTest, Lineage, Stage, Store
+import numpy as np
+
+from shm.store import Adoption, HeldTest, IdentifiedTest, Judged, Lineage, Stage, Store
 from shm.store.tables import SCHEMA
-from shm.values import Selection
+from shm.values import Doubt, Fingerprint, Selection
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import (
     NOW,
@@ -35,7 +38,7 @@ ADOPTED = "beam1+point_mass@everywhere"
 
 def fill(store: Store) -> None:
     """Two tests with results, one refused file, one twice, an alert that was acknowledged, a
-    dropped adoption, a baseline set anew."""
+    dropped adoption, a baseline set anew, what is held."""
     for number in (1, 2, 3):
         store.receive(a_file(number), NOW)
     store.receive(a_file(1, arrival="again"), NOW)
@@ -70,6 +73,22 @@ def fill(store: Store) -> None:
     joint = a_posterior("beam1", ("t2",), seed=9)
     store.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
     _update_again(store)
+    _hold(store)
+
+
+def _hold(store: Store) -> None:
+    """A test with a wrong clock that a person has confirmed, and a copy of it that waits."""
+    for number, check in ((5, "clock before the bridge"), (6, "copy")):
+        recording = store.receive(a_file(number, modified_at=NOW), NOW).recording
+        doubt = Doubt(check, "its time cannot be that", "Confirm it", "No clock was there.", True)
+        held = HeldTest(0, f"t{number}", (doubt,), -0.1)
+        notice = replace(an_alert("", f"t{number}"), hanger=5, drifts=(), kinds=("held",))
+        print_ = Fingerprint(f"{number:064x}", np.ones((1, 256)) / 16)
+        judged = Judged(None, print_, (held,), notice, ["mail"])
+        found = [IdentifiedTest(a_test(f"t{number}", number, hanger=5))]
+        store.identified(recording.id, found, LINEAGE, NOW, judged)
+    later = NOW + timedelta(days=9)
+    store.confirm(5, "engineer", "battery was flat", later, later)
 
 
 def _update_again(store: Store) -> None:

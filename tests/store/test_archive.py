@@ -8,7 +8,7 @@ import json
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import pytest
 
@@ -71,8 +71,8 @@ def test_a_file_that_changes_while_it_is_read_is_not_kept(
     source = a_source(tmp_path)
     copy = archive._copy_hashed
 
-    def copy_and_append(reading: BinaryIO, target: Path) -> tuple[str, int]:
-        result = copy(reading, target)
+    def copy_and_append(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
+        result = copy(reading, target, *more)
         with source.open("ab") as file:
             file.write(b"1,2\n")
         return result
@@ -187,10 +187,10 @@ def test_a_name_given_to_a_link_while_it_is_read_is_noticed(
     source, secret = a_source(tmp_path), a_source(tmp_path, "secret.csv", b"secret\n")
     copy, copied = archive._copy_hashed, []
 
-    def swap_and_copy(reading: BinaryIO, target: Path) -> tuple[str, int]:
+    def swap_and_copy(reading: BinaryIO, target: Path, *more: Any) -> tuple[str, int]:
         source.unlink()
         source.symlink_to(secret)
-        sha256, size = copy(reading, target)
+        sha256, size = copy(reading, target, *more)
         copied.append(target.read_bytes())
         return sha256, size
 
@@ -263,3 +263,47 @@ def test_names_that_no_database_or_file_system_holds_are_made_safe() -> None:
     assert long.startswith("sub/å")
     assert long.endswith("å.csv")
     assert safe_name(Path("logger/h3.csv")) == "logger/h3.csv"
+
+
+def rotten(kept_in: Archive, tmp_path: Path) -> tuple[Path, ReceivedFile]:
+    """A kept file of which one bit has flipped since."""
+    kept = kept_in.keep(a_source(tmp_path, content=b"force,acc_1\n1,2\n"))
+    path = kept_in.folder / kept.archived_as
+    path.chmod(0o644)
+    path.write_bytes(b"force,acc_1\n1,3\n")
+    path.chmod(0o444)
+    return path, ReceivedFile(kept.sha256, "h3.csv", kept.size_bytes, "e", kept.archived_as)
+
+
+def test_a_rotten_file_is_refused_at_every_read_with_the_remedy(
+    kept_in: Archive, tmp_path: Path
+) -> None:
+    path, file = rotten(kept_in, tmp_path)
+    with (
+        pytest.raises(
+            StoreError, match=rf"h3.csv is damaged in the archive: .*{path.name}"
+        ) as told,
+        kept_in.opened(file),
+    ):
+        pass
+    assert "into the spool again" in told.value.remedy
+    assert not kept_in.holds_whole(file)
+
+
+def test_so_is_one_whose_sidecar_is_rotten(kept_in: Archive, tmp_path: Path) -> None:
+    sidecar, _ = rotten(kept_in, tmp_path)
+    kept = kept_in.keep(a_source(tmp_path, name="h4.csv", content=b"force\n"))
+    name = sidecar.relative_to(kept_in.folder).as_posix()
+    file = ReceivedFile(kept.sha256, "h4.csv", kept.size_bytes, "e", kept.archived_as, name)
+    with pytest.raises(StoreError, match=name), kept_in.opened(file):
+        pass
+
+
+def test_the_good_file_that_comes_again_heals_the_rotten_one(
+    kept_in: Archive, tmp_path: Path
+) -> None:
+    path, file = rotten(kept_in, tmp_path)
+    kept_in.keep(a_source(tmp_path, content=b"force,acc_1\n1,2\n"))
+    assert checksum(path) == file.sha256
+    with kept_in.opened(file) as shown:
+        assert shown.read_bytes() == b"force,acc_1\n1,2\n"

@@ -24,8 +24,9 @@ def test_a_backup_is_one_file_that_restores_into_either_kind(
     filled: Store, empty: str | Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "backups" / "may.db"
-    written = back_up(filled, file, quiet)
-    assert written == held(filled)
+    checked = back_up(filled, file, quiet)
+    assert (written := checked.tables) == held(filled)
+    assert checked.troubles == ()
     assert [path.name for path in file.parent.iterdir()] == ["may.db"]
     restored = restore(empty, file, tmp_path / "kept.db", quiet)
     assert (restored.tables, restored.kept) == (written, None)

@@ -7,7 +7,7 @@ from datetime import timedelta
 import pytest
 
 from shm.errors import NothingThere
-from shm.store import IdentifiedTest, Lineage, Outcome, Stage, Store
+from shm.store import IdentifiedTest, Judged, Lineage, Outcome, Stage, Store
 from tests.helpers.nouns import NOW, a_file, a_test
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -36,10 +36,29 @@ def test_the_same_bytes_dropped_again_are_noticed_and_not_entered(store: Store) 
     assert "sidecar" not in event.message
 
 
-def test_a_duplicate_with_another_sidecar_is_told(store: Store) -> None:
-    store.receive(a_file(1), NOW)
-    store.receive(a_file(1, arrival="other", sidecar_as="22/2.toml"), NOW)
-    assert "sidecar differs" in store.events("duplicate")[0].message
+def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Store) -> None:
+    first = store.receive(a_file(1, sidecar_as="11/1.toml"), NOW).recording.id
+    found = [IdentifiedTest(a_test())]
+    store.identified(first, found, LINEAGE, NOW, Judged("11/1.toml"))
+    described = a_file(1, arrival="other", sidecar_as="22/2.toml")
+    again = store.receive(described, NOW)
+    assert again.outcome is Outcome.REDESCRIBED
+    assert again.recording.file.sidecar_as == "22/2.toml"
+    assert again.recording.stage is Stage.RECEIVED
+    assert store.tests(3) == ()
+    assert len(store.former_tests(first)) == 1
+    assert "another sidecar" in store.events("redescribed")[0].message
+    assert store.receive(described, NOW).outcome is Outcome.RESUMED
+    late = Judged("11/1.toml")  # what was begun with the sidecar of before
+    store.identified(first, found, LINEAGE, NOW, late)
+    assert store.recording(first).stage is Stage.RECEIVED
+
+
+def test_a_duplicate_without_a_sidecar_changes_nothing(store: Store) -> None:
+    store.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
+    bare = store.receive(a_file(1, arrival="other"), NOW)
+    assert bare.outcome is Outcome.DUPLICATE
+    assert bare.recording.file.sidecar_as == "11/1.toml"
 
 
 def test_a_receipt_cut_short_by_a_crash_is_no_duplicate(store: Store) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
@@ -14,9 +16,10 @@ from alembic.script import ScriptDirectory
 
 from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store import Acknowledgement, Stage, Store
+from shm.store import Acknowledgement, Decision, Stage, Store
 from shm.store.database import make_engine
 from shm.store.tables import SCHEMA, metadata
+from shm.values import Fingerprint
 from tests.helpers.nouns import NOW, a_change
 
 RELEASED = sorted(Path(__file__).parent.glob("data/schema_*.db"))
@@ -59,8 +62,8 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
         assert second.model == store.selected_models()[3] == "beam1"
         assert store.baseline(3) is not None
         assert {drift.quantity for drift in store.drifts(3)} == {"tension"}
-        assert [stored.alert.key for stored in store.alerts()] == ["hanger-3:tension-down"]
-        assert [delivery.hook for delivery in store.deliveries()] == ["mail"]
+        assert store.alerts()[0].alert.key == "hanger-3:tension-down"
+        assert {delivery.hook for delivery in store.deliveries()} == {"mail"}
         assert [event.kind for event in store.events()][:2] == ["duplicate", "refused"]
 
 
@@ -120,6 +123,23 @@ def test_what_was_superseded_is_kept_with_its_lineage(tmp_path: Path) -> None:
         (test,) = store.former_tests(4)
         assert [made.superseded_at for made in test.posteriors] == [NOW, None]
         assert store.posterior(3, "t4").seed == 11
+
+
+def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(RELEASED[6], path)
+    Store.upgrade(path)
+    with Store.open(path) as store:
+        confirmed = store.latest_hold(5)
+        assert confirmed is not None
+        assert (confirmed.decision, confirmed.who) == (Decision.CONFIRMED, "engineer")
+        assert confirmed.time == confirmed.decided_at == NOW + timedelta(days=9)
+        (waits,) = store.holds()
+        assert [(test.name, test.tension_shift) for test in waits.tests] == [("t6", -0.1)]
+        assert [doubt.check for doubt in waits.doubts] == ["copy"]
+        known = store.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
+        assert [each.fingerprint.shapes.shape for each in known] == [(1, 256)] * 2
+        assert store.recording(5).file.modified_at == NOW
 
 
 @pytest.mark.parametrize("version", ["0000", None])

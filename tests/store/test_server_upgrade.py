@@ -35,14 +35,20 @@ def database(postgresql: Databases) -> Iterator[str]:
 
 @pytest.mark.parametrize("released", OLDER, ids=lambda path: path.stem)
 def test_a_server_upgrades_as_a_file_does(released: Path, database: str, tmp_path: Path) -> None:
-    path = Path(shutil.copyfile(released, tmp_path / "shm.db"))
-    _make_as_of(released.stem.removeprefix("schema_"), database)
-    _fill_from(path, database)
+    path = as_of(released, database, tmp_path)
     for location in (path, database):
         Store.upgrade(location)
     with Store.open(path) as of_file, Store.open(database) as of_server:
         assert held(of_server) == held(of_file)
         assert sum(each.rows for each in held(of_file)) > 10
+
+
+def as_of(released: Path, url: str, folder: Path) -> Path:
+    """Makes an empty database one of a released schema; a copy of the file that filled it."""
+    path = Path(shutil.copyfile(released, folder / "released.db"))
+    _make_as_of(released.stem.removeprefix("schema_"), url)
+    _fill_from(path, url)
+    return path
 
 
 def _make_as_of(schema: str, url: str) -> None:

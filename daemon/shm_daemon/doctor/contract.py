@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from enum import StrEnum
 
 from shm.store import Store, Workspace
@@ -60,15 +60,6 @@ def fault(check: str, found: str, remedy: str) -> Finding:
 def unknown(check: str, found: str, remedy: str = "") -> Finding:
     """It could not be looked at."""
     return Finding(check, Level.UNKNOWN, found, remedy)
-
-
-def told(age: timedelta) -> str:
-    """A duration as people say it."""
-    seconds = age.total_seconds()
-    for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds:.0f} s"
 
 
 def some(names: list[str], most: int = 5) -> str:

@@ -13,13 +13,19 @@ from shm.store import Workspace
 from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, unknown
 from shm_daemon.doctor.flowing import (
     check_daemon,
+    check_held,
     check_quarantine,
     check_raw_files,
     check_spool,
     check_under_way,
 )
 from shm_daemon.doctor.folders import check_disks, check_folders
-from shm_daemon.doctor.installed import check_extras, check_models, check_versions
+from shm_daemon.doctor.installed import (
+    check_confinement,
+    check_extras,
+    check_models,
+    check_versions,
+)
 from shm_daemon.doctor.keeping import check_backup, check_clock, check_hangers, check_store
 from shm_daemon.doctor.telling import check_deliveries, check_hooks
 
@@ -29,6 +35,7 @@ _CHECKS: Sequence[tuple[str, Check]] = (
     ("spool", check_spool),
     ("recordings", check_under_way),
     ("quarantine", check_quarantine),
+    ("held", check_held),
     ("raw files", check_raw_files),
     ("backup", check_backup),
     ("clock", check_clock),
@@ -54,6 +61,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
     findings += _found("disk", partial(check_disks, folder, workspace.settings))
     findings += _found("models", partial(check_models, workspace))
     findings += _found("extras", partial(check_extras, workspace))
+    findings += _found("confinement", check_confinement)
     findings += _found("hooks", partial(check_hooks, workspace))
     return (*findings, *_of_store(workspace, now))
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from shm.report.words import counted
 from shm.store import Stage
-from shm_daemon.doctor.contract import Examined, Finding, fault, ok, some, told, warning
-from shm_daemon.heartbeat import patience_s, seconds_since_beat
+from shm_daemon.doctor.contract import Examined, Finding, fault, ok, some, warning
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
 from shm_daemon.spool import left_alone, scan
 
 _WAITS_LONG = timedelta(minutes=10)
@@ -98,6 +98,20 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: "
         f"{_why(reasons[-1])}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
+    )
+
+
+def check_held(examined: Examined) -> Iterator[Finding]:
+    """Whether recordings wait for a person to decide."""
+    found = examined.store.holds()
+    if not found:
+        yield ok("held", "nothing waits for you to decide")
+        return
+    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    yield warning(
+        "held",
+        f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
+        "See why with `shm ingest --held`, then confirm or discard each.",
     )
 
 

@@ -11,8 +11,9 @@ from importlib.util import find_spec
 from shm import __version__
 from shm.bridge import AppriseHook
 from shm.models import competing_names
+from shm.read import apart
 from shm.store import Workspace
-from shm_daemon.doctor.contract import Finding, fault, ok
+from shm_daemon.doctor.contract import Finding, fault, ok, warning
 
 _MODULES = {
     "alerts": ("apprise",),
@@ -58,6 +59,23 @@ def check_models(workspace: Workspace) -> Iterator[Finding]:
     for hanger in workspace.bridge.hangers:
         competing_names(hanger, names)
     yield ok("models", f"{', '.join(names)}; each hanger has one that applies")
+
+
+def check_confinement() -> Iterator[Finding]:
+    """Whether files of others are read within all bounds that we know; ShmError where they cannot.
+
+    A file is read by a child process here, as the daemon's are.
+    """
+    missing = apart.missing_bounds()
+    for name, why in missing.items():
+        yield warning(
+            "confinement",
+            f"files are read without {name}: {why}",
+            "A file made to take its reader over could do what this user may: let nobody send "
+            "files whom you do not trust, or run shm on a newer Linux, on x86_64 or aarch64.",
+        )
+    if not missing:
+        yield ok("confinement", "files are read within limits, Landlock and a list of system calls")
 
 
 def _version(name: str) -> str:

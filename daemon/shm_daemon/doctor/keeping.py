@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from datetime import timedelta
 
+from shm.pipeline.redescribed import redescribed
 from shm.report.words import counted
 from shm.store.checking import quick_troubles
 from shm_daemon.doctor.contract import (
@@ -15,10 +16,10 @@ from shm_daemon.doctor.contract import (
     fault,
     ok,
     some,
-    told,
     unknown,
     warning,
 )
+from shm_daemon.heartbeat import told
 
 _CLOCK_TOLERANCE = timedelta(minutes=1)
 _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
@@ -27,12 +28,13 @@ _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
 def check_store(examined: Examined) -> Iterator[Finding]:
     """Whether the store is whole, as far as a quick look tells."""
     store = examined.store
-    troubles = quick_troubles(store)
+    troubles = (*quick_troubles(store), *(error.message for error in store.known_damage()))
     if troubles:
         yield fault(
             "store",
             f"{store.location} is damaged: {some(list(troubles))}",
-            "Stop the daemon, then `shm db restore FILE --replace`.",
+            "`shm db check` names each damaged row and what heals it; else stop the daemon, then "
+            "`shm db restore FILE --replace`.",
         )
     else:
         held = sum(store.stage_counts().values())
@@ -103,13 +105,23 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
         yield warning("hangers", f"no test yet: {some(never)}", "Test them.")
     if forming:
         yield warning("hangers", f"no baseline yet: {some(forming)}", "Take more tests.")
+    changed = [
+        str(each.id) for each in bridge.hangers if redescribed(each, store.baseline(each.id))
+    ]
+    if changed:
+        yield warning(
+            "hangers",
+            f"described otherwise since the baseline: {some(changed)}",
+            f"Set a new baseline: `shm drift rebaseline --hanger {changed[0]} --since DAY --why "
+            "TEXT`.",
+        )
     strangers = sorted(set(latest) - set(ids))
     if strangers:
         names = some([str(each) for each in strangers])
         yield warning(
             "hangers", f"tests of hangers not described: {names}", "Describe them in bridge.toml."
         )
-    if not (quiet or never or forming or strangers):
+    if not (quiet or never or forming or changed or strangers):
         yield ok("hangers", f"{len(ids)}, with a baseline and recent tests")
 
 

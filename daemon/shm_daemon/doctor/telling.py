@@ -10,7 +10,8 @@ from datetime import timedelta
 from shm.bridge import AppriseHook, Hook, WebhookHook
 from shm.store import Workspace
 from shm.store.rows import DeliveryState
-from shm_daemon.doctor.contract import Examined, Finding, fault, ok, told, unknown, warning
+from shm_daemon.doctor.contract import Examined, Finding, fault, ok, unknown, warning
+from shm_daemon.heartbeat import told
 from shm_daemon.hooks import HookFailed, HookNotifier
 
 _LATE = timedelta(minutes=10)

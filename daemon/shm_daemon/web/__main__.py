@@ -1,42 +1,72 @@
-"""`python -m shm_daemon.web WORKSPACE HOST PORT [LOG]`: ends with its standard input."""
+"""`python -m shm_daemon.web WORKSPACE HOST PORT [--certificate PEM] [--key PEM] [--log-file LOG]`:
+ends with its standard input.
+"""
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import signal
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 
-from shm.errors import ShmError, UsageError
+from shm.errors import ShmError
 from shm.store import Workspace
 from shm_daemon.logs import begin_logging
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import serve
+from shm_daemon.web.serving import leaving, serve
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: Sequence[str]) -> int:
     """Serves one workspace; the exit code."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
-    threading.Thread(target=_end_with_input, daemon=True).start()
+    wanted = _parser().parse_args(arguments)
     try:
-        if len(arguments) not in (3, 4):
-            raise UsageError("3 or 4 arguments are expected.", remedy="Begin it with `shm web`.")
-        folder, host, port, *log_file = arguments
-        workspace = Workspace.open(folder)
-        begin_logging(workspace.settings, Path(log_file[0]) if log_file else None)
-        serve(workspace, Address(host, int(port)))
+        workspace = Workspace.open(wanted.workspace)
+        begin_logging(workspace.settings, wanted.log_file)
+        address = Address(wanted.host, wanted.port)
+        serve(workspace, address, wanted.certificate, wanted.key)
     except ShmError as error:
         logging.getLogger("shm").error("%s", error)
         return error.exit_code
     return 0
 
 
+def command(
+    workspace: Path,
+    address: Address,
+    certificate: Path | None = None,
+    key: Path | None = None,
+    log_file: Path | None = None,
+) -> list[str]:
+    """The words that begin it in a process of its own."""
+    options = {"--certificate": certificate, "--key": key, "--log-file": log_file}
+    given = [str(word) for option in options.items() if option[1] is not None for word in option]
+    place = [str(workspace), address.host, str(address.port)]
+    return [sys.executable, "-m", "shm_daemon.web", *place, *given]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("shm_daemon.web", description="Begin it with `shm web`.")
+    parser.add_argument("workspace", type=Path)
+    parser.add_argument("host")
+    parser.add_argument("port", type=int)
+    for option in ("--certificate", "--key", "--log-file"):
+        parser.add_argument(option, type=Path)
+    return parser
+
+
 def _end_with_input() -> None:
-    sys.stdin.buffer.read()
+    # Not by `sys.stdin`, whose lock this thread would hold while Python ends.
+    while os.read(0, 4096):
+        pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    threading.Thread(target=_end_with_input, daemon=True).start()
+    with leaving():
+        sys.exit(main(sys.argv[1:]))

@@ -5,6 +5,7 @@ A program sends its token in a header, a browser in the cookie that signing in g
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 from urllib.parse import urlsplit
@@ -14,6 +15,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
 from shm.store import Scope, StoredToken
+from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.site import Site
 
@@ -53,11 +55,11 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     `frame.page` shows who it is.
     """
     if credentials is not None:
-        found = _visitor(site, credentials.credentials, Scope.READ)
+        found = _visitor(request, site, credentials.credentials, Scope.READ)
     elif _is_at_home(request, site):
         found = _at_home(request, site)
     else:
-        found = _visitor(site, _cookie(request, "Reading needs a token here."), Scope.READ)
+        found = _visitor(request, site, _cookie(request, "Reading needs a token here."), Scope.READ)
     request.state.visitor = found
     return found
 
@@ -65,10 +67,10 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
 def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
     """Lets in who may write: only with a token, from wherever."""
     if credentials is not None:
-        return _visitor(site, credentials.credentials, Scope.WRITE)
+        return _visitor(request, site, credentials.credentials, Scope.WRITE)
     token = _cookie(request, "Writing needs a token.")
     refuse_foreign(request)
-    return _visitor(site, token, Scope.WRITE)
+    return _visitor(request, site, token, Scope.WRITE)
 
 
 Reader = Annotated[Visitor, Depends(reading)]
@@ -86,16 +88,31 @@ def refuse_foreign(request: Request) -> None:
         raise Refused(403, "This was sent by a page of another site.", "Send it from our page.")
 
 
-def token_in_force(site: Site, secret: str) -> StoredToken:
-    """The token of this secret; raises Refused where it is wrong or revoked."""
+def token_in_force(request: Request, site: Site, secret: str) -> StoredToken:
+    """The token of this secret; raises Refused where it is wrong or revoked, or where too many of
+    those came from the same address.
+    """
+    forwarded = request.headers.get("x-forwarded-for", "")
+    peer = request.client.host if request.client else ""
+    caller = caller_of(peer, forwarded, site.workspace.settings.web_proxies)
+    wait_s = site.wrong_tokens.wait_s(caller, secret)
+    if wait_s > 0:
+        raise Refused(
+            429,
+            "Too many wrong tokens came from this address.",
+            f"Try again in {wait_s:.0f} s, with a token that is in force.",
+            {"Retry-After": f"{math.ceil(wait_s)}"},
+        )
     token = site.store.token_of(secret, utc_now())
     if token is None:
+        site.wrong_tokens.note_wrong(caller)
         raise _nobody("This token is wrong or revoked.")
+    site.wrong_tokens.note_right(secret)
     return token
 
 
-def _visitor(site: Site, secret: str, scope: Scope) -> Visitor:
-    token = token_in_force(site, secret)
+def _visitor(request: Request, site: Site, secret: str, scope: Scope) -> Visitor:
+    token = token_in_force(request, site, secret)
     if scope not in token.scopes:
         raise Refused(
             403,

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import socket
 from dataclasses import dataclass
-from ipaddress import ip_address
+from ipaddress import IPv6Address, ip_address
 
 DEFAULT_PORT = 8400
+UPLOADS = "/api/recordings"
+"""Where recordings are sent to."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,32 @@ class Address:
         if name in known:
             return True
         return _is_loopback(name) if self.is_loopback else _is_number(name)
+
+
+def network_of(address: str) -> str:
+    """Who calls, as one caller is told from another: a network of IPv6 is given out to one owner in
+    blocks of 64 bits.
+    """
+    try:
+        number = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if isinstance(number, IPv6Address) and number.ipv4_mapped is None:
+        return f"{IPv6Address(int(number) >> 64 << 64)}/64"
+    return str(getattr(number, "ipv4_mapped", None) or number)
+
+
+def caller_of(peer: str, forwarded_for: str, proxies: str) -> str:
+    """The address of who asks: the peer or, where that is one of our `proxies`, whom it names.
+
+    Each proxy adds the address that it was called from at the end of X-Forwarded-For: what stands
+    before the first that is none of ours anybody may have written.
+    """
+    ours = {name.strip() for name in proxies.split(",")}
+    for named in reversed([peer] if peer not in ours else [*forwarded_for.split(","), peer]):
+        if named.strip() not in ours:
+            return named.strip() if _is_number(named.strip()) else peer
+    return peer
 
 
 def _name_of(host_header: str) -> str:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.responses import JSONResponse
 
 import shm
-from shm.store import Workspace
 from shm_daemon.web import alerts, hanger_numbers, hangers, recordings, signing_in, tests, watching
-from shm_daemon.web.address import Address
-from shm_daemon.web.around import Around
+from shm_daemon.web.access import Reader
 from shm_daemon.web.faults import handle_faults
+from shm_daemon.web.front import Pages
+from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import alerts as alerts_page
 from shm_daemon.web.pages import bridge, hanger, health, static, test, upload
 from shm_daemon.web.site import Site
+from shm_daemon.web.warming import warm_up
 from shm_daemon.web.working_out import Workshop
+
+_described = APIRouter(include_in_schema=False)
 
 _DESCRIPTION = (
     "Recordings come in, states and alerts are read, alerts are acknowledged. Answers that are no "
@@ -24,26 +25,20 @@ _DESCRIPTION = (
 )
 
 
-def make_app(workspace: Workspace, address: Address | None = None) -> FastAPI:
-    """The interface of one workspace, as it listens at `address` (by default this machine only)."""
-    site = Site(workspace, address or Address())
-
-    @asynccontextmanager
-    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        yield
-        app.state.workshop.close()
-        site.close()
-
+def load_pages(site: Site) -> Pages:
+    """All of the interface: pages, API and metrics."""
+    watching_site = site.twin()  # so that a scrape need not wait for the pages' connections
     app = FastAPI(
         title="shm",
         version=shm.__version__,
         description=_DESCRIPTION,
+        openapi_url=None,  # ours asks for a token where other pages do
         docs_url=None,  # its pages load scripts from elsewhere
         redoc_url=None,
-        lifespan=lifespan,
     )
     app.state.site = site
     app.state.workshop = Workshop()
+    app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (
         recordings,
@@ -62,5 +57,17 @@ def make_app(workspace: Workspace, address: Address | None = None) -> FastAPI:
         hanger,
     ):
         app.include_router(part.router)
-    app.add_middleware(Around, site=site)
-    return app
+    app.include_router(_described)
+
+    def close() -> None:
+        app.state.workshop.close()
+        watching_site.close()
+        site.close()
+
+    return Pages(app, close, lambda: warm_up(app))
+
+
+@_described.get("/openapi.json")
+def openapi(request: Request, _: Reader) -> JSONResponse:
+    """What the interface takes and answers, as OpenAPI."""
+    return JSONResponse(request.app.openapi())

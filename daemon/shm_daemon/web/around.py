@@ -9,9 +9,9 @@ import logging
 import time
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shm_daemon.web.faults import fault
 from shm_daemon.web.site import Site
 
 PROTECTION = {
@@ -27,6 +27,8 @@ PROTECTION = {
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cache-Control": "no-store",
 }
+HTTPS_ONLY = {"Strict-Transport-Security": "max-age=31536000"}
+"""For who came by HTTPS: from now on a browser comes by nothing else. No names below ours."""
 
 log = logging.getLogger(__name__)
 
@@ -42,13 +44,14 @@ class Around:
             await self._app(scope, receive, send)
             return
         began, status = time.monotonic(), 500
+        protection = PROTECTION | (HTTPS_ONLY if is_https(scope) else {})
 
         async def protected(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
                 headers = MutableHeaders(scope=message)
-                for name, value in PROTECTION.items():
+                for name, value in protection.items():
                     headers.setdefault(name, value)
             await send(message)
 
@@ -65,9 +68,18 @@ class Around:
         if self._site.answers_to(host):
             await self._app(scope, receive, send)
             return
-        refusal = fault(
-            400,
-            "The request is meant for another host.",
-            "Call the interface by its address, or name the host in the setting web_hosts.",
-        )
-        await refusal(scope, receive, send)
+        said = {
+            "message": "The request is meant for another host.",
+            "remedy": "Call the interface by its address, or name the host in the setting "
+            "web_hosts.",
+        }
+        await JSONResponse(said, 400)(scope, receive, send)
+
+
+def is_https(scope: Scope) -> bool:
+    """Whether the caller came by HTTPS, to us or to a proxy before us.
+
+    A proxy's word is enough, whoever it is: to believe it only makes cookies and browsers stricter.
+    """
+    forwarded = Headers(scope=scope).get("x-forwarded-proto", "").split(",")[0].strip().lower()
+    return "https" in (scope["scheme"], forwarded)

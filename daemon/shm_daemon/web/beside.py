@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import logging
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from shm.store import Workspace
-from shm_daemon.extras import needing
+from shm_daemon.web.__main__ import command
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import refuse_unguarded
+from shm_daemon.web.serving import context_of, refuse_unguarded, refuse_uninstalled
 
 _FIRST_WAIT_S, _LONGEST_WAIT_S, _LIVED_WELL_S = 1.0, 60.0, 60.0
 _ENDING_S = 10.0
@@ -23,36 +22,34 @@ log = logging.getLogger(__name__)
 
 @contextmanager
 def web_beside(
-    workspace: Workspace, address: Address | None, log_file: Path | None = None
+    workspace: Workspace,
+    address: Address | None,
+    log_file: Path | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
 ) -> Iterator[None]:
     """Serves the web interface while the context lasts; without an address, nothing.
 
     What befalls it does not touch the daemon; it ends with the daemon, however that ends. Where the
     daemon writes its log to a file, the interface has one beside it: two processes cannot put one
-    file aside. Raises UsageError where it may not be begun at all.
+    file aside. Raises UsageError where it may not be begun at all, BadInput where the certificate
+    cannot be used.
     """
     if address is None:
         yield
         return
-    with needing("web"):
-        import fastapi  # noqa: F401
-        import prometheus_client  # noqa: F401
-        import uvicorn  # noqa: F401
+    refuse_uninstalled()
     refuse_unguarded(workspace, address)
-    keeper = _Keeper(
-        [
-            *(sys.executable, "-m", "shm_daemon.web", str(workspace.folder)),
-            *(address.host, str(address.port)),
-            *([str(log_beside(log_file))] if log_file else []),
-        ]
-    )
+    context_of(certificate, key)
+    log_file = log_beside(log_file) if log_file else None
+    keeper = _Keeper(command(workspace.folder, address, certificate, key, log_file))
     thread = threading.Thread(target=keeper.keep, name="web", daemon=True)
     thread.start()
     try:
         yield
     finally:
         keeper.stop()
-        thread.join(_ENDING_S)
+        thread.join()  # it ends the process itself where that does not end in time
 
 
 def log_beside(file: Path) -> Path:

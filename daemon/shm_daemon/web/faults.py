@@ -14,8 +14,7 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from shm.errors import BadInput, NothingThere, ShmError, StoreError, UsageError
-from shm_daemon.landing import TooLarge
+from shm.errors import BadInput, NothingThere, ShmError, StoreError, TooLarge, UsageError
 from shm_daemon.web.frame import for_a_person, problem
 
 log = logging.getLogger(__name__)
@@ -37,6 +36,7 @@ _WORDS = {
     413: "The file is larger than is taken.",
     415: "The body is no plain file.",
     422: "A value cannot be used.",
+    429: "Too many wrong tokens came from this address; `Retry-After` says how long to wait.",
     503: "The store cannot be used now; `Retry-After` says when to try again.",
 }
 
@@ -59,7 +59,9 @@ class Refused(HTTPException):
 
 
 def answers(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The faults that a route documents."""
+    """The faults that a route documents; where it wants a token, that of many wrong ones too."""
+    if 401 in statuses:
+        statuses = (*statuses, 429)
     return {status: {"model": Fault, "description": _WORDS[status]} for status in statuses}
 
 

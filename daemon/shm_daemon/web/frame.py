@@ -19,6 +19,7 @@ from shm.report import words
 from shm.report.figures.style import PALETTE
 from shm.report.template import ENVIRONMENT as OF_REPORTS
 from shm.report.template import environment
+from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
 STATIC = Path(__file__).with_name("static")
@@ -45,6 +46,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
         bridge=site.workspace.bridge.name if visitor else "",
         open_alerts=_open_alerts(site) if visitor else None,
         here=request.url.path,
+        notices=notices(site) if visitor else (),
         **content,
     )  # fmt: skip
     return HTMLResponse(text, status)

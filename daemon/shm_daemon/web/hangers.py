@@ -11,6 +11,7 @@ from fastapi import APIRouter, Path
 from shm.documents import averaged_document
 from shm.errors import BadInput, NothingThere
 from shm.store import DeliveryState, Store, StoredWatch, TrendPoint, Workspace
+from shm.store.listing import of_readable
 from shm.values import Hanger
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
@@ -35,7 +36,7 @@ def status(site: AtSite, _: Reader) -> Any:
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
-        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
+        "recordings": store.stage_counts(),
         "spool": len(scan(workspace.spool)),
         "quarantine": quarantined(workspace),
         "open_alerts": store.alert_counts()[0],
@@ -82,7 +83,8 @@ def quarantined(workspace: Workspace) -> int:
 def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Of many hangers in as many questions as of one."""
     trends, baselines = store.latest_trends(hangers), store.baselines_in_force(hangers)
-    tests, watches, alerts = store.latest_tests(), store.latest_watches(), store.open_alert_counts()
+    tests, alerts = store.latest_tests(), store.open_alert_counts()
+    watches = of_readable(store.latest_watches, {})
     return [
         {
             "hanger": hanger.id,

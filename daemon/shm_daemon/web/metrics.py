@@ -1,90 +1,146 @@
-"""What Prometheus scrapes: made anew at each scrape, so that no process needs to keep counts."""
+"""What Prometheus scrapes: made anew at each scrape, so that no process needs to keep counts.
+
+It is made in parts. A part that fails is left out, counted in `shm_scrape_errors_total` and logged;
+the others answer, so that one odd row or folder never blinds those who watch.
+"""
 
 from __future__ import annotations
 
 import logging
 import shutil
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
 
 import numpy as np
 from prometheus_client import CollectorRegistry, generate_latest
-from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4 as CONTENT_TYPE
 from prometheus_client.registry import Collector
 
-from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm.store import Stage, Store
+from shm.store.measuring import ON_THE_WAY
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.site import Site
 
-__all__ = ["CONTENT_TYPE", "exposition"]
+__all__ = ["CONTENT_TYPE", "Exposition"]
 
 _LATELY = timedelta(hours=1)
 _QUANTILES = (0.5, 0.95, 1.0)
-_ENDED = (Stage.DONE, Stage.REFUSED)
 
 log = logging.getLogger(__name__)
 
 
-def exposition(site: Site) -> bytes:
-    """The page for Prometheus, in a registry of its own."""
-    registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Measured(site))
-    return generate_latest(registry)
+class Exposition:
+    """The page for Prometheus, and how often each part of it has failed since the beginning."""
+
+    def __init__(self, site: Site):
+        self._site = site
+        self._errors: Counter[str] = Counter(dict.fromkeys(["store", *_PARTS, *_OF_STORE], 0))
+        self._said: dict[str, str] = {}
+
+    def page(self) -> bytes:
+        """In a registry of its own, as text of Prometheus."""
+        registry = CollectorRegistry(auto_describe=False)
+        registry.register(_Measured(self._metrics))
+        return generate_latest(registry)
+
+    def _metrics(self) -> Iterator[Metric]:
+        for name, part in _PARTS.items():
+            yield from self._made(name, part)
+        up = self._made("store", _usable)
+        yield from up or [_store_up(is_up=False)]
+        if up:  # else each part would wait in vain for a server that is away
+            for name, part in _OF_STORE.items():
+                yield from self._made(name, part)
+        text = "How often a part of this page could not be made, since the interface began."
+        errors = CounterMetricFamily("shm_scrape_errors", text, labels=["part"])
+        for name, times in self._errors.items():
+            errors.add_metric([name], times)
+        yield errors
+
+    def _made(self, name: str, part: _Part) -> list[Metric]:
+        """A part as a whole; nothing where it fails, for whatever reason."""
+        try:
+            made = list(part(self._site))
+        except Exception as error:
+            self._errors[name] += 1
+            if self._said.get(name) != str(error):  # else a line at each scrape
+                self._said[name] = str(error)
+                log.exception("the part %s of /metrics cannot be made", name)
+            return []
+        self._said.pop(name, None)
+        return made
 
 
 class _Measured(Collector):
-    def __init__(self, site: Site):
-        self._site = site
+    def __init__(self, metrics: Callable[[], Iterator[Metric]]):
+        self._metrics = metrics
 
     def describe(self) -> list[Metric]:
         return []  # or registering would measure once more
 
     def collect(self) -> Iterator[Metric]:
-        looks = scan(self._site.workspace.spool)
-        changed_s = [look.modified_ns / 1e9 for look in looks.values()]
-        spooled_s = max(0.0, time.time() - min(changed_s)) if changed_s else 0.0
-        yield _gauge("shm_spool_files", "Files in the spool.", len(looks))
-        yield from self._folders()
-        try:
-            measured = list(_of_store(self._site.store, len(looks), spooled_s))
-        except ShmError as error:
-            log.error("%s", error)
-            measured = []
-        yield _gauge("shm_store_up", "Whether the store can be used.", float(bool(measured)))
-        yield from measured
-
-    def _folders(self) -> Iterator[Metric]:
-        workspace = self._site.workspace
-        text = "Refused files in the quarantine."
-        yield _gauge("shm_quarantined_files", text, quarantined(workspace))
-        free = shutil.disk_usage(workspace.folder).free
-        yield _gauge("shm_disk_free_bytes", "Room on the disk of the workspace.", free)
-        ago = seconds_since_beat(workspace)
-        if ago is not None:
-            text = "How long ago the daemon's loop last went round."
-            yield _gauge("shm_daemon_seen_seconds", text, ago)
+        return self._metrics()
 
 
-def _of_store(store: Store, spooled: int, spooled_s: float) -> Iterator[Metric]:
-    counts = store.stage_counts()
-    waiting = sum(n for stage, n in counts.items() if stage not in _ENDED)
+def _spool(site: Site) -> Iterator[Metric]:
+    files = len(scan(site.workspace.spool))
+    yield _gauge("shm_spool_files", "Files in the spool.", files)
+
+
+def _quarantine(site: Site) -> Iterator[Metric]:
+    text = "Refused files in the quarantine."
+    yield _gauge("shm_quarantined_files", text, quarantined(site.workspace))
+
+
+def _disk(site: Site) -> Iterator[Metric]:
+    free = shutil.disk_usage(site.workspace.folder).free
+    yield _gauge("shm_disk_free_bytes", "Room on the disk of the workspace.", free)
+
+
+def _daemon(site: Site) -> Iterator[Metric]:
+    ago = seconds_since_beat(site.workspace)
+    if ago is not None:
+        text = "How long ago the daemon's loop last went round."
+        yield _gauge("shm_daemon_seen_seconds", text, ago)
+
+
+def _usable(site: Site) -> Iterator[Metric]:
+    site.store.alert_counts()
+    yield _store_up(is_up=True)
+
+
+def _queue(site: Site) -> Iterator[Metric]:
+    looks, counts = scan(site.workspace.spool), site.store.stage_counts()
+    waiting = len(looks) + sum(counts[stage] for stage in ON_THE_WAY)
     text = "Files in the spool and recordings that are not through."
-    yield _gauge("shm_queue_length", text, spooled + waiting)
-    oldest, now = store.oldest_waiting(), utc_now()
-    waited_s = (now - oldest).total_seconds() if oldest else 0.0
+    yield _gauge("shm_queue_length", text, waiting)
+    changed_s = [time.time() - look.modified_ns / 1e9 for look in looks.values()]
+    oldest = site.store.oldest_waiting()
+    stored_s = [(utc_now() - oldest).total_seconds()] if oldest else []
     text = "How long the oldest of the queue has waited; 0 where it is empty."
-    yield _gauge("shm_queue_oldest_seconds", text, max(spooled_s, waited_s))
-    yield _labelled("shm_recordings", "Recordings at a stage.", "stage", counts)
-    alerts = dict(zip(("open", "acknowledged"), store.alert_counts(), strict=True))
-    yield _labelled("shm_alerts", "Alerts raised.", "state", alerts)
-    yield _labelled("shm_deliveries", "Alerts to hooks.", "state", store.delivery_counts())
-    lately = store.stage_seconds(now - _LATELY)
+    yield _gauge("shm_queue_oldest_seconds", text, max([0.0, *changed_s, *stored_s]))
+
+
+def _recordings(site: Site) -> Iterator[Metric]:
+    yield _labelled("shm_recordings", "Recordings at a stage.", "stage", site.store.stage_counts())
+
+
+def _alerts(site: Site) -> Iterator[Metric]:
+    counts = dict(zip(("open", "acknowledged"), site.store.alert_counts(), strict=True))
+    yield _labelled("shm_alerts", "Alerts raised.", "state", counts)
+
+
+def _deliveries(site: Site) -> Iterator[Metric]:
+    yield _labelled("shm_deliveries", "Alerts to hooks.", "state", site.store.delivery_counts())
+
+
+def _stages(site: Site) -> Iterator[Metric]:
+    lately = site.store.stage_seconds(utc_now() - _LATELY)
     text = "From the stage before to this one, over the last hour: quantiles."
     seconds = GaugeMetricFamily("shm_stage_seconds", text, labels=["stage", "quantile"])
     for stage, values in lately.items():
@@ -96,13 +152,32 @@ def _of_store(store: Store, spooled: int, spooled_s: float) -> Iterator[Metric]:
                     "stage", reached)  # fmt: skip
 
 
+_Part = Callable[[Site], Iterator[Metric]]
+_PARTS: Mapping[str, _Part] = {
+    "spool": _spool,
+    "quarantine": _quarantine,
+    "disk": _disk,
+    "daemon": _daemon,
+}
+_OF_STORE: Mapping[str, _Part] = {
+    "queue": _queue,
+    "recordings": _recordings,
+    "alerts": _alerts,
+    "deliveries": _deliveries,
+    "stages": _stages,
+}
+
+
+def _store_up(*, is_up: bool) -> Metric:
+    return _gauge("shm_store_up", "Whether the store can be used.", float(is_up))
+
+
 def _gauge(name: str, text: str, value: float) -> GaugeMetricFamily:
     return GaugeMetricFamily(name, text, value)
 
 
-def _labelled(name: str, text: str, label: str, values: object) -> GaugeMetricFamily:
+def _labelled(name: str, text: str, label: str, values: Mapping[str, int]) -> GaugeMetricFamily:
     family = GaugeMetricFamily(name, text, labels=[label])
-    assert isinstance(values, dict)
     for key, value in values.items():
-        family.add_metric([str(key)], value)
+        family.add_metric([key], value)
     return family

@@ -46,10 +46,12 @@ class RecordingStatus(BaseModel):
     file_name: str
     size_bytes: int
     received_at: datetime
-    stage: Literal["received", "identified", "updated", "watched", "done", "refused"]
+    stage: Literal["received", "identified", "updated", "watched", "done", "refused", "held"]
     hanger: int | None
     tests: list[TestLink] = Field(description="What came of it so far.")
-    reason: dict[str, Any] | None = Field(description="Why it was refused; null where it was not.")
+    reason: dict[str, Any] | None = Field(
+        description="Why it was refused or is held; null where it is not."
+    )
 
 
 class Recordings(BaseModel):
@@ -184,10 +186,23 @@ class Status(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether all is well; `reasons` says what is not."""
+    """Whether all is well; `reasons` says what is not. What is degraded works, not as described."""
 
-    status: Literal["ok", "failing"]
+    status: Literal["ok", "degraded", "failing"]
     reasons: list[str]
+    attention: list[str] = Field(
+        default=[], description="What a person should look at though nothing fails."
+    )
+
+
+class HeldRecording(BaseModel):
+    """A recording that counts in nothing until a person decides, and why."""
+
+    recording: int
+    file: str
+    hanger: int
+    held_at: datetime
+    message: str
 
 
 class RefusedFile(BaseModel):
@@ -209,6 +224,7 @@ class Operation(BaseModel):
     spool: int
     oldest_waiting_at: datetime | None
     deliveries: dict[str, int]
+    held: list[HeldRecording]
     quarantine: list[RefusedFile] = Field(description="The newest first, at most 100.")
     quarantined: int
     disk_free_bytes: int

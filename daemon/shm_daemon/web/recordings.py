@@ -14,8 +14,10 @@ from starlette.requests import ClientDisconnect
 from shm.documents import parse_time
 from shm.errors import BadInput, NothingThere
 from shm.store import Stage, Store, StoredRecording
-from shm_daemon.landing import Incoming, Landed, TooLarge, landing_name
+from shm.store.archive import refuse_oversize
+from shm_daemon.landing import Incoming, Landed, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.address import UPLOADS
 from shm_daemon.web.faults import Refused, answers
 from shm_daemon.web.models import Recordings, RecordingStatus, Uploaded
 from shm_daemon.web.test_address import test_page
@@ -30,7 +32,7 @@ _BODY = {
     }
 }
 
-router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+router = APIRouter(prefix=UPLOADS, tags=["recordings"])
 
 List = Annotated[str | None, Query(max_length=2000)]
 Number = Annotated[float | None, Query(allow_inf_nan=False)]
@@ -111,7 +113,7 @@ async def upload(
     finally:
         await run_in_threadpool(file.close)
     outcome = await run_in_threadpool(_outcome, site.store, landed)
-    status_url = f"/api/recordings/{landed.sha256}"
+    status_url = f"{UPLOADS}/{landed.sha256}"
     return Uploaded(
         sha256=landed.sha256,
         size_bytes=landed.size_bytes,
@@ -182,11 +184,7 @@ def _refuse_form(request: Request) -> None:
 
 def _refuse_large(request: Request, max_bytes: int) -> None:
     """Before a byte of it is sent, where the sender says how much it is and waits for our word."""
-    if int(request.headers.get("content-length", 0)) > max_bytes:
-        raise TooLarge(
-            f"more than {max_bytes} bytes are not taken.",
-            remedy="Send less at once, or raise the setting max_file_bytes.",
-        )
+    refuse_oversize(int(request.headers.get("content-length", 0)), max_bytes)
 
 
 def _land(
@@ -221,10 +219,12 @@ def _recording(store: Store, key: str) -> StoredRecording:
 
 
 def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
-    """The tests in force that came of a recording."""
+    """The tests in force that came of a recording, but for those that are held."""
     if recording.hanger is None:
         return []
-    names = [test.name for test in store.former_tests(recording.id) if test.superseded_at is None]
+    found = store.former_tests(recording.id)
+    shown = (each for each in found if each.stage is not Stage.HELD)
+    names = [test.name for test in shown if test.superseded_at is None]
     return [{"name": name, "page": test_page(recording.hanger, name)} for name in names]
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
+import os
+import resource
 import signal
 import ssl
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +23,10 @@ from shm_daemon.web.address import Address
 
 if TYPE_CHECKING:
     import uvicorn
-    from fastapi import FastAPI
+    from starlette.types import ASGIApp
 
 _HEADERS_BYTES = 16_384
-_REQUESTS_AT_ONCE = 64
+_OPEN_FILES = 8192
 _ENDING_S = 5
 
 log = logging.getLogger(__name__)
@@ -40,18 +44,36 @@ def serve(
     Raises UsageError where others could reach it and no token is in force, and where the extra
     `[web]` is not installed; BadInput where the certificate cannot be used.
     """
-    with needing("web"):
-        from shm_daemon.web.app import make_app
-        from shm_daemon.web.warming import warm_up
+    refuse_uninstalled()
     refuse_unguarded(workspace, address)
-    refuse_useless(certificate, key)
+    context = context_of(certificate, key)
     announce()
     if not address.is_loopback and certificate is None:
         log.warning("tokens and data go over the network in clear: give --certificate and --key")
-    app = make_app(workspace, address)
-    threading.Thread(target=warm_up, args=(app,), name="warm-up", daemon=True).start()
+    _allow_connections()
+    app = make_app(workspace, address, warms_up=True)
     with ending_in_order():
-        make_server(app, address, certificate, key).run()
+        make_server(app, address, context).run()
+
+
+def make_app(
+    workspace: Workspace, address: Address | None = None, *, warms_up: bool = False
+) -> ASGIApp:
+    """The interface of one workspace, as it listens at `address` (by default this machine only).
+
+    It answers `/health` at once and loads its pages beside.
+    """
+    from shm_daemon.web.around import Around
+    from shm_daemon.web.front import Front, Pages
+    from shm_daemon.web.site import Description, Site
+
+    def load() -> Pages:
+        from shm_daemon.web.app import load_pages
+
+        return load_pages(site)
+
+    site = Site(Description(workspace), address or Address())
+    return Around(Front(site, load, warms_up=warms_up), site)
 
 
 @contextmanager
@@ -69,44 +91,88 @@ def ending_in_order() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+@contextmanager
+def leaving() -> Iterator[None]:
+    """Ends the process with the context, without taking Python apart: a thread that is still at
+    work, loading pages or writing a line of the log, would have that end in a fatal error.
+
+    What is raised but an exit goes on as it would without.
+    """
+    code = 0
+    try:
+        yield
+    except KeyboardInterrupt:
+        code = 128 + signal.SIGINT
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 0
+    logging.shutdown()
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)
+
+
 def make_server(
-    app: FastAPI, address: Address, certificate: Path | None = None, key: Path | None = None
+    app: ASGIApp, address: Address, certificate: ssl.SSLContext | None = None
 ) -> uvicorn.Server:
     """A server that limits what a caller may take, and tells little of itself and of callers."""
     import uvicorn
+
+    from shm_daemon.web.connections import Door, guarded_by
 
     config = uvicorn.Config(
         app,
         host=address.host,
         port=address.port,
-        ssl_certfile=certificate,
-        ssl_keyfile=key,
+        http=guarded_by(Door(certificate)),
+        ws="none",
+        loop="asyncio",
         log_config=None,
         access_log=False,  # ours tells less: no queries, in which people put secrets
         server_header=False,
         proxy_headers=False,
         h11_max_incomplete_event_size=_HEADERS_BYTES,
-        limit_concurrency=_REQUESTS_AT_ONCE,
         timeout_graceful_shutdown=_ENDING_S,
     )
     logging.getLogger("uvicorn.access").disabled = True
     return uvicorn.Server(config)
 
 
-def refuse_useless(certificate: Path | None, key: Path | None) -> None:
-    """Raises BadInput where a certificate cannot be used, UsageError for a key without one."""
+def context_of(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
+    """What HTTPS is served with; None where no certificate is given.
+
+    Raises BadInput where it cannot be used, UsageError for a key without one.
+    """
     if certificate is None:
         if key is not None:
             raise UsageError("--key is of no use alone.", remedy="Give its --certificate as well.")
-        return
+        return None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+        context.load_cert_chain(certificate, key)
     except OSError as error:  # of which ssl.SSLError is a kind
         raise BadInput(
             "it holds no certificate with a key that fits.",
             file=certificate,
             remedy="Give both as PEM files, with --certificate and --key.",
         ) from error
+    return context
+
+
+def refuse_uninstalled() -> None:
+    """Raises UsageError where the extra `[web]` is not installed; loads nothing of it."""
+    with needing("web"):
+        for name in ("fastapi", "plotly", "prometheus_client", "uvicorn"):
+            if find_spec(name) is None:
+                raise ImportError(f"No module named {name!r}", name=name)
+
+
+def _allow_connections() -> None:
+    """As many open files as we may have: a burst of callers is let in before it is sorted out."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _OPEN_FILES if most == resource.RLIM_INFINITY else min(most, _OPEN_FILES)
+    if resource.getrlimit(resource.RLIMIT_NOFILE)[0] < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def refuse_unguarded(workspace: Workspace, address: Address) -> None:

@@ -9,6 +9,7 @@ from fastapi.responses import RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
 from shm_daemon.web.access import COOKIE, AtSite, refuse_foreign, token_in_force
+from shm_daemon.web.around import is_https
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import page
 
@@ -31,12 +32,17 @@ async def sign_in(request: Request, site: AtSite) -> Response:
     told = await _form(request)
     secret, wanted = told.get("token", "").strip(), told.get("next", "/")
     try:
-        await run_in_threadpool(token_in_force, site, secret)
+        await run_in_threadpool(token_in_force, request, site, secret)
     except Refused as refused:
         return _ask(request, wanted, refused.status_code, refused.detail)
     answer = RedirectResponse(_ours(wanted), 303)
     answer.set_cookie(
-        COOKIE, secret, max_age=_KEPT_S, httponly=True, samesite="strict", secure=_is_https(request)
+        COOKIE,
+        secret,
+        max_age=_KEPT_S,
+        httponly=True,
+        samesite="strict",
+        secure=is_https(request.scope),
     )
     return answer
 
@@ -46,7 +52,7 @@ def sign_out(request: Request) -> Response:
     """Takes the cookie back."""
     refuse_foreign(request)
     answer = RedirectResponse("/sign-in", 303)
-    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=_is_https(request))
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=is_https(request.scope))
     return answer
 
 
@@ -64,11 +70,6 @@ def _ours(wanted: str) -> str:
     """An address of this site: nobody is sent elsewhere after signing in."""
     plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
-
-
-def _is_https(request: Request) -> bool:
-    """A proxy's word is enough: to believe it only makes the cookie stricter."""
-    return "https" in (request.url.scheme, request.headers.get("x-forwarded-proto", ""))
 
 
 async def _form(request: Request) -> dict[str, str]:

@@ -105,7 +105,7 @@ def test(_: Reader, view: View) -> Any:
         "notes": list(stored.notes),
         "responses": [point.name for point in response.points] if response else [],
         "file": _file(view),
-        "lineage": asdict(stored.lineage),
+        "lineage": stored.lineage.columns,
         "steps": [{"stage": s.stage, "at": s.at, "version": s.version} for s in steps_of(view)],
         "superseded": _superseded(view),
         "previous": before,
@@ -145,7 +145,7 @@ def _superseded(view: TestView) -> list[dict[str, Any]]:
 
 
 def _ended(former: FormerTest | FormerPosterior) -> dict[str, Any]:
-    return {"superseded_at": former.superseded_at, "lineage": asdict(former.lineage)}
+    return {"superseded_at": former.superseded_at, "lineage": former.lineage.columns}
 
 
 def _known(row: dict[str, Any]) -> dict[str, Any]:

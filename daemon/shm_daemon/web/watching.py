@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import logging
-import os
-from datetime import timedelta
 from typing import Any
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
-from shm.errors import ShmError
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.metrics import CONTENT_TYPE, exposition
+from shm_daemon.web.front import HEALTH, METRICS
+from shm_daemon.web.health import health_document
+from shm_daemon.web.metrics import CONTENT_TYPE, Exposition
 from shm_daemon.web.models import Health
-from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["watching"])
-log = logging.getLogger(__name__)
 
 
 @router.get(
-    "/health",
+    HEALTH,
     response_model=Health,
     responses={
         **answers(400),
@@ -33,19 +27,16 @@ log = logging.getLogger(__name__)
     summary="Whether all is well",
 )
 def health(site: AtSite) -> Any:
-    """Needs no token and tells no secrets: for load balancers and service managers."""
-    reasons = troubles(site)
-    found = Health(status="failing" if reasons else "ok", reasons=reasons)
-    return JSONResponse(found.model_dump(), 503) if reasons else found
+    """Needs no token and tells no secrets: for load balancers and service managers.
 
-
-def troubles(site: Site) -> list[str]:
-    """Why work stands still; empty where all is well."""
-    return [*_store(site), *_spool(site), *_daemon(site)]
+    What works, though not as it is described now, is `degraded` and answers 200.
+    """
+    status, document = health_document(site)  # `front` has answered already, where it stands before
+    return JSONResponse(document, status)
 
 
 @router.get(
-    "/metrics",
+    METRICS,
     response_class=Response,
     responses={
         200: {"content": {CONTENT_TYPE: {"schema": {"type": "string"}}}},
@@ -53,30 +44,10 @@ def troubles(site: Site) -> list[str]:
     },
     summary="Metrics for Prometheus",
 )
-def metrics(site: AtSite, _: Reader) -> Response:
-    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out."""
-    return Response(exposition(site), headers={"Content-Type": CONTENT_TYPE})
-
-
-def _store(site: Site) -> list[str]:
-    try:
-        site.store.stage_counts()
-    except ShmError as error:
-        log.error("%s", error)
-        return ["The store cannot be used."]
-    return []
-
-
-def _spool(site: Site) -> list[str]:
-    if os.access(site.workspace.spool, os.W_OK | os.X_OK):
-        return []
-    return ["The spool cannot be written."]
-
-
-def _daemon(site: Site) -> list[str]:
-    ago = seconds_since_beat(site.workspace)
-    if ago is None:
-        return ["The daemon has never run here."]
-    if ago > patience_s(site.workspace):
-        return [f"The daemon was last seen {told(timedelta(seconds=ago))} ago."]
-    return []
+def metrics(request: Request, _: Reader) -> Response:
+    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
+    `shm_scrape_errors_total` counts what could not be told.
+    """
+    exposition = request.app.state.exposition
+    assert isinstance(exposition, Exposition)
+    return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

@@ -7,7 +7,7 @@ caller's process: for a person's own files in a notebook they save the second th
 costs.
 """
 
-from shm.read.apart.door import load_modes, peek_test, read_test
+from shm.read.apart.door import load_modes, missing_bounds, peek_test, read_test
 from shm.read.limits import Limits
 
-__all__ = ["Limits", "load_modes", "peek_test", "read_test"]
+__all__ = ["Limits", "load_modes", "missing_bounds", "peek_test", "read_test"]

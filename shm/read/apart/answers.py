@@ -1,7 +1,8 @@
 """Values through a pipe: a header in JSON, then the bytes of arrays; never a pickle.
 
-An answer is eight bytes of length, the header {"refused", "found", "arrays": [[dtype, shape]]}, and
-the arrays one after the other. In the header an array is {"array": place}. The side that receives
+An answer is a sign that the child is confined, eight bytes of length, the header {"refused",
+"found", "arrays": [[dtype, shape]]}, and the arrays one after the other. In the header an array is
+{"array": place}. The side that receives
 checks every type against the fields of the value that it expects.
 """
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 
+BEGUN = b"+"
 LENGTH_BYTES = 8
 LARGEST_HEADER = 1 << 25
 _DTYPES = ("<f8", "<c16")

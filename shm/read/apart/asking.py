@@ -20,8 +20,9 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput, ShmError, WorkerDied
 from shm.read.apart.answers import (
+    BEGUN,
     LARGEST_HEADER,
     LENGTH_BYTES,
     Answer,
@@ -30,6 +31,7 @@ from shm.read.apart.answers import (
     header_of,
 )
 from shm.read.limits import Limits
+from shm.resources import KILLING
 
 ARRAYS_AT_ONCE = 2
 """The arrays of an answer may be so many times what is read at once."""
@@ -37,6 +39,7 @@ WALL_SECONDS = 3.0
 """A child may take so many times its processor time: beyond, it waits for something."""
 _GRACE_S = 5.0
 _START_S = 120.0
+_UNCONFINED_S = 60.0
 _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from shm.read.apart.serving import serve; serve()"
@@ -86,6 +89,7 @@ class _Reader:
         ours, theirs = socket.socketpair()
         environment = {name: os.environ[name] for name in _KEPT if name in os.environ}
         environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        environment["HDF5_USE_FILE_LOCKING"] = "FALSE"  # nobody writes what is archived
         paths = json.dumps([str(Path(each).absolute()) for each in sys.path])
         with theirs:
             self.process = subprocess.Popen(  # noqa: S603 - our own program
@@ -126,7 +130,7 @@ class _Reader:
             found = _received(pipe, request)
         status = self._status()
         if found is None:
-            raise _death(status, request)
+            raise _death(status, request, pipe.begun)
         return found
 
     def _status(self) -> int:
@@ -154,13 +158,14 @@ def _kill_session(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Pipe:
-    """The end of a pipe that is read until a deadline."""
+    """The end of a pipe that is read until a deadline; `begun` once the child is confined."""
 
     descriptor: int
     deadline: float
     request: Request
+    begun: bool = False
 
     def bytes(self, count: int) -> bytearray:
         """So many bytes, or fewer where the child ends before; raises BadInput when time is up."""
@@ -182,11 +187,12 @@ class _Pipe:
         poll = select.poll()
         poll.register(self.descriptor, select.POLLIN | select.POLLHUP)
         if left <= 0 or not poll.poll(1000 * left):
-            raise _death(-signal.SIGALRM, self.request)
+            raise _death(-signal.SIGALRM, self.request, self.begun)
 
 
 def _received(pipe: _Pipe, request: Request) -> Answer | None:
     """A whole answer within the limits, or None; raises BadInput when time is up."""
+    pipe.begun = pipe.bytes(len(BEGUN)) == BEGUN
     length = int.from_bytes(pipe.bytes(LENGTH_BYTES), "little")
     if not 0 < length <= LARGEST_HEADER:
         return None
@@ -204,13 +210,23 @@ def _received(pipe: _Pipe, request: Request) -> Answer | None:
         return None
 
 
-def _death(status: int, request: Request) -> BadInput:
-    """Why a child gave no answer."""
+def _death(status: int, request: Request, begun: bool) -> ShmError:
+    """Why a child gave no answer: a file is not to blame before it was opened."""
     seconds = request.limits.parse_seconds
     if status in (-signal.SIGXCPU, -signal.SIGALRM):
         what = f"takes more than {seconds:g} s to read."
         remedy = f"{_DAMAGED} Split a long record, or raise the setting parse_seconds."
         return BadInput(what, file=request.path, remedy=remedy)
+    if -status in KILLING:
+        how = signal.Signals(-status).name
+        what = f"the process that read {Path(request.path).name} was killed ({how})."
+        return WorkerDied(what, how=how, from_outside=True)
+    if not begun:
+        return ShmError(
+            "the process that reads files cannot be confined, so that nothing is read.",
+            remedy="See `shm doctor`; it is tried again.",
+            retry_after_s=_UNCONFINED_S,
+        )
     how = signal.Signals(-status).name if status < 0 else f"exit code {status}"
     return BadInput(f"the file made the reader crash ({how}).", file=request.path, remedy=_DAMAGED)
 

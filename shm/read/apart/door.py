@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -47,6 +48,15 @@ def load_modes(path: Path, limits: Limits | None = None) -> tuple[ModalTest, ...
     """The tests of a `*.modes.json`, as `shm.documents.load_modes` gives them; raises BadInput."""
     answer = _answer("load_modes", path, limits or Limits())
     return parse_modes(answer.found, path)
+
+
+def missing_bounds() -> dict[str, str]:
+    """The bounds of reading that are not in force on this system, by name, and why.
+
+    Raises ShmError where one that this system knows could not be put in force.
+    """
+    found = _answer("missing_bounds", Path(os.devnull), Limits()).found
+    return {str(name): str(why) for name, why in dict(found).items()}
 
 
 def _answer(verb: str, path: Path, limits: Limits) -> Answer:

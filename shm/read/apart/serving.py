@@ -12,7 +12,6 @@ import os
 import signal
 import socket
 import struct
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -21,10 +20,11 @@ from typing import Any
 from shm.documents import dump
 from shm.errors import BadInput, ShmError
 from shm.modes_document import load_modes, modes_document
-from shm.read.apart.answers import LARGEST_HEADER, encoded, refusal_as_value
+from shm.read.apart.answers import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.apart.asking import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.apart.confinement import Confinement, confine, pythons_own
 from shm.read.limits import Limits, limited, limits, too_large
+from shm.read.packed import unpacking_in
 from shm.read.sidecar import sidecar_path
 from shm.read.whole_test import peek_test, read_test
 
@@ -60,8 +60,7 @@ def _read_and_end(requests: socket.socket, message: bytes, out: int) -> None:
         signal.setitimer(signal.ITIMER_REAL, WALL_SECONDS * allowed.parse_seconds)
         os.chdir(request["working_folder"])
         path, folder = Path(request["path"]), request["folder"]
-        tempfile.tempdir = folder or None
-        confine(
+        missing = confine(
             Confinement(
                 readable=(path, sidecar_path(path)),
                 folder=Path(folder) if folder else None,
@@ -71,8 +70,10 @@ def _read_and_end(requests: socket.socket, message: bytes, out: int) -> None:
             ),
             keep=out,
         )
-        with limited(allowed):
-            _write_answer(_VERBS[request["verb"]], path, out)
+        os.write(out, BEGUN)
+        verb = _VERBS.get(request["verb"]) or (lambda _: missing)
+        with limited(allowed), unpacking_in(Path(folder) if folder else None):
+            _write_answer(verb, path, out)
         code = 0
     finally:
         os._exit(code)

@@ -63,4 +63,6 @@ def _with_address(alert: AlertRow) -> dict[str, Any]:
     """An alert that only tries a hook is of no test."""
     is_trial = "test" in alert.kinds
     address = None if is_trial else test_page(alert.hanger, alert.test)
+    if "held" in alert.kinds:  # what is held has no page of its own
+        address = "/operation#held"
     return {**alert_document(alert), "address": address}

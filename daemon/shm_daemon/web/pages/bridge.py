@@ -13,7 +13,7 @@ from shm.pipeline import utc_now
 from shm.report import Interval, words
 from shm.report.bridge.content import hangers_unit
 from shm.values.force_units import ForceUnit
-from shm_daemon.doctor.contract import told
+from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_drawing import CLASSES, elevation, shift_words, triangles
 from shm_daemon.web.bridge_view import (
@@ -25,6 +25,7 @@ from shm_daemon.web.bridge_view import (
 )
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
+from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import BridgeState, Moved, Underway
 from shm_daemon.web.test_address import test_page
 
@@ -47,6 +48,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         "bridge.html.j2",
         view=bridge,
         facts=_facts(bridge, now),
+        held=held_documents(site),
         drawing=elevation(bridge.hangers) if bridge.hangers else None,
         legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
         moved=found.sentence if found else None,

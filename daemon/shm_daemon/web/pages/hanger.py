@@ -24,6 +24,7 @@ from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
 from shm_daemon.web.hanger_tests import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.held import held_documents
 from shm_daemon.web.working_out import workshop_of
 
 router = APIRouter(include_in_schema=False)
@@ -71,6 +72,7 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
         "tests": rows[:_LATEST_TESTS],
         "test_headings": headings(view),
         "has_more": len(rows) > _LATEST_TESTS,
+        "held": held_documents(site, one.id),
     }
     if view.report is None:
         return page(request, "hanger_untested.html.j2", **common)

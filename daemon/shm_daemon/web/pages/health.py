@@ -19,18 +19,18 @@ from shm.documents import parse_time
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.report import Table, words
-from shm.store import DeliveryState, Stage, Workspace
+from shm.store import ENDED, DeliveryState, Workspace
 from shm_daemon.doctor import Finding, Level, examine
-from shm_daemon.doctor.contract import told
-from shm_daemon.heartbeat import seconds_since_beat
+from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
+from shm_daemon.web.health import troubles
+from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import Examination, Operation, Underway
 from shm_daemon.web.site import Site
-from shm_daemon.web.watching import troubles
 from shm_daemon.web.working_out import workshop_of
 
 router = APIRouter(tags=["operation"])
@@ -52,7 +52,9 @@ _STAGES = {
     "watched": "watched, wait for their alerts to be sent",
     "done": "through",
     "refused": "refused",
+    "held": "implausible: counts in nothing until a person decides",
 }
+_OTHER_STAGE = "at a stage that this version of shm does not know"
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,11 @@ def _operation(site: Site) -> dict[str, Any]:
         "troubles": troubles(site),
         "daemon": workspace.holder(),
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
-        "recordings": {stage.value: n for stage, n in store.stage_counts().items()},
+        "recordings": store.stage_counts(),
         "spool": len(scan(workspace.spool)),
         "oldest_waiting_at": store.oldest_waiting(),
-        "deliveries": {state.value: n for state, n in store.delivery_counts().items()},
+        "held": held_documents(site),
+        "deliveries": store.delivery_counts(),
         "quarantine": _refused(workspace),
         "quarantined": quarantined(workspace),
         "disk_free_bytes": disk.free,
@@ -176,7 +179,7 @@ def _modified_ns(path: Path) -> int:
 
 def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
     seen_s, counts = state["daemon_seen_seconds_ago"], state["recordings"]
-    ended = counts[Stage.DONE] + counts[Stage.REFUSED]
+    ended = sum(counts[stage] for stage in ENDED)
     under_way = sum(counts.values()) - ended
     owed = state["deliveries"]
     return [
@@ -213,7 +216,7 @@ def _since(oldest: datetime | None) -> str:
 
 
 def _stages(counts: dict[str, int]) -> Table:
-    rows = tuple((name, str(n), _STAGES[name]) for name, n in counts.items())
+    rows = tuple((name, str(n), _STAGES.get(name, _OTHER_STAGE)) for name, n in counts.items())
     return Table("Recordings by stage", ("stage", "recordings", "what that means"), rows)
 
 

@@ -1,0 +1,184 @@
+"""Who may keep a connection: callers that say what they want, soon.
+
+Uvicorn counts connections, not requests, and sets no deadline to a caller that connects and falls
+silent, or drips in a byte at a time. Here a connection *waits* until its request has come as a
+whole, and again once that is answered. Who waits too long is cut off; where too many wait, those
+that have waited longest make room, first of the same address, so that a new caller always gets in.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import logging
+import socket
+import ssl
+import struct
+import termios
+from array import array
+from collections import defaultdict
+from contextlib import suppress
+from typing import Any, ClassVar
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from shm_daemon.web.address import network_of
+from shm_daemon.web.front import is_upload
+
+DEADLINE_S = 10.0
+"""From the first moment to the last byte of a request that is no upload; also for TLS to begin."""
+FROM_AN_ADDRESS = 64
+"""So many may wait from one address: a browser holds six, a proxy keeps some tens open."""
+FROM_ALL = 256
+_LEAST_PROGRESS_BYTES = 10_000
+"""Who takes this much of a long answer before each deadline may take it to the end."""
+
+log = logging.getLogger(__name__)
+
+
+class Door:
+    """All connections that wait, by address, in the order in which they began to."""
+
+    def __init__(self, certificate: ssl.SSLContext | None = None):
+        self.certificate = certificate
+        self._waiting: dict[Guarded, str] = {}
+        self._of_address: defaultdict[str, dict[Guarded, None]] = defaultdict(dict)
+
+    def waits(self, one: Guarded, address: str) -> None:
+        """A connection waits; where too many do, the one that has waited longest is cut off."""
+        same = self._of_address[address]
+        self._waiting[one], same[one] = address, None
+        if len(same) > FROM_AN_ADDRESS:
+            self._cut_off(next(iter(same)))
+        elif len(self._waiting) > FROM_ALL:
+            self._cut_off(next(iter(self._waiting)))
+
+    def leaves(self, one: Guarded) -> None:
+        """It waits no longer: it is answered, or gone."""
+        address = self._waiting.pop(one, None)
+        if address is None:
+            return
+        same = self._of_address[address]
+        del same[one]
+        if not same:
+            del self._of_address[address]
+
+    def _cut_off(self, one: Guarded) -> None:
+        self.leaves(one)
+        one.cut_off()
+
+
+class Guarded(H11Protocol):
+    """One connection; `door` is that of its server."""
+
+    door: ClassVar[Door]
+
+    def __init__(self, *args: Any, **options: Any):
+        super().__init__(*args, **options)
+        self._plain: asyncio.Transport | None = None
+        self._early = b""
+        self._deadline: asyncio.TimerHandle | None = None
+        self._unsent_bytes = 0
+        self._address = ""
+        self._beginning: asyncio.Task[None] | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        self._plain = transport
+        self._address = _address(transport)
+        self._wait()
+        if self.door.certificate is None:
+            super().connection_made(transport)
+            return
+        transport.pause_reading()
+        self._beginning = self.loop.create_task(self._begin_tls(transport, self.door.certificate))
+
+    async def _begin_tls(self, transport: asyncio.Transport, context: ssl.SSLContext) -> None:
+        """Here and not in asyncio, which waits for a minute and lets nobody count meanwhile."""
+        try:
+            secured = await self.loop.start_tls(
+                transport, self, context, server_side=True, ssl_handshake_timeout=DEADLINE_S
+            )
+        except OSError as error:  # of which ssl.SSLError is a kind
+            log.debug("TLS could not begin: %s", error)
+            secured = None
+        if secured is None:
+            transport.abort()
+            return
+        super().connection_made(secured)
+        if self._early:
+            self.data_received(self._early)
+
+    def data_received(self, data: bytes) -> None:
+        if self.flow is None:  # TLS has just begun
+            self._early += data
+            return
+        super().data_received(data)
+        self._look()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        self._look()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop_waiting()
+        if self.flow is not None:
+            super().connection_lost(exc)
+
+    def cut_off(self) -> None:
+        """Ends it without a word: who does not ask is not answered."""
+        self._stop_waiting()
+        if self._plain is not None:
+            # Else the system would keep what is unsent, and try for minutes to deliver it.
+            self._plain.get_extra_info("socket").setsockopt(
+                socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)
+            )
+            self._plain.abort()
+
+    def _look(self) -> None:
+        """Whether it waits, or is being answered."""
+        cycle = self.cycle
+        asked = cycle is not None and not cycle.response_complete
+        if asked and (not cycle.more_body or is_upload(self.scope)):
+            self._stop_waiting()
+        elif self._deadline is None and not self.transport.is_closing():
+            self._wait()
+
+    def _wait(self) -> None:
+        self._deadline = self.loop.call_later(DEADLINE_S, self._overdue)
+        self.door.waits(self, self._address)
+
+    def _stop_waiting(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+        self.door.leaves(self)
+
+    def _overdue(self) -> None:
+        """Time is over, unless a long answer is still being taken."""
+        before, self._unsent_bytes = self._unsent_bytes, self._unsent()
+        is_taken = self._unsent_bytes > 0 and (
+            before == 0 or before - self._unsent_bytes >= _LEAST_PROGRESS_BYTES
+        )
+        if is_taken:
+            self._deadline = self.loop.call_later(DEADLINE_S, self._overdue)
+        else:
+            self.cut_off()
+
+    def _unsent(self) -> int:
+        """What the caller has yet to take, with what the system keeps for them."""
+        if self.transport is None or self._plain is None:
+            return 0
+        kept = array("i", [0])
+        with suppress(OSError):  # another system may not tell
+            fcntl.ioctl(self._plain.get_extra_info("socket").fileno(), termios.TIOCOUTQ, kept)
+        return self.transport.get_write_buffer_size() + kept[0]
+
+
+def guarded_by(door: Door) -> type[Guarded]:
+    """The protocol of a server with that door."""
+    return type("Guarded", (Guarded,), {"door": door})
+
+
+def _address(transport: asyncio.BaseTransport) -> str:
+    peer = transport.get_extra_info("peername")
+    return network_of(str(peer[0])) if isinstance(peer, tuple) else ""

@@ -1,0 +1,148 @@
+"""Whether all is well: what stops the work, and what only limits it.
+
+`/health` answers for load balancers and service managers even while the pages are being loaded, so
+that nothing here may import what they need.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+from shm.errors import ShmError
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
+from shm_daemon.web.site import Site
+
+log = logging.getLogger(__name__)
+
+
+def health_document(site: Site) -> tuple[int, dict[str, Any]]:
+    """The answer of `/health`: its status and its document.
+
+    Who is degraded still works: only who fails answers 503.
+    """
+    failing, degraded = troubles(site), limits(site)
+    status = "failing" if failing else "degraded" if degraded else "ok"
+    document = {"status": status, "reasons": [*failing, *degraded], "attention": attention(site)}
+    return 503 if failing else 200, document
+
+
+def troubles(site: Site) -> list[str]:
+    """Why work stands still; empty where all is well."""
+    return _found(site, _store, _spool, _daemon)
+
+
+def limits(site: Site) -> list[str]:
+    """Why work goes on otherwise than it is described; empty where all is well."""
+    return _found(site, _description, _strangers)
+
+
+def attention(site: Site) -> list[str]:
+    """What a person should look at though nothing fails."""
+    return _found(site, _held)
+
+
+@dataclass(frozen=True)
+class Notice:
+    """What every page says at its top: a state in a sentence, and what to do."""
+
+    state: str
+    action: str
+
+
+def notices(site: Site) -> list[Notice]:
+    """What limits the work, with its remedy; a page is shown whatever befalls this."""
+    try:
+        return [*_of_description(site), *_of_strangers(site)]
+    except Exception:
+        log.exception("the notices of a page cannot be made")
+        return []
+
+
+def _of_description(site: Site) -> list[Notice]:
+    fault = site.fault
+    if fault is None:
+        return []
+    where = fault.where or "bridge.toml"
+    message = fault.message.replace(str(site.workspace.folder), "the workspace")
+    state = f"{where}: {message} The description before is still in force."
+    return [Notice(state, fault.remedy or "Correct the file; `shm doctor` looks at it again.")]
+
+
+def _of_strangers(site: Site) -> list[Notice]:
+    try:
+        tested = set(site.store.latest_tests())
+    except ShmError:
+        return []  # told as a trouble
+    missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
+    if not missing:
+        return []
+    named = ", ".join(map(str, missing[:5])) + (" and others" if missing[5:] else "")
+    return [
+        Notice(
+            f"bridge.toml: hanger {named} is not described, though tests of it are stored.",
+            f"Add its table `[[hanger]]` with `id = {missing[0]}` to bridge.toml.",
+        )
+    ]
+
+
+def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:
+    return [reason for check in checks for reason in _looked_at(site, check)]
+
+
+def _looked_at(site: Site, check: Callable[[Site], list[str]]) -> list[str]:
+    """Whatever befalls one check, the others answer, and so does `/health`."""
+    try:
+        return check(site)
+    except Exception:
+        log.exception("a check of /health failed")
+        return [f"The check of the {check.__name__.strip('_')} failed; the log says more."]
+
+
+def _store(site: Site) -> list[str]:
+    try:
+        site.store.alert_counts()
+        damage = site.store.known_damage()
+    except ShmError as error:
+        log.error("%s", error)
+        return ["The store cannot be used."]
+    of_hangers = sorted({each.hanger for each in damage if each.hanger is not None})
+    stopped = [f"Hanger {hanger} stands still: a row of it is damaged." for hanger in of_hangers]
+    return [*stopped, *(["A row of the store is damaged."] if damage and not stopped else [])]
+
+
+def _spool(site: Site) -> list[str]:
+    if os.access(site.workspace.spool, os.W_OK | os.X_OK):
+        return []
+    return ["The spool cannot be written."]
+
+
+def _daemon(site: Site) -> list[str]:
+    ago = seconds_since_beat(site.workspace)
+    if ago is None:
+        return ["The daemon has never run here."]
+    if ago > patience_s(site.workspace):
+        return [f"The daemon was last seen {told(timedelta(seconds=ago))} ago."]
+    return []
+
+
+def _held(site: Site) -> list[str]:
+    try:
+        number = len(site.store.holds())
+    except ShmError:
+        return []  # told as a trouble
+    if not number:
+        return []
+    return [f"{number} recording{' is' if number == 1 else 's are'} held until a person decides."]
+
+
+def _description(site: Site) -> list[str]:
+    return [notice.state for notice in _of_description(site)]
+
+
+def _strangers(site: Site) -> list[str]:
+    return [notice.state for notice in _of_strangers(site)]

@@ -1,0 +1,211 @@
+"""Whether the signals of a test can be what their channels say: "right unit?", "right channel?".
+
+A hit's impulse J (N s) over the velocity v (m/s) with which the hanger swings right after it is a
+mass: v is that of some N modes, each J/(M/2) times its shape at hammer and sensor, so that J/v lies
+near the hanger's mass M, whatever tension and ends. A unit that is wrong by 1000 puts it at grams
+or kilotonnes. A hammer's signal is over when it has left the bar, an accelerometer's rings on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from shm.identify.measuring.hits import Pulse, find_pulses
+from shm.values import NAN, Channel, FloatArray, Hanger, Recording
+
+PEAK_FORCE_N = 10.0, 50e3
+PEAK_ACCELERATION_M_S2 = 1e-3, 1e4
+"""From a tap with a pencil to a sledge; from the noise of a seismic sensor to a shock sensor."""
+
+MASS_OVER_DESCRIBED = 0.02, 50.0
+"""J/v over the hanger's mass: 0.3 to 2.7 in 120 tests of tests/benchmarks/right_signals.py, widened
+by more than 15 for sensors near a node, hits that slip and parts that nobody described."""
+
+MASS_OVER_EARLIER = 5.0
+"""Factor between J/v of one crew's tests of a hanger; 9.81 is that of g for m/s^2."""
+
+SENSORS_APART = 100.0
+"""Factor between the velocities of sensors of one plane, at places that a crew reaches."""
+
+RINGS_MORE = 2.0
+"""Factor of the ringing after the largest excursion: of accelerometers 4.9 times and more that
+of a hammer, double hits included (40 tests of tests/benchmarks/right_signals.py)."""
+
+_AFTER_S, _RING_S = 0.02, 0.5
+_LOWEST_HZ, _HIGHEST_HZ = 2.0, 200.0
+
+
+@dataclass(frozen=True)
+class SignalDoubt:
+    """That a channel is not what it says; `text` is for a person."""
+
+    kind: Literal["unit", "channels"]
+    channel: str
+    text: str
+
+
+def signal_doubts(
+    records: Sequence[Recording],
+    hanger: Hanger | None = None,
+    earlier_masses_kg: Sequence[float] = (),
+) -> tuple[SignalDoubt, ...]:
+    """What is doubtful of the records of one test; none where nobody hit.
+
+    `earlier_masses_kg` are `apparent_mass_kg` of earlier accepted tests of the hanger.
+    """
+    found: dict[tuple[str, str], SignalDoubt] = {}
+    for record in records:
+        swapped = _not_a_hammer(record)
+        for doubt in swapped or _units(record, hanger, earlier_masses_kg):
+            found.setdefault((doubt.kind, doubt.channel), doubt)
+    return tuple(found.values())
+
+
+def apparent_mass_kg(record: Recording) -> float:
+    """J/v by the sensor that moves most, the median over the hits; NaN where there is no hit."""
+    velocities = _velocities(record)
+    if not len(velocities):
+        return NAN
+    fastest = float(velocities.max())
+    return 1 / fastest if fastest > 0 else math.inf
+
+
+def _units(
+    record: Recording, hanger: Hanger | None, earlier_kg: Sequence[float]
+) -> list[SignalDoubt]:
+    odd = _unlike_its_neighbours(record)
+    if odd:
+        return odd
+    outside = [d for c in record.channels for d in _outside_bounds(c)]
+    if outside or record.force is None:
+        return outside
+    mass_kg = apparent_mass_kg(record)
+    known = [each for each in earlier_kg if math.isfinite(each)]
+    if math.isnan(mass_kg):
+        return []
+    if known:
+        usual, factor = float(np.median(known)), MASS_OVER_EARLIER
+        low, high, whose = usual / factor, usual * factor, "earlier tests"
+    elif hanger is not None:
+        usual = hanger.mass_per_length_kg_m * hanger.length_m
+        low, high, whose = *(usual * each for each in MASS_OVER_DESCRIBED), "the description"
+    else:
+        return []
+    if low <= mass_kg <= high:
+        return []
+    times = max(mass_kg / usual, usual / mass_kg)
+    side = "less" if mass_kg > usual else "more"
+    return [
+        SignalDoubt(
+            "unit",
+            record.force.name,
+            f"The hanger moves {times:.2g} times {side} for the force than by {whose}: right units "
+            f"and sensitivities of {record.force.name} and the accelerometers?",
+        )
+    ]
+
+
+def _outside_bounds(channel: Channel) -> list[SignalDoubt]:
+    force = channel.quantity == "force"
+    low, high = PEAK_FORCE_N if force else PEAK_ACCELERATION_M_S2
+    values = channel.values[np.isfinite(channel.values)]
+    peak = float(np.abs(values - np.median(values)).max(initial=0.0)) if len(values) else 0.0
+    if low <= peak <= high or peak == 0:  # a dead channel is another check's
+        return []
+    what, unit = ("hammer hits", "N") if force else ("a hit hanger", "m/s^2")
+    side = "below" if peak < low else "above"
+    return [
+        SignalDoubt(
+            "unit",
+            channel.name,
+            f"{channel.name} peaks at {peak:.3g} {unit}, {side} what {what} give "
+            f"({low:g} to {high:g} {unit}): right unit and sensitivity?",
+        )
+    ]
+
+
+def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
+    """A sensor that moves 100 times as much, or as little, as all others of its plane."""
+    velocities, channels = _velocities(record), record.accelerations
+    found = []
+    for row, channel in enumerate(channels if len(velocities) else ()):
+        rest = [
+            velocities[n] for n, c in enumerate(channels) if n != row and c.plane == channel.plane
+        ]
+        if not rest or velocities[row] == 0 or min(rest) == 0:
+            continue
+        above, below = velocities[row] / max(rest), min(rest) / velocities[row]
+        if max(above, below) > SENSORS_APART:
+            side = "more" if above > below else "less"
+            found.append(
+                SignalDoubt(
+                    "unit",
+                    channel.name,
+                    f"{channel.name} moves {max(above, below):.2g} times {side} than the other "
+                    "sensors of its plane: right unit and sensitivity?",
+                )
+            )
+    return found
+
+
+def _velocities(record: Recording) -> FloatArray:
+    """Velocity for an impulse of 1 N s (channels,), root mean square over 0.5 s after a hit.
+
+    The median over the hits; empty where there is none.
+    """
+    force = record.force
+    pulses = [] if force is None else find_pulses(force.values, record.sampling_rate_hz)
+    rows = [_velocity(record, pulse) for pulse in pulses]
+    return np.median(rows, axis=0) if rows else np.empty(0)
+
+
+def _velocity(record: Recording, pulse: Pulse) -> FloatArray:
+    rate, force = record.sampling_rate_hz, record.force
+    assert force is not None
+    push = force.values[pulse.start : pulse.end]
+    impulse = abs(float(np.nansum(push - np.nanmedian(force.values)))) / rate
+    first = pulse.end + int(_AFTER_S * rate)
+    rings = [c.values[first : first + int(_RING_S * rate)] for c in record.accelerations]
+    rest = np.nan_to_num(np.array([r - np.nanmean(r) if len(r) else r for r in rings]))
+    if not rest.size or impulse == 0:
+        return np.zeros(len(rings))
+    samples = rest.shape[1]
+    lines = np.fft.rfft(rest * np.hanning(samples), axis=1)
+    hz = np.fft.rfftfreq(samples, 1 / rate)
+    band = (hz >= _LOWEST_HZ) & (hz <= min(_HIGHEST_HZ, 0.4 * rate))
+    power = (np.abs(lines[:, band] / (2 * np.pi * hz[band])) ** 2).sum(axis=1)
+    # Parseval, and 3/8 of the power that a Hann window lets through.
+    return np.asarray(np.sqrt(2 * power / samples**2 / 0.375) / impulse)
+
+
+def _not_a_hammer(record: Recording) -> list[SignalDoubt]:
+    """The force channel rings on more than an accelerometer does: that one is the hammer."""
+    force, rate = record.force, record.sampling_rate_hz
+    if force is None:
+        return []
+    share = ringing(force.values, rate)
+    least = min(record.accelerations, key=lambda c: ringing(c.values, rate), default=None)
+    if least is None or not share > RINGS_MORE * ringing(least.values, rate):
+        return []
+    text = (
+        f"{force.name} rings on after the hits as an accelerometer does, {least.name} is over as a "
+        "hammer's force is: right channels?"
+    )
+    return [SignalDoubt("channels", force.name, text)]
+
+
+def ringing(values: FloatArray, sampling_rate_hz: float) -> float:
+    """Root mean square from 0.02 to 0.5 s after the largest excursion, over it; inf where dead."""
+    above = np.nan_to_num(values - np.nanmedian(values)) if np.isfinite(values).any() else values
+    peak = int(np.abs(np.nan_to_num(above)).argmax())
+    first = peak + int(_AFTER_S * sampling_rate_hz)
+    ring = above[first : first + int(_RING_S * sampling_rate_hz)]
+    size = float(abs(above[peak]))
+    if not len(ring) or not size > 0:
+        return math.inf
+    return float(np.sqrt(np.mean(ring**2))) / size

@@ -1,0 +1,140 @@
+"""From an identified recording to what is held of it: what the store knows meets the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
+from shm.store import (
+    Decision,
+    HeldTest,
+    Hold,
+    IdentifiedTest,
+    Judged,
+    Store,
+    StoredRecording,
+    StoredTest,
+    Workspace,
+)
+from shm.store.holding import time_note
+from shm.values import Alert, Hanger
+
+_LATEST = 10  # of a hanger's tests: what it does from test to test, without reading years of them
+_LATEST_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
+
+
+def judge(
+    workspace: Workspace,
+    store: Store,
+    recording: StoredRecording,
+    found: Sequence[IdentifiedTest],
+) -> tuple[tuple[IdentifiedTest, ...], Judged]:
+    """The tests to keep, and which of them to hold.
+
+    What a person has confirmed with this sidecar is not doubted again, and has the time that they
+    gave it.
+    """
+    sidecar_as, fingerprint = recording.file.sidecar_as, found[0].fingerprint
+    judged = Judged(sidecar_as, fingerprint)
+    hold = store.latest_hold(recording.id)
+    if hold is not None and hold.decision is Decision.CONFIRMED and hold.sidecar_as == sidecar_as:
+        return tuple(_as_confirmed(item, hold) for item in found), judged
+    held, candidates = [], {}
+    for item in found:
+        candidate = _candidate(workspace, store, recording, item, found)
+        doubts = doubts_about(candidate)
+        if doubts:
+            shift = implied_shift(candidate.test, candidate.reference, candidate.hanger)
+            held.append(HeldTest(item.position, item.test.id, doubts, shift))
+            candidates[item.position] = candidate
+    if not held:
+        return tuple(found), judged
+    hooks = [hook.name for hook in workspace.bridge.hooks]
+    notice = _notice(store, recording, held, candidates)
+    return tuple(found), replace(judged, held=tuple(held), notice=notice, hooks=hooks)
+
+
+def _candidate(
+    workspace: Workspace,
+    store: Store,
+    recording: StoredRecording,
+    item: IdentifiedTest,
+    found: Sequence[IdentifiedTest],
+) -> Candidate:
+    test, hanger = item.test, workspace.bridge.hanger(item.test.hanger or 0)
+    earlier = store.latest_tests_before(hanger.id, recording.id, _LATEST)
+    baseline = store.baseline(hanger.id, time=_possible(test.time))
+    reference = store.tests_of(baseline) if baseline else earlier
+    at_once = store.tests_at(hanger.id, test.time, recording.id) if test.time else ()
+    print_ = item.fingerprint
+    return Candidate(
+        hanger=hanger,
+        test=test,
+        received_at=recording.received_at,
+        tolerance=timedelta(seconds=workspace.settings.future_tolerance_seconds),
+        modified_at=recording.file.modified_at,
+        built=workspace.bridge.built,
+        file_times=item.times,
+        neighbours=[other.test.time for other in found if other is not item and other.test.time],
+        same_time=[each.test for each in at_once],
+        reference=[each.test for each in reference],
+        reference_at=max(each.time for each in reference) if baseline else None,
+        earlier=[each.test for each in earlier],
+        baseline=baseline.posterior if baseline else None,
+        fingerprint=print_,
+        copies=store.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        signals=item.signals,
+        others=[
+            (other, [each.test for each in _latest_of(store, other, recording)])
+            for other in workspace.bridge.hangers
+            if other.id != hanger.id
+        ],
+    )
+
+
+def _latest_of(store: Store, hanger: Hanger, recording: StoredRecording) -> Sequence[StoredTest]:
+    return store.latest_tests_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
+
+
+def _possible(time: datetime | None) -> datetime | None:
+    """A time by which to look for a baseline; None where it says nothing: that in force."""
+    return None if time is None or time.date() < FIRST_DAY else time
+
+
+def _notice(
+    store: Store,
+    recording: StoredRecording,
+    held: Sequence[HeldTest],
+    candidates: Mapping[int, Candidate],
+) -> Alert:
+    """What to tell of a recording, once: of the test whose modes say most."""
+    leading = max(held, key=lambda each: np.nan_to_num(abs(each.tension_shift)))
+    candidate = candidates[leading.position]
+    hanger = candidate.hanger.id
+    others = [test.tension_shift for hold in store.holds(hanger) for test in hold.tests]
+    others += [test.tension_shift for test in held if test is not leading]
+    message = notice_of(candidate, leading.doubts, recording.id, others)
+    if len(held) > 1:
+        message += f" {len(held)} tests of {recording.file.file_name} are held."
+    return Alert(
+        key="",  # its hold gives it one
+        hanger=hanger,
+        test=leading.name,
+        time=candidate.test.time or recording.received_at,
+        message=message,
+        drifts=(),
+        kinds=("held",),
+    )
+
+
+def _as_confirmed(item: IdentifiedTest, hold: Hold) -> IdentifiedTest:
+    """A test done again after a person has confirmed it: with the time that they gave it."""
+    doubts = {test.position: test.doubts for test in hold.tests}.get(item.position, ())
+    if hold.time is None and not any(doubt.time_unknown for doubt in doubts):
+        return item
+    notes = (*item.notes, time_note(hold, hold.time, hold.who))
+    return replace(item, test=replace(item.test, time=hold.time), notes=notes)

@@ -1,0 +1,48 @@
+"""Whether a test can be what it says it is, before it counts: what is implausible is held.
+
+A check is one function `Candidate -> Doubt | None` and one line of `CHECKS`. It is asked once the
+modes of a test are identified, and before anything is computed from them.
+"""
+
+from __future__ import annotations
+
+from shm.plausibility import bar, clock, copies
+from shm.plausibility.candidate import (
+    Candidate,
+    Check,
+    frequency_change,
+    implied_shift,
+)
+from shm.plausibility.clock import FIRST_DAY
+from shm.plausibility.copies import fingerprint_of
+from shm.plausibility.notice import notice_of
+from shm.values import Doubt
+
+__all__ = [
+    "CHECKS",
+    "FIRST_DAY",
+    "Candidate",
+    "Check",
+    "doubts_about",
+    "fingerprint_of",
+    "frequency_change",
+    "implied_shift",
+    "notice_of",
+]
+
+CHECKS: tuple[Check, ...] = (
+    clock.before_the_bridge,
+    clock.ahead,
+    clock.scattered,
+    clock.stuck,
+    clock.before_the_baseline,
+    copies.copied,
+    bar.of_another_bar,
+    bar.of_other_signals,
+)
+
+
+def doubts_about(candidate: Candidate) -> tuple[Doubt, ...]:
+    """The reasons to hold a test, in the order of `CHECKS`; none where it is plausible."""
+    found = (check(candidate) for check in CHECKS)
+    return tuple(doubt for doubt in found if doubt is not None)

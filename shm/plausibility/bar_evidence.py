@@ -1,0 +1,372 @@
+"""What modes say of a bar: its fit to them, and how probable a shift of them is.
+
+Each hanger that a test may come from is fitted to its modes (`shm.plausibility.bars`), and misfits
+are weighed with what may have changed and with what tests and bars err by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from shm.plausibility.bar_solver import SHARE, SPRINGS, Solver
+from shm.values import NAN, PLANES, BoolArray, FloatArray, Hanger, ModalTest
+
+OriginKind: TypeAlias = Literal["hanger", "unknown bar", "time base", "planes"]
+
+LATEST = 5
+"""Of a hanger's earlier tests, how many say where its modes lie now."""
+
+_MOST_ORDER, LEAST_MODES = 20, 3
+"""Two frequencies fit any bar, by its tension and its ends."""
+
+_PARAMETERS = 7
+"""ln of the tension ratio, ln c (shm.models.as_made), log10 k L/EI of springs k1 to k4, and shear
+over that of a solid section."""
+
+
+_STARTS = (-1.0, 0.75, 2.5)
+"""log10 k L/EI near a pin, in the middle and near a clamp, from where fits begin."""
+
+_STEPS, _WIDE, _NARROWS, _FIT_SD = 14, 0.1, 0.5, 2e-3
+"""Of fits: misfits of 10 % count at first, those of 0.2 % in the end."""
+
+_ENDS = (0.75, 1.3)
+"""Mean and standard deviation of log10 k L/EI uniform from 0.03 to 1000 (as_made.RESTRAINT)."""
+
+_TENSION = (math.log(0.6), 1.0)
+"""Of ln(tension over nominal): 2 % to 5 times (as_made.TENSION_RATIO), mostly a third to 1.5."""
+
+_MODEL_C = 0.005
+"""Of ln c: what end zones and sensors do to a bar that is taken as uniform."""
+
+_SHEAR = {"rod": (1.0, 0.02), "strand": (0.75, 0.4)}
+"""Of the share of shear: that of theory, and of wires that slip anything from 0 to 1.5."""
+
+_SLIP = (math.log(0.6), 0.35)
+"""Of ln(bending factor) of a strand, uniform from 0.3 to 1 (as_made.BENDING_FACTOR)."""
+
+_ANY_BAR = (2.0, 0.7)
+"""Standard deviations of ln tension and ln c of a bar that nobody described: c from a quarter to
+four times as large, as that of a bar of half or twice the length is."""
+
+#         weight  ln T  ln c  log10 k  time base
+ORDINARY = 0.93, 0.02, 3e-4, 0.05, 0.0
+TIGHTER = 0.04, 0.25, 3e-4, 0.05, 0.0
+_LOOSER = 0.02, 0.05, 3e-4, 0.5, 0.0
+_ALTERED = 0.01, 0.40, 1e-2, 0.7, 0.0
+OTHER_CLOCK = 1.0, 0.02, 3e-4, 0.05, 1.5
+"""What tests of one hanger differ by, standard deviations: temperature; a tension that was lost or
+restored; end springs of a third or three times; all of it. And a time base of any factor."""
+
+_TEST_ERRORS = ((0.55, 3e-4), (0.35, 1e-3), (0.08, 3e-3), (0.02, 0.03))
+_BAR_ERRORS = ((0.3, 1e-3), (0.45, 3e-3), (0.2, 1e-2), (0.05, 0.03))
+"""Weights and standard deviations of ln f of each mode beyond the stated ones: of one test against
+another (0.03: a change of no known kind), and of a bar against its description."""
+
+_TOGETHER, _ALONG_ORDERS = 0.9, 0.7
+"""Of the variance of a bar's errors, what goes together in neighbouring orders, and how far in ln
+of the order: fittings, end zones and sensors raise or lower many modes alike."""
+
+_UNSTATED_SD = 3e-4
+"""Of ln f where no standard deviation is stated."""
+
+_OFF_SHIFT = 0.01
+"""Share by which a fitted bar mistakes the shift of a frequency."""
+
+_MISTAKEN, _MISTAKEN_DENSITY, _MOST_MISTAKEN = 0.02, 2.5, 2
+"""Probability that a mode is another peak or has another's order, within 20 % to either side."""
+
+_MASSES, _MASS_ERROR = (0.01, 0.15), 2e-3
+"""Probability that something was hung on the bar; share by which Rayleigh's quotient errs, and the
+error of each mode besides."""
+_MASS_SHARES = np.geomspace(0.003, 2.0, 11)
+_MASS_PLACES = np.linspace(0.05, 0.5, 10)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a test may come from; the hanger it is filed under where `kind` is empty."""
+
+    kind: OriginKind | Literal[""] = ""
+    hanger: int | None = None
+    factor: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """ln f (2, orders) by plane and order, NaN where not measured, and the variance of each."""
+
+    log_f: FloatArray
+    variance: FloatArray
+
+    @property
+    def mask(self) -> BoolArray:
+        return np.isfinite(self.log_f)
+
+    def over(self, other: Seen) -> Seen:
+        return Seen(self.log_f - other.log_f, self.variance + other.variance)
+
+    def times(self, factor: float) -> Seen:
+        return replace(self, log_f=self.log_f + math.log(factor))
+
+    def exchanged(self) -> Seen:
+        return Seen(self.log_f[::-1], self.variance[::-1])
+
+
+def seen_in(tests: Sequence[ModalTest], hanger: Hanger) -> Seen:
+    """The modes of tests of a hanger, the mean of several, without masses clamped on for a test."""
+    shape = len(tests), len(PLANES), _MOST_ORDER
+    log_f, variance = np.full(shape, NAN), np.zeros(shape)
+    for row, test in enumerate(tests):
+        for mode in test.regular_modes:
+            if mode.order > _MOST_ORDER:
+                continue
+            at = row, PLANES.index(mode.plane), mode.order - 1
+            sd = mode.frequency_sd_hz / mode.frequency_hz
+            log_f[at] = math.log(mode.frequency_hz)
+            variance[at] = (sd if math.isfinite(sd) else _UNSTATED_SD) ** 2
+        if test.added_mass is not None:
+            whole = hanger.mass_per_length_kg_m * hanger.length_m
+            place = test.added_mass.x_m / hanger.length_m
+            shift = _by_mass(np.array(test.added_mass.mass_kg / whole), np.array(place))
+            log_f[row] -= shift
+            variance[row] += (_MASSES[1] * shift) ** 2
+    count = np.isfinite(log_f).sum(axis=0)
+    some = np.maximum(count, 1)
+    mean = np.where(count, np.nansum(log_f, axis=0) / some, NAN)
+    own = np.where(np.isfinite(log_f), variance, 0.0).sum(axis=0)
+    return Seen(mean, own / some**2)
+
+
+def _by_mass(share: FloatArray, place: FloatArray) -> FloatArray:
+    """What a mass, as a share of the bar's, at a share of its length does to ln f (..., orders)."""
+    moves = np.sin(np.pi * np.arange(1, _MOST_ORDER + 1) * place[..., None]) ** 2
+    return np.asarray(-0.5 * np.log1p(2 * share[..., None] * moves))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Misfits `off` (2, orders) of ln f and what may be behind them.
+
+    `sensitivity` (2, orders, 8); `changes` are weights with standard deviations (8,), `errors`
+    weights with a standard deviation of each mode; `masses`: something may have been hung on it.
+    """
+
+    off: Seen
+    sensitivity: FloatArray
+    changes: tuple[tuple[float, FloatArray], ...]
+    errors: tuple[tuple[float, float], ...] = _TEST_ERRORS
+    masses: bool = False
+
+    @property
+    def mask(self) -> BoolArray:
+        return self.off.mask
+
+    def log_density(self, mask: BoolArray) -> float:
+        """Log density of ln f of the modes in `mask` (2, orders), all of them measured."""
+        off, way = self.off.log_f[mask], self.sensitivity[mask]
+        weights, sds = zip(*self.changes, strict=True)
+        shares, errors = np.array(self.errors).T
+        shared = np.einsum("mi,ci,ni->cmn", way, np.array(sds) ** 2, way)
+        covariance = shared[:, None] + np.diag(self.off.variance[mask])
+        covariance = covariance + errors[:, None, None] ** 2 * self._alike(mask)
+        covariance = covariance.reshape(-1, len(off), len(off))
+        found = _log_normal(off, covariance) + np.log(np.outer(weights, shares)).ravel()
+        if self.masses:
+            found = np.append(found, self._with_mass(mask))
+        return log_sum(found)
+
+    def _alike(self, mask: BoolArray) -> FloatArray:
+        """Correlation (modes, modes) of the errors: what a bar model lacks is of no mode alone."""
+        own = np.eye(int(mask.sum()))
+        if self.errors is _TEST_ERRORS:
+            return own
+        plane, order = mask.nonzero()
+        log = np.log(order + 1.0)
+        along = np.exp(-0.5 * (np.subtract.outer(log, log) / _ALONG_ORDERS) ** 2)
+        across = np.where(np.equal.outer(plane, plane), 1.0, 0.5)
+        return np.asarray((1 - _TOGETHER) * own + _TOGETHER * along * across)
+
+    def _with_mass(self, mask: BoolArray) -> float:
+        """With something of any mass at any place hung on it."""
+        share, place = (a.ravel() for a in np.meshgrid(_MASS_SHARES, _MASS_PLACES))
+        shift = np.repeat(_by_mass(share, place)[:, None], 2, axis=1)[:, mask]
+        way, (_, sds) = self.sensitivity[mask], self.changes[0]
+        covariance = (way * sds**2) @ way.T + np.diag(self.off.variance[mask] + _MASS_ERROR**2)
+        wide = covariance + (_MASSES[1] * shift)[:, :, None] ** 2 * np.eye(shift.shape[1])
+        rest = self.off.log_f[mask] - shift
+        _, size = np.linalg.slogdet(wide)
+        along = np.linalg.solve(wide, rest[..., None])[..., 0]
+        log = -0.5 * ((rest * along).sum(axis=1) + size + len(rest.T) * math.log(2 * math.pi))
+        return log_sum(log) + math.log(_MASSES[0] / len(log))
+
+
+def _log_normal(off: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Log densities (k,) of `off` (modes,) by covariances (k, modes, modes).
+
+    One or two of its modes may be mistaken.
+    """
+    inverse = np.linalg.inv(covariance)
+    _, size = np.linalg.slogdet(covariance)
+    every, modes = np.arange(len(covariance)), len(off)
+    log = -0.5 * (inverse @ off @ off + size + modes * math.log(2 * math.pi))
+    found, left = [log], np.ones((len(covariance), modes), dtype=bool)
+    for _ in range(min(_MOST_MISTAKEN, modes - LEAST_MODES)):
+        # Without a mode: less its density given the others, which the inverse holds.
+        weight = np.where(left, np.diagonal(inverse, axis1=1, axis2=2), 1.0)
+        given = 0.5 * np.log(weight / (2 * math.pi)) - 0.5 * (inverse @ off) ** 2 / weight
+        worst = np.where(left, given, np.inf).argmin(axis=1)
+        log = log - given[every, worst] + math.log(_MISTAKEN * _MISTAKEN_DENSITY)
+        found.append(log)
+        left[every, worst] = False
+        row = inverse[every, worst]
+        inverse = inverse - row[:, :, None] * row[:, None, :] / row[every, worst][:, None, None]
+    return np.asarray(np.logaddexp.reduce(found))
+
+
+def log_sum(values: FloatArray) -> float:
+    return float(np.logaddexp.reduce(values))
+
+
+def changes_of(*classes: tuple[float, ...]) -> tuple[tuple[float, FloatArray], ...]:
+    return tuple((w, np.array([t, c, *(k,) * 4, 1e-3, clock])) for w, t, c, k, clock in classes)
+
+
+class Bars:
+    """Bars to be fitted to modes, each about the middle of its description's prior."""
+
+    def __init__(self) -> None:
+        self.origins: list[Origin] = []
+        self.hangers: list[Hanger] = []
+        self.seen: list[Seen] = []
+        self.mean: list[FloatArray] = []
+        self.sd: list[FloatArray] = []
+
+    def add(self, origin: Origin, hanger: Hanger, seen: Seen, any_bar: bool = False) -> None:
+        mean, sd = _prior(hanger)
+        if any_bar:
+            sd[:2] = _ANY_BAR
+        self.append(origin, hanger, seen, mean, sd)
+
+    def append(
+        self, origin: Origin, hanger: Hanger, seen: Seen, mean: FloatArray, sd: FloatArray
+    ) -> None:
+        self.origins.append(origin)
+        self.hangers.append(hanger)
+        self.seen.append(seen)
+        self.mean.append(mean)
+        self.sd.append(sd)
+
+    def fitted(self, start: FloatArray | None = None) -> Fits:
+        """Each bar's likeliest parameters, by Gauss-Newton steps with Student's weights.
+
+        From `start` (7,) where it is given.
+        """
+        starts, rows = 1 if start is not None else len(_STARTS), len(self.hangers)
+        log_f = np.repeat([each.log_f for each in self.seen], starts, axis=0)
+        stated = np.repeat([each.variance for each in self.seen], starts, axis=0)
+        mean, sd = (np.repeat(each, starts, axis=0) for each in (self.mean, self.sd))
+        orders = int(np.isfinite(log_f).any(axis=(0, 1)).nonzero()[0].max()) + 1
+        solver = Solver([h for h in self.hangers for _ in range(starts)], orders)
+        y = log_f[..., :orders].reshape(len(mean), -1)
+        measured = np.isfinite(y)
+        theta = mean.copy()
+        if start is None:
+            theta[:, SPRINGS] = np.tile(_STARTS, rows)[:, None]
+            theta[:, 0] = solver.string_tension(log_f)
+        else:
+            theta[:] = start
+        for step in range(_STEPS):
+            wide = max(_FIT_SD, _WIDE * _NARROWS**step)
+            variance = stated[..., :orders].reshape(y.shape) + wide**2
+            found, way = solver.with_slopes(theta)
+            off = np.where(measured, y - found, 0.0)
+            weight = measured * 4 / (3 + off**2 / variance) / variance
+            normal = np.einsum("nki,nk,nkj->nij", way, weight, way)
+            normal += np.eye(_PARAMETERS) / sd[:, None, :] ** 2
+            slope = np.einsum("nki,nk->ni", way, weight * off) + (mean - theta) / sd**2
+            move = np.linalg.solve(normal, slope[..., None])[..., 0]
+            theta = theta + move.clip(-1, 1)
+            theta[:, 0], theta[:, 1] = theta[:, 0].clip(-7, 4), theta[:, 1].clip(-3, 3)
+            theta[:, SPRINGS] = theta[:, SPRINGS].clip(-2.5, 4)
+            theta[:, SHARE] = theta[:, SHARE].clip(0.01, 3)
+        found, way = solver.with_slopes(theta)
+        off = np.where(measured, y - found, 0.0)
+        variance = stated[..., :orders].reshape(y.shape) + _FIT_SD**2
+        cost = 2 * np.log1p(off**2 / variance / 3).sum(axis=1)
+        cost += 0.5 * (((theta - mean) / sd) ** 2).sum(axis=1)
+        best = cost.reshape(rows, starts).argmin(axis=1) + starts * np.arange(rows)
+        return Fits(self, theta[best], found[best], way[best])
+
+
+class Fits:
+    def __init__(self, bars: Bars, theta: FloatArray, log_f: FloatArray, way: FloatArray):
+        self._bars, self._theta = bars, theta
+        rows, orders = len(theta), log_f.shape[1] // 2
+        self._log_f = np.full((rows, 2, _MOST_ORDER), NAN)
+        self._log_f[..., :orders] = log_f.reshape(rows, 2, orders)
+        self._way = np.zeros((rows, 2, _MOST_ORDER, _PARAMETERS + 1))
+        self._way[..., :orders, :_PARAMETERS] = way.reshape(rows, 2, orders, _PARAMETERS)
+        self._way[..., _PARAMETERS] = 1.0
+
+    def sensitivity(self, origin: Origin) -> FloatArray:
+        """How ln f goes with the parameters and the time base (2, orders, 8)."""
+        return np.asarray(self._way[self._bars.origins.index(origin)])
+
+    def described(self, origin: Origin) -> Evidence:
+        """The modes by the priors of the description."""
+        row, bars = self._bars.origins.index(origin), self._bars
+        away = self._theta[row] - bars.mean[row]
+        seen, way = bars.seen[row], self._way[row]
+        off = seen.log_f - self._log_f[row] + way[..., :_PARAMETERS] @ away
+        sds = np.append(bars.sd[row], 0.0)
+        more = 3.0 if bars.hangers[row].turnbuckles else 1.0
+        errors = tuple((weight, more * sd) for weight, sd in _BAR_ERRORS)
+        return Evidence(replace(seen, log_f=off), way, ((1.0, sds),), errors)
+
+    def changed(self, origin: Origin, shift: Seen) -> Evidence:
+        """The hanger of earlier tests with whatever may have changed since."""
+        row, bars = self._bars.origins.index(origin), self._bars
+        changes = changes_of(ORDINARY, TIGHTER, _LOOSER, _ALTERED)
+        start = self._theta[row]
+        again = Bars()
+        moved = replace(shift, log_f=self._log_f[row] + shift.log_f)
+        again.append(origin, bars.hangers[row], moved, start, changes[-1][1][:_PARAMETERS])
+        fit = again.fitted(start)
+        expected = fit._log_f[0] - self._log_f[row]
+        way = fit._way[0]
+        away = fit._theta[0] - start
+        off = shift.log_f - expected + way[..., :_PARAMETERS] @ away
+        variance = shift.variance + np.nan_to_num(_OFF_SHIFT * expected) ** 2
+        return Evidence(Seen(off, variance), way, changes, masses=True)
+
+
+def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
+    """Means and standard deviations (7,) of the parameters by the description."""
+    scatter = hanger.scatter
+    shear, shear_sd = _SHEAR[hanger.kind]
+    mean = np.array([_TENSION[0], 0.0, *(_ENDS[0],) * 4, shear])
+    sd = np.array([_TENSION[1], _MODEL_C, *(_ENDS[1],) * 4, shear_sd])
+    if math.isfinite(scatter.tension):
+        mean[0], sd[0] = 0.0, math.hypot(scatter.tension, scatter.section)
+    own = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
+    plates_m = 2 * hanger.plate.length_m if hanger.plate is not None else 0.0
+    # The length that swings lies anywhere between the taped one and that without fittings.
+    open_share = (sum(hanger.fittings_m) + plates_m) / hanger.length_m
+    mean[1] += open_share
+    own.append(2 * open_share / math.sqrt(12))
+    if math.isfinite(scatter.effective_length):
+        own.append(2 * scatter.effective_length)
+    if hanger.kind == "strand":
+        if math.isfinite(scatter.bending_factor):
+            own.append(scatter.bending_factor / 2)
+        else:
+            mean[1] += (_SLIP[0] - math.log(hanger.bending_stiffness_factor)) / 2
+            own.append(_SLIP[1] / 2)
+    sd[1] = math.hypot(sd[1], *own)
+    return mean, sd

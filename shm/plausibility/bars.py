@@ -1,0 +1,202 @@
+"""Whether a test is of the hanger whose number it bears: "right hanger?", "right sampling rate?".
+
+Bayes' rule over what may be behind the modes of a test that is filed under one hanger:
+
+- it is that hanger, as it was, or really changed (tension, end springs, a mass, anything);
+- it is another hanger of the bridge, or a bar that nobody has described;
+- the time base is wrong: all frequencies are multiplied alike, where tension moves low modes more;
+- the sensors' axes were exchanged, and with them the planes.
+
+Where a hanger has earlier tests they say where its modes lie: the shift of ln f (modes,) is normal
+about 0 with covariance S + J C J': J (modes, 8) is how the bar that fits those tests goes with
+tension, bending, four end springs, shear and the time base, C the variances of what may change, S
+what tests and the bar model err by. Where there are none the description says it, in the same form
+with its priors for C. Two candidates are compared by the modes of which both speak; one or two of
+these may be mistaken. All bars are fitted at once, by Gauss-Newton steps from three places.
+
+What cannot be told apart: twins (of one length and section) before the named one has a test of its
+own, and afterwards where their frequencies differ by no more than temperature moves them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.plausibility.bar_evidence import (
+    LATEST,
+    LEAST_MODES,
+    ORDINARY,
+    OTHER_CLOCK,
+    TIGHTER,
+    Bars,
+    Evidence,
+    Origin,
+    OriginKind,
+    Seen,
+    changes_of,
+    log_sum,
+    seen_in,
+)
+from shm.values import NAN, FloatArray, Hanger, ModalTest
+
+SWAP, UNKNOWN_BAR, TIME_BASE, PLANES_EXCHANGED = 0.015, 0.003, 0.004, 0.003
+"""Prior probabilities that a test is not what it is filed as. Of numbers keyed in once and not
+checked 1 to 2 % are wrong (Barchard and Pace 2011, Computers in Human Behavior 27, 1834); the
+others are rarer: each needs a wrong setting, not a wrong digit."""
+
+DOUBTED_FROM = 0.5
+"""Probability of not being what it is filed as from which a test is doubted."""
+
+FACTORS = (2.0, 0.5, 10.0, 0.1, 1.024, 1 / 1.024)
+"""Of a wrong time base: the rate of every second sample, a decade, 1000 for 1024."""
+
+COARSE_FACTORS = tuple(factor for factor in FACTORS if abs(math.log(factor)) > 0.1)
+"""Those that a description can show: area, modulus and tape leave ln f open by some percent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A hanger as described, and its accepted tests, oldest first (none: `()`)."""
+
+    hanger: Hanger
+    tests: tuple[ModalTest, ...] = ()
+
+
+@dataclass(frozen=True)
+class OtherOrigin:
+    """That a test is not what it is filed as: `probability` of it, and what it is instead.
+
+    `hanger` is the other one where `kind` is "hanger"; `factor` that of all frequencies over the
+    expected ones where it is "time base". `text` is for a person.
+    """
+
+    kind: OriginKind
+    probability: float
+    text: str
+    hanger: int | None = None
+    factor: float = NAN
+
+
+OWN = Origin()
+
+
+def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
+    """Why `test`, filed under hanger `own`, is probably not of it; None where it well may be.
+
+    `own.tests` are its earlier accepted tests, `others` the other hangers of the bridge. None also
+    where nothing can be said: fewer than three modes, or a description that is no hanger's (free or
+    pinned ends, no tension).
+    """
+    odds = origins(test, own, others)
+    if not odds:
+        return None
+    total = log_sum(np.array(list(odds.values())))
+    probability = -math.expm1(odds.pop(OWN) - total)
+    if probability < DOUBTED_FROM:
+        return None
+    return _said(max(odds, key=lambda each: odds[each]), probability, own.hanger)
+
+
+def origins(test: ModalTest, own: Known, others: Sequence[Known]) -> dict[Origin, float]:
+    """Log odds of where a test comes from, up to a constant; empty where nothing can be said."""
+    seen = seen_in([test], own.hanger)
+    if not own.hanger.as_hanger or seen.mask.sum() < LEAST_MODES:
+        return {}
+    others = [each for each in others if each.hanger.as_hanger]
+    if not own.tests:
+        others = [each for each in others if not _twins(own.hanger, each.hanger)]
+    mine, rivals = _candidates(test, own, others)
+    odds = {OWN: math.log(1 - SWAP - UNKNOWN_BAR - TIME_BASE - PLANES_EXCHANGED)}
+    for origin, (prior, rival) in rivals.items():
+        both = mine.mask & rival.mask
+        if both.sum() >= LEAST_MODES:
+            factor = rival.log_density(both) - mine.log_density(both)
+            odds[origin] = math.log(prior) + factor
+    return odds
+
+
+def _said(origin: Origin, probability: float, own: Hanger) -> OtherOrigin:
+    name = f"hanger {own.id}"
+    texts = {
+        "hanger": f"The modes fit hanger {origin.hanger} rather than {name}: right hanger?",
+        "unknown bar": f"No tension and no ends of {name} as described give these modes: right "
+        "hanger, right description?",
+        "time base": f"All frequencies are {origin.factor:.4g} times those of {name}: right "
+        "sampling rate?",
+        "planes": f"The modes fit {name} with its two planes exchanged: right axes of the sensors?",
+    }
+    assert origin.kind
+    return OtherOrigin(origin.kind, probability, texts[origin.kind], origin.hanger, origin.factor)
+
+
+def _twins(one: Hanger, other: Hanger) -> bool:
+    """Whether two descriptions differ by less than tape and mill do."""
+    near = 2 * math.sqrt(2) * one.scatter.length
+    stiffness = one.bending_stiffness_n_m2 / other.bending_stiffness_n_m2
+    mass = one.mass_per_length_kg_m / other.mass_per_length_kg_m
+    return (
+        one.kind == other.kind
+        and abs(math.log(one.length_m / other.length_m)) < near
+        and max(abs(math.log(stiffness)), abs(math.log(mass))) < one.scatter.section
+    )
+
+
+def _as_before(shift: Seen, sensitivity: FloatArray, *classes: tuple[float, ...]) -> Evidence:
+    """A hanger whose modes have shifted since its earlier tests, by no more than usual."""
+    return Evidence(shift, sensitivity, changes_of(*(classes or (ORDINARY, TIGHTER))))
+
+
+def _candidates(
+    test: ModalTest, own: Known, others: Sequence[Known]
+) -> tuple[Evidence, dict[Origin, tuple[float, Evidence]]]:
+    """The hanger of that number, and what else the test may come from with its prior."""
+    rows = Bars()
+    now = {each.hanger.id: seen_in([test], each.hanger) for each in (own, *others)}
+    before = {
+        each.hanger.id: seen_in(each.tests[-LATEST:], each.hanger)
+        for each in (own, *others)
+        if each.tests
+    }
+    for each in (own, *others):
+        id_ = each.hanger.id
+        rows.add(Origin("hanger", id_), each.hanger, before.get(id_, now[id_]))
+    seen, id_ = now[own.hanger.id], own.hanger.id
+    rows.add(Origin("unknown bar"), own.hanger, seen, any_bar=True)
+    if not own.tests:
+        for factor in COARSE_FACTORS:
+            origin = Origin("time base", factor=factor)
+            rows.add(origin, own.hanger, seen.times(1 / factor))
+    fits = rows.fitted()
+    mine = Origin("hanger", id_)
+    rivals = {origin: fits.described(origin) for origin in rows.origins if origin != mine}
+    for each in others:
+        origin, at = Origin("hanger", each.hanger.id), each.hanger.id
+        if at in before:
+            rivals[origin] = _as_before(now[at].over(before[at]), fits.sensitivity(origin))
+    if id_ not in before:
+        return replace(fits.described(mine), masses=True), _with_priors(rivals, len(others))
+    shift, way = seen.over(before[id_]), fits.sensitivity(mine)
+    for factor in FACTORS:
+        rivals[Origin("time base", factor=factor)] = _as_before(shift.times(1 / factor), way)
+    if shift.mask.any():
+        factor = math.exp(float(np.median(shift.log_f[shift.mask])))
+        rivals[Origin("time base", factor=factor)] = _as_before(shift, way, OTHER_CLOCK)
+    crossed = seen.over(before[id_].exchanged())
+    rivals[Origin("planes")] = _as_before(crossed, way[::-1])
+    return fits.changed(mine, shift), _with_priors(rivals, len(others))
+
+
+def _with_priors(
+    rivals: dict[Origin, Evidence], others: int
+) -> dict[Origin, tuple[float, Evidence]]:
+    each = {
+        "hanger": SWAP / max(1, others),
+        "unknown bar": UNKNOWN_BAR,
+        "time base": TIME_BASE / (len(FACTORS) + 1),
+        "planes": PLANES_EXCHANGED,
+    }
+    return {origin: (each[origin.kind], rival) for origin, rival in rivals.items()}

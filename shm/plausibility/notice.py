@@ -1,0 +1,50 @@
+"""What a person is told of a held test: state, action, why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shm.plausibility.candidate import Candidate, frequency_change, implied_shift
+from shm.values import Doubt
+
+
+def notice_of(
+    candidate: Candidate, doubts: Sequence[Doubt], recording_id: int, others: Sequence[float]
+) -> str:
+    """The message of one held test; `others` are shifts of tension that other held tests imply.
+
+    Where its modes themselves are not in doubt, what they imply leads: a wrong clock must not hide
+    a loss.
+    """
+    of_others = any(doubt.check.startswith(("copy", "right")) for doubt in doubts)
+    loss = "" if of_others else _loss(candidate, others)
+    states = "; ".join(doubt.state for doubt in doubts)
+    held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}."
+    lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
+    why = " ".join(doubt.why for doubt in doubts)
+    return f"{lead} {_what_to_do(doubts, recording_id)} {why} Until then it counts in nothing."
+
+
+def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
+    time = " --time TIME" if any(doubt.check.startswith("clock") for doubt in doubts) else ""
+    return (
+        f"{doubts[0].action}: `shm ingest --confirm {recording_id}{time}` or "
+        f"`shm ingest --discard {recording_id}`."
+    )
+
+
+def _loss(candidate: Candidate, others: Sequence[float]) -> str:
+    """What the modes would mean for the tension; empty where that is below the threshold."""
+    hanger, limit = candidate.hanger, candidate.hanger.thresholds.tension_shift_fraction
+    shift = implied_shift(candidate.test, candidate.reference, hanger)
+    if not abs(shift) >= limit:
+        return ""
+    moved, side = ("lost", "below") if shift < 0 else ("gained", "above")
+    agreeing = 1 + sum(each * shift > 0 and abs(each) >= limit for each in others)
+    say = f"{agreeing} held tests agree" if agreeing > 1 else "one held test says so"
+    change = frequency_change(candidate.test, candidate.reference)
+    return (
+        f"Hanger {hanger.id} may have {moved} {100 * abs(shift):.0f} % of its tension: {say}. "
+        "Repeat the test today, with the logger's clock set. "
+        f"Its lowest frequencies are {100 * abs(change):.1f} % {side} the last ones."
+    )

@@ -1,0 +1,37 @@
+"""How often a loss of a tenth is told of by its second test, whatever the logger's clock says.
+
+`python tests/benchmarks/clock_faults.py 50`: so many bridges a fault, of all faults or those named.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from shm.pipeline import steps
+from tests.helpers import quick_update
+from tests.helpers.clock_faults import FAULTS, one_case
+
+
+def main() -> None:
+    logging.disable(logging.WARNING)
+    number = int(sys.argv[1])
+    for verb in ("update", "refresh", "select"):
+        setattr(steps, verb, getattr(quick_update, verb))
+    for fault in sys.argv[2:] or FAULTS:
+        with TemporaryDirectory() as folder:
+            found = [one_case(fault, seed, Path(folder)) for seed in range(number)]
+        told = sum(each.told for each in found)
+        missed = [seed for seed, each in enumerate(found) if not each.told]
+        held = sum(each.good_held for each in found)
+        print(
+            f"{fault}: told {told} of {number}, good tests held {held}, missed {missed}", flush=True
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""`kill -9` of workers in the midst of their steps: is any healthy file refused for it?
+
+    python tests/benchmarks/kill_workers.py --kills 1000 --files 200 --workers 2
+
+The daemon, its processes and its pauses are the real ones; the sampler is the tests' stand-in, and
+each step is slowed down so that the kills strike it. `tests/faults` holds the short form.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from shm.resources import one_thread_a_process
+
+one_thread_a_process()
+
+from tests.helpers.worker_killing import kill_workers, stage_counts  # noqa: E402
+from tests.helpers.workspaces import make_workspace  # noqa: E402
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=1000)
+    parser.add_argument("--files", type=int, default=200)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--longest", type=float, default=14_400.0, help="in s, before it gives up")
+    options = parser.parse_args()
+    logging.basicConfig(level=logging.ERROR)
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        settings = {"workers": options.workers}
+        workspace = make_workspace(Path(folder) / "bridge", settings=settings)
+        rng = random.Random(options.seed)
+        struck = kill_workers(workspace, options.files, options.kills, rng, options.longest)
+        counts = stage_counts(workspace)
+        with workspace.store() as store:
+            noted = Counter(event.kind for event in store.events())
+    print(
+        f"{struck} kills over {options.files} healthy files, {options.workers} workers: "
+        f"{ {stage.value: n for stage, n in counts.items()} }; noted: {dict(noted)}; "
+        f"{time.monotonic() - began:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()

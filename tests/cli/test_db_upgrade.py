@@ -1,0 +1,85 @@
+"""`shm db upgrade` of every released schema, through the command, also beside a daemon at work."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from shm.store import Store, Workspace
+from shm.store.backups import copy_store
+from shm.store.checking import check_store
+from shm.store.tables import SCHEMA
+from tests.cli.conftest import Shm
+from tests.helpers.contents import held, quiet
+from tests.helpers.postgres import Databases
+from tests.store.test_server_upgrade import as_of
+
+RELEASED = sorted((Path(__file__).parents[1] / "store" / "data").glob("schema_*.db"))
+OLDER = [path for path in RELEASED if path.stem != f"schema_{SCHEMA}"]
+
+
+def of_a_release(released: Path, empty: Workspace) -> Workspace:
+    """A workspace whose store a former shm has made."""
+    for ending in ("-wal", "-shm"):
+        empty.database.with_name(empty.database.name + ending).unlink(missing_ok=True)
+    shutil.copyfile(released, empty.database)
+    return empty
+
+
+@pytest.mark.parametrize("released", RELEASED, ids=lambda path: path.stem)
+def test_a_file_of_every_schema_upgrades_twice_without_complaint(
+    shm: Shm, empty: Workspace, released: Path
+) -> None:
+    workspace = of_a_release(released, empty)
+    for _ in range(2):
+        ended = shm("--workspace", workspace.folder, "db", "upgrade", "--json")
+        assert (ended.code, ended.document["upgraded"]) == (0, True)
+    for verb in (["status"], ["db", "check"], ["alerts"]):
+        assert shm("--workspace", workspace.folder, *verb).code == 0
+    # Nothing watched yet, or by a class that has other parameters by now.
+    said = shm("--workspace", workspace.folder, "drift", "--hanger", 3)
+    assert said.code == 0 or "Unexpected" not in said.err
+
+
+@pytest.mark.parametrize("released", [OLDER[0], OLDER[-1]], ids=lambda path: path.stem)
+def test_a_server_upgrades_through_the_command(
+    shm: Shm,
+    empty: Workspace,
+    released: Path,
+    postgresql: Databases,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with postgresql.database() as url:
+        as_of(released, url, tmp_path)
+        monkeypatch.setenv("SHM_STORE", url)
+        assert shm("--workspace", empty.folder, "status").code == 5
+        assert shm("--workspace", empty.folder, "db", "upgrade").code == 0
+        assert shm("--workspace", empty.folder, "db", "check").code == 0
+
+
+@pytest.mark.parametrize("released", OLDER, ids=lambda path: path.stem)
+def test_beside_a_daemon_nothing_is_upgraded_and_the_message_says_who_it_is(
+    shm: Shm, empty: Workspace, released: Path
+) -> None:
+    workspace = of_a_release(released, empty)
+    before = workspace.database.read_bytes()
+    with workspace.lock():
+        ended = shm("--workspace", workspace.folder, "db", "upgrade")
+    assert ended.code == 5
+    assert "already ingests" in ended.err
+    assert workspace.database.read_bytes() == before
+    assert shm("--workspace", workspace.folder, "db", "upgrade").code == 0
+    with Store.open(workspace.database) as store:
+        assert check_store(store, quiet).troubles == ()
+
+
+def test_an_upgraded_store_holds_the_same_after_a_copy(
+    shm: Shm, empty: Workspace, tmp_path: Path
+) -> None:
+    workspace = of_a_release(OLDER[0], empty)
+    assert shm("--workspace", workspace.folder, "db", "upgrade").code == 0
+    with workspace.store() as store:
+        assert copy_store(store, tmp_path / "copy.db", quiet) == held(store)

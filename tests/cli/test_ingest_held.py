@@ -1,0 +1,128 @@
+"""`shm ingest --held`, `--confirm` and `--discard`: a person answers what is held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from shm.documents import dump
+from shm.modes_document import modes_document
+from shm.store import Stage, Workspace
+from tests.cli.conftest import Shm
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
+
+
+@pytest.fixture
+def held(tmp_path: Path) -> Workspace:
+    """Hanger 3 has a baseline and a test of 1970 with a tenth less tension, recording 2."""
+    made = make_workspace(tmp_path / "bridge")
+    write_test(made.spool / "good.modes.json", made)
+    ingest(made)
+    put(made.spool / "lost.modes.json", epoch(made))
+    ingest(made)
+    return made
+
+
+def epoch(workspace: Workspace) -> str:
+    test = modelled_test("lost", workspace.bridge.hanger(3), tension=0.9)
+    return dump(modes_document([replace(test, time=datetime(1970, 1, 1, tzinfo=UTC))]))
+
+
+def test_ingest_says_that_a_file_is_held_and_how_to_answer(
+    shm: Shm, empty: Workspace, tmp_path: Path
+) -> None:
+    (tmp_path / "lost.modes.json").write_text(epoch(empty))
+    ended = shm("--workspace", empty.folder, "ingest", tmp_path / "lost.modes.json", "--json")
+    assert ended.code == 0
+    (row,) = ended.document["files"]
+    assert (row["outcome"], row["stage"], row["hanger"]) == ("held", "held", 3)
+    assert "shm ingest --confirm 1 --time TIME" in row["reason"]
+    (alert,) = ended.document["alerts"]
+    assert alert["kinds"] == ["held"]
+
+
+def test_what_is_held_is_listed(shm: Shm, held: Workspace) -> None:
+    said = shm("--workspace", held.folder, "ingest", "--held")
+    assert "recording 2, lost.modes.json" in said.out
+    assert "may have lost 10 % of its tension" in " ".join(said.out.split())
+    (hold,) = shm("--workspace", held.folder, "ingest", "--held", "--json").document["held"]
+    assert (hold["recording"], hold["hanger"], hold["decision"]) == (2, 3, None)
+    (test,) = hold["tests"]
+    assert test["tension_shift"] == pytest.approx(-0.1, abs=0.01)
+    assert [doubt["check"] for doubt in test["doubts"]] == ["clock before the bridge"]
+
+
+def test_status_shows_it_and_counts_it_in_nothing(shm: Shm, held: Workspace) -> None:
+    said = shm("--workspace", held.folder, "status")
+    assert "1 held" in said.out
+    assert "held until you decide: 1" in said.out
+    assert "shm ingest --confirm 2 --time TIME" in " ".join(said.out.split())
+    document = shm("--workspace", held.folder, "status", "--json").document
+    assert document["under_way"] == 0
+    assert [each["recording"] for each in document["held"]] == [2]
+    (hanger,) = document["hangers"]
+    assert (hanger["tests"], hanger["held"]) == (1, 1)
+
+
+def test_what_is_confirmed_is_done_at_once_with_its_true_time(shm: Shm, held: Workspace) -> None:
+    ended = shm(
+        "--workspace", held.folder, "ingest", "--confirm", "lost", "--time", "2026-06-01T10:00Z",
+        "--why", "clock was dead", "--who", "Ann", "--json",
+    )  # fmt: skip
+    assert ended.code == 0
+    assert ended.document["decision"] == "confirmed"
+    assert (ended.document["who"], ended.document["why"]) == ("Ann", "clock was dead")
+    assert ended.document["stage"] == "done"
+    with held.store() as store:
+        times = {test.test.id: test.time for test in store.tests(3)}
+        assert times == {"good": START, "lost": datetime(2026, 6, 1, 10, tzinfo=UTC)}
+        assert [drift.test for drift in store.drifts(3)] == ["lost"]
+    assert shm("--workspace", held.folder, "ingest", "--held").out == "Nothing is held.\n"
+
+
+def test_what_is_confirmed_while_a_daemon_serves_is_left_to_it(shm: Shm, held: Workspace) -> None:
+    with held.lock():
+        ended = shm("--workspace", held.folder, "ingest", "--confirm", 2)
+    assert ended.code == 0
+    assert "It does the rest." in ended.err
+    assert "its receipt counts" in ended.out
+    with held.store() as store:
+        assert store.stage_counts()[Stage.IDENTIFIED] == 1
+
+
+def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspace) -> None:
+    ended = shm("--workspace", held.folder, "ingest", "--discard", 2, "--why", "wrong hanger")
+    assert ended.code == 0
+    assert "Its raw file stays in the archive." in ended.out
+    again = shm("--workspace", held.folder, "ingest", "--confirm", 2)
+    assert again.code == 2
+    assert "it was discarded by" in again.err
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (("--confirm", 2, "--discard", 2), 2),
+        (("--held", "a.csv"), 2),
+        (("--time", "2026-05-01"), 2),
+        (("--why", "because", "--again", 2), 2),
+        (("--confirm", 2, "--time", "yesterday"), 3),
+        (("--confirm", 2, "--time", "2999-01-01"), 2),
+        (("--confirm", 99), 4),
+        (("--confirm", "nobody"), 4),
+        (("--discard", 1), 2),
+    ],
+)
+def test_what_makes_no_sense_changes_nothing(
+    shm: Shm, held: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    words: tuple[object, ...], code: int,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("")
+    assert shm("--workspace", held.folder, "ingest", *words).code == code
+    with held.store() as store:
+        assert len(store.holds()) == 1

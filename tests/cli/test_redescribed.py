@@ -1,0 +1,112 @@
+"""A description that changes after the baseline moves what later tests say: the report tells."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+import pytest
+
+from shm import report
+from shm.pipeline.redescribed import MOVES_NOTHING, redescribed
+from shm.pipeline.reporting import hanger_report
+from shm.store import Workspace
+from shm.values import Hanger
+from tests.cli.conftest import Shm
+from tests.helpers.flows import ingest
+from tests.helpers.web_servers import served
+from tests.helpers.workspaces import START, make_workspace, write_test
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Hanger 3 with two tests, the first of which is its baseline."""
+    workspace = make_workspace(tmp_path_factory.mktemp("redescribed") / "bridge")
+    for day in range(2):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+    ingest(workspace)
+    return workspace
+
+
+@pytest.fixture
+def before(made: Workspace, tmp_path: Path) -> Workspace:
+    """A copy of it."""
+    return Workspace.open(shutil.copytree(made.folder, tmp_path / "bridge"))
+
+
+def rewritten(workspace: Workspace, old: str, new: str) -> Workspace:
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text().replace(old, new))
+    return workspace.reopened()
+
+
+def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_baseline(
+    before: Workspace, shm: Shm
+) -> None:
+    with before.store() as store:
+        assert hanger_report(before, store, 3, START).redescribed == ()
+        workspace = rewritten(before, "length_m = 12.0", "length_m = 12.4")
+        data = hanger_report(workspace, store, 3, START)
+    assert data.redescribed == ("length_m from 12 to 12.4",)
+    lines = report.text(data).splitlines()
+    first = " ".join(lines[:8])
+    assert "description of hanger 3 has changed since its baseline" in first
+    assert "shm drift rebaseline --hanger 3" in first
+    assert "has changed since its baseline" in report.html(data)
+    assert report.json(data)["redescribed"] == ["length_m from 12 to 12.4"]
+    told = shm("--workspace", workspace.folder, "doctor").out
+    assert "described otherwise since the baseline: 3" in told
+    command = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}")
+    assert shm("--workspace", workspace.folder, *command, "--why", "taped anew").code == 0
+    with workspace.store() as store:
+        assert hanger_report(workspace, store, 3, START).redescribed == ()
+
+
+def test_what_no_posterior_depends_on_asks_for_nothing(before: Workspace) -> None:
+    hanger = before.bridge.hanger(3)
+    with before.store() as store:
+        baseline = store.baseline(3)
+    assert baseline is not None
+    known = replace(baseline, described={**asdict(hanger), "name": "old", "limits": {}})
+    assert redescribed(replace(hanger, name="new", models=("beam1",)), known) == ()
+    assert redescribed(hanger, None) == ()
+    assert redescribed(hanger, replace(baseline, described=None)) == ()
+
+
+def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Workspace) -> None:
+    hanger = before.bridge.hanger(3)
+    known = {"length_m", "elastic_modulus_pa", "area_m2", "second_moment_m4"}
+    described = {
+        each.name: getattr(hanger, each.name)  # numbers all
+        for each in fields(Hanger)
+        if each.name in known | {"mass_per_length_kg_m", "nominal_tension_n", "diameter_m"}
+    }
+    with before.store() as store:
+        baseline = store.baseline(3)
+    assert baseline is not None
+    assert redescribed(hanger, replace(baseline, described=described)) == ()
+    strand = replace(hanger, kind="strand", scatter=replace(hanger.scatter, section=0.02))
+    assert redescribed(strand, replace(baseline, described=described)) == (
+        "kind from rod to strand",
+        "scatter.section from 0.01 to 0.02",
+    )
+
+
+@pytest.mark.parametrize("name", sorted({each.name for each in fields(Hanger)} - MOVES_NOTHING))
+def test_every_other_field_of_a_hanger_is_compared(before: Workspace, name: str) -> None:
+    """A field that is added to a hanger must be compared, or be said to move nothing."""
+    with before.store() as store:
+        baseline = store.baseline(3)
+    assert baseline is not None
+    assert baseline.described is not None
+    other = replace(baseline, described={**baseline.described, name: "another"})
+    assert [each.split()[0] for each in redescribed(before.bridge.hanger(3), other)] == [name]
+
+
+def test_the_page_of_the_hanger_says_so_first(before: Workspace) -> None:
+    workspace = rewritten(before, "length_m = 12.0", "length_m = 12.4")
+    with served(workspace) as site, site.client() as client:
+        page = client.get("/hangers/3", headers={"Accept": "text/html"}).text
+    start = page.index("<main")
+    assert 0 < page.index("has changed since its baseline") - start < 1500

@@ -1,0 +1,220 @@
+"""A damaged row is named, stops its hanger alone, and is made again from the archive."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sqlalchemy as sa
+
+import shm_daemon
+from shm.pipeline import steps
+from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.reporting import hanger_report
+from shm.report import Status
+from shm.store import Stage, Store, Workspace
+from shm.store.checking import check_store
+from shm.store.tables import posteriors
+from shm.values import FloatArray
+from shm_cli import working
+from shm_cli.main import run
+from tests.helpers import quick_update
+from tests.helpers.contents import quiet
+from tests.helpers.damaging import change, damage, flipped
+from tests.helpers.flows import Clock, a_flow, receive_all, tension_kn, threads
+from tests.helpers.workspaces import START, make_workspace, write_test
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quick() -> Iterator[None]:
+    """The sampler's stand-in, also for the command line."""
+    with pytest.MonkeyPatch.context() as patch:
+        for verb in ("update", "refresh", "select"):
+            patch.setattr(steps, verb, getattr(quick_update, verb))
+        patch.setattr(working, "executor_of", threads)
+        yield
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two hangers with three tests each, all through; hanger 3 has an alert."""
+    workspace = make_workspace(tmp_path_factory.mktemp("damage") / "bridge", hangers=(3, 4))
+    for hanger in (3, 4):
+        for day, tension in ((0, 1.0), (30, 0.8), (60, 0.8)):
+            name = f"h{hanger}-{day}.modes.json"
+            write_test(workspace.spool / name, workspace, hanger=hanger, day=day, tension=tension)
+    with a_flow(workspace) as flow:
+        receive_all(flow)
+        flow.drain()
+    return workspace.folder
+
+
+@pytest.fixture
+def bridge(made: Path, tmp_path: Path) -> Workspace:
+    return Workspace.open(shutil.copytree(made, tmp_path / "bridge"))
+
+
+def through_the_flow(workspace: Workspace) -> dict[str, Stage]:
+    """Takes in what lies in the spool; where each file then stands."""
+    with a_flow(workspace, clock=Clock(START + timedelta(days=200))) as flow:
+        receive_all(flow)
+        flow.drain()
+        return {each.file.file_name: each.stage for each in flow.store.recordings()}
+
+
+def next_tests(workspace: Workspace) -> None:
+    for hanger in (3, 4):
+        path = workspace.spool / f"h{hanger}-90.modes.json"
+        write_test(path, workspace, hanger=hanger, day=90, tension=0.8)
+
+
+def troubles(workspace: Workspace) -> tuple[str, ...]:
+    with workspace.store() as store:
+        return check_store(store, quiet).troubles
+
+
+def test_one_damaged_posterior_stops_its_hanger_alone_and_says_so(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = tension_of(bridge)
+    damage(bridge, "posteriors", "samples", 1)
+    next_tests(bridge)
+    stages = through_the_flow(bridge)
+    assert (stages["h4-90.modes.json"], stages["h3-90.modes.json"]) == (Stage.DONE, "identified")
+    assert run(["--workspace", str(bridge.folder), "status"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "hanger 3 stands still: row 1 of posteriors of hanger 3 is damaged" in said
+    assert "shm ingest --again" in said
+    with bridge.store() as store:
+        assert [row.hanger for row in store.known_damage()] == [3]
+    assert run(["--workspace", str(bridge.folder), "ingest", "--again", "h3-0"]) == 0
+    assert troubles(bridge) == ()
+    stages = through_the_flow(bridge)
+    assert set(stages.values()) == {Stage.DONE}
+    after = tension_of(bridge)
+    assert {name: after[name] for name in before} == pytest.approx(before, rel=1e-3)
+    with bridge.store() as store:
+        assert store.known_damage() == ()
+
+
+def baseline_tension_n(workspace: Workspace) -> FloatArray:
+    with workspace.store() as store:
+        baseline = store.baseline(3)
+        assert baseline is not None
+        return baseline.posterior.tension_n
+
+
+def tension_of(workspace: Workspace) -> dict[str, float]:
+    with workspace.store() as store:
+        return tension_kn(store)
+
+
+def test_the_daemon_lives_with_a_damaged_posterior(bridge: Workspace) -> None:
+    damage(bridge, "posteriors", "samples", 1)
+    next_tests(bridge)
+    shm_daemon.run(bridge, once=True, make_executor=threads)
+    with bridge.store() as store:
+        assert store.test_named(4, "h4-90").stage is Stage.WATCHED
+        assert store.test_named(3, "h3-90").stage is Stage.IDENTIFIED
+        assert [row.hanger for row in store.known_damage()] == [3]
+
+
+def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: Workspace) -> None:
+    """Of each table that a page, a report or `shm status` reads, one row damaged at a time."""
+    for table, column, id_ in (
+        ("posteriors", "document", 2),
+        ("tests", "document", 2),
+        ("watches", "document", 1),
+        ("alerts", "document", 1),
+        ("summaries", "document", 2),
+        ("watch_states", "content", 1),
+        ("recordings", "received_at", 2),
+        ("tests", "time", 2),
+    ):
+        with values_changed(bridge, table, column, id_):
+            with bridge.store() as store:
+                lines = hanger_lines(bridge, store)
+                assert len(lines) == 2
+                assert lines[1].status is Status.ALERT, table
+                assert hanger_report(bridge, store, 4, START).posterior.hanger == 4
+                assert len(store.alerts()) == len(store.alert_rows()) == 2
+            assert run(["--workspace", str(bridge.folder), "status"]) == 0
+            assert run(["--workspace", str(bridge.folder), "report", "--bridge"]) == 0
+            assert run(["--workspace", str(bridge.folder), "db", "check"]) == 5
+
+
+def test_a_damaged_watch_shows_no_green_hanger(bridge: Workspace) -> None:
+    damage(bridge, "watches", "document", 2)
+    with bridge.store() as store:
+        line = hanger_lines(bridge, store)[0]
+    assert line.status is None
+    assert "row 2 of watches of hanger 3 is damaged" in line.called
+
+
+@contextmanager
+def values_changed(workspace: Workspace, table: str, column: str, id_: int) -> Iterator[None]:
+    """One value is damaged while the context lasts."""
+    before: list[Any] = []
+
+    def altered(value: Any) -> Any:
+        before.append(value)
+        return "no time" if column in ("time", "received_at") else flipped(value)
+
+    change(workspace.location, table, column, id_, altered)
+    yield
+    change(workspace.location, table, column, id_, lambda _: before[0])
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "id_"),
+    [
+        ("tests", "document", 1),  # of the baseline
+        ("tests", "document", 3),
+        ("posteriors", "document", 1),
+        ("posteriors", "samples", 3),
+        ("watches", "document", 1),
+        ("summaries", "document", 1),
+        ("watch_states", "content", 1),
+    ],
+)
+def test_what_can_be_computed_is_made_again_from_the_archive(
+    bridge: Workspace, table: str, column: str, id_: int
+) -> None:
+    before, baseline_n = tension_of(bridge), baseline_tension_n(bridge)
+    damage(bridge, table, column, id_)
+    assert any(f"of {table}" in said for said in troubles(bridge))
+    recording = str(id_ if table in ("tests", "posteriors") else 2)
+    assert run(["--workspace", str(bridge.folder), "ingest", "--again", recording]) == 0
+    assert troubles(bridge) == ()
+    assert tension_of(bridge) == pytest.approx(before, rel=1e-3)
+    assert np.array_equal(baseline_tension_n(bridge), baseline_n)
+    next_tests(bridge)
+    assert set(through_the_flow(bridge).values()) == {Stage.DONE}
+
+
+def test_an_update_of_a_damaged_row_does_not_make_it_pass_for_whole(bridge: Workspace) -> None:
+    damage(bridge, "posteriors", "samples", 2)
+    with bridge.store() as store:
+        with store.writing() as connection:
+            changed = sa.update(posteriors).where(posteriors.c.id == 2)
+            connection.execute(changed.values(superseded_at=START))
+        assert [(each.table, each.id) for each in check_store(store, quiet).damaged] == [
+            ("posteriors", 2)
+        ]
+
+
+def test_a_backup_keeps_all_else_and_names_the_damaged_row(
+    bridge: Workspace, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    damage(bridge, "posteriors", "document", 2)
+    file = tmp_path / "safe.db"
+    assert run(["--workspace", str(bridge.folder), "db", "backup", str(file)]) == 5
+    assert "row 2 of posteriors of hanger 3 is damaged" in capsys.readouterr().err
+    with Store.open(file) as store:
+        assert len(store.recordings()) == 6

@@ -1,0 +1,368 @@
+"""What is implausible is held: it counts in nothing until a person has looked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from shm import plausibility
+from shm.documents import dump
+from shm.errors import NothingThere, UsageError
+from shm.modes_document import modes_document
+from shm.plausibility.bar import of_another_bar
+from shm.read import write
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.store import Decision, Outcome, Stage, Store, Workspace
+from shm.values import ModalTest, Recording
+from tests.helpers.flows import Postman, a_flow, ingest, receive_all
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.workspaces import START, modelled_test, put
+
+EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
+
+
+@pytest.fixture(autouse=True)
+def of_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What rings here is no hanger: these tests are of clocks, copies and decisions."""
+    others = tuple(check for check in plausibility.CHECKS if check is not of_another_bar)
+    monkeypatch.setattr(plausibility, "CHECKS", others)
+
+
+def spool(
+    workspace: Workspace, name: str, time: datetime | None, tension: float = 1.0
+) -> ModalTest:
+    test = modelled_test(name, workspace.bridge.hanger(3), tension=tension)
+    test = replace(test, time=time)
+    put(workspace.spool / f"{name}.modes.json", dump(modes_document([test])))
+    return test
+
+
+def day(number: float) -> datetime:
+    return START + timedelta(days=number)
+
+
+@pytest.fixture
+def held(workspace: Workspace) -> Workspace:
+    """A good test, then one of 1970 with a tenth less tension."""
+    spool(workspace, "good", day(0))
+    ingest(workspace)
+    spool(workspace, "lost", EPOCH, tension=0.9)
+    ingest(workspace)
+    return workspace
+
+
+def counted(store: Store) -> list[str]:
+    return [test.test.id for test in store.tests(3)]
+
+
+def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
+    """Four of them raised neither refusal, flag nor alert, and hid a loss of 10 %."""
+    spool(held, "again", EPOCH + timedelta(minutes=5), tension=0.9)
+    postman = Postman()
+    ingest(held, notifier=postman)
+    with held.store() as store:
+        first, second = (stored.alert for stored in store.alerts())
+        assert first.kinds == second.kinds == ("held",)
+        assert first.message.startswith("Hanger 3 may have lost 10 % of its tension: one held test")
+        assert "2 held tests agree" in second.message
+        assert "Repeat the test today" in second.message
+        assert "1970-01-01 00:08" in second.message
+        assert postman.told == [("mail", first.key), ("mail", second.key)]
+
+
+def test_what_is_held_counts_in_nothing(held: Workspace) -> None:
+    with held.store() as store:
+        assert counted(store) == ["good"]
+        assert store.stage_counts()[Stage.HELD] == 1
+        assert store.drifts(3) == ()
+        assert [test.test.id for test, _ in store.history(3)] == ["good"]
+        assert [row.name for row in store.test_rows(3)] == ["good"]
+        assert store.latest_tests()[3].tests == 1
+        assert len(store.trend(held.bridge.hanger(3))) == 1
+        assert store.oldest_waiting() is None
+        assert store.waiting_tests() == ()
+        with pytest.raises(NothingThere):
+            store.test_named(3, "lost")
+        (hold,) = store.holds()
+        assert (hold.recording_id, hold.hanger, hold.decision) == (2, 3, None)
+        assert [doubt.check for doubt in hold.doubts] == ["clock before the bridge"]
+
+
+def test_a_first_test_that_is_held_makes_no_baseline(workspace: Workspace) -> None:
+    spool(workspace, "first", EPOCH)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.baseline(3) is None
+        assert store.stage_counts()[Stage.HELD] == 1
+
+
+def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
+    held: Workspace,
+) -> None:
+    with a_flow(held) as flow:
+        at = flow.clock()
+        hold = flow.store.confirm(2, "Ann", "clock was dead", at)
+        assert (hold.decision, hold.who, hold.why) == (Decision.CONFIRMED, "Ann", "clock was dead")
+        flow.drain()
+        assert flow.store.recording(2).stage is Stage.DONE
+        _, test = flow.store.tests(3)
+        assert test.time == flow.store.recording(2).received_at
+        assert test.test.time is None
+        assert "confirmed by Ann" in test.notes[-1]
+        assert [drift.test for drift in flow.store.drifts(3)] == ["lost"]
+        assert flow.store.holds() == ()
+        (notice,) = flow.store.alerts()
+        assert notice.acknowledgement is not None
+        assert notice.acknowledgement.who == "Ann"
+
+
+def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.confirm(2, "Ann", "", flow.clock(), day(30))
+        flow.drain()
+        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
+        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        flow.drain()
+        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
+        assert flow.store.stage_counts()[Stage.HELD] == 0
+        with pytest.raises(UsageError, match="not held: it was confirmed by Ann"):
+            flow.store.confirm(2, "Bob", "", flow.clock())
+
+
+def test_a_time_yet_to_come_is_given_to_no_test(held: Workspace) -> None:
+    with a_flow(held) as flow, pytest.raises(UsageError, match="yet to come"):
+        flow.store.confirm(2, "Ann", "", flow.clock(), day(9000))
+
+
+def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.discard(2, "Ann", "wrong hanger", flow.clock())
+        flow.drain()
+        recording = flow.store.recording(2)
+        assert recording.stage is Stage.REFUSED
+        assert recording.reason is not None
+        assert recording.reason["message"] == "discarded by Ann: wrong hanger"
+        assert held.archive.holds(recording.file)
+        assert counted(flow.store) == ["good"]
+        assert flow.store.holds() == ()
+
+
+def test_what_was_discarded_and_comes_again_is_held_again(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.discard(2, "Ann", "", flow.clock())
+        spool(held, "lost", EPOCH, tension=0.9)
+        receive_all(flow)
+        flow.drain()
+        assert flow.store.recording(2).stage is Stage.HELD
+        assert len(flow.store.alerts()) == 2
+
+
+def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:
+    tests = [
+        replace(modelled_test(name, workspace.bridge.hanger(3)), time=time)
+        for name, time in (("a", day(0)), ("b", EPOCH), ("c", day(30)))
+    ]
+    put(workspace.spool / "campaign.modes.json", dump(modes_document(tests)))
+    with a_flow(workspace) as flow:
+        receive_all(flow)
+        flow.drain()
+        assert counted(flow.store) == ["a", "c"]
+        assert [drift.test for drift in flow.store.drifts(3)] == ["c"]
+        assert flow.store.recording(1).stage is Stage.HELD
+        flow.store.confirm(1, "Ann", "", flow.clock())
+        flow.drain()
+        assert flow.store.recording(1).stage is Stage.DONE
+        assert counted(flow.store) == ["a", "c", "b"]
+
+
+def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Workspace) -> None:
+    spool(workspace, "first", EPOCH)
+    with a_flow(workspace) as flow:
+        receive_all(flow)
+    for _ in range(3):  # each time a process of its own
+        ingest(workspace)
+    with workspace.store() as store:
+        assert len(store.alerts()) == len(store.holds()) == 1
+
+
+@pytest.mark.parametrize(
+    ("time", "check"),
+    [
+        (datetime(1, 1, 1, tzinfo=UTC), "clock before the bridge"),
+        (datetime(1979, 12, 31, tzinfo=UTC), "clock before the bridge"),
+        (datetime(2000, 1, 1, 7, tzinfo=UTC), "clock before the bridge"),
+        (START + timedelta(days=101, hours=1), "clock ahead"),
+        (datetime(9999, 12, 31, tzinfo=UTC), "clock ahead"),
+    ],
+)
+def test_a_time_that_cannot_be_is_held(workspace: Workspace, time: datetime, check: str) -> None:
+    spool(workspace, "first", time)
+    ingest(workspace)
+    with workspace.store() as store:
+        (hold,) = store.holds()
+        assert [doubt.check for doubt in hold.doubts] == [check]
+        assert hold.time_unknown
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        START + timedelta(days=100, hours=14),  # received on day 100, in another zone
+        datetime(1995, 5, 1, tzinfo=UTC),  # found in an old folder
+        None,
+    ],
+)
+def test_what_may_be_passes(workspace: Workspace, time: datetime | None) -> None:
+    spool(workspace, "good", day(0))
+    spool(workspace, "other", time)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.stage_counts()[Stage.DONE] == 2
+
+
+def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> None:
+    described = workspace.folder / "bridge.toml"
+    text = described.read_text().replace('name = "Test bridge"', 'name = "B"\nbuilt = 1998-06-01')
+    described.write_text(text)
+    spool(workspace, "before", datetime(1998, 5, 31, 23, tzinfo=UTC))
+    spool(workspace, "after", datetime(1998, 6, 1, tzinfo=UTC))
+    ingest(workspace.reopened())
+    with workspace.store() as store:
+        assert counted(store) == ["after"]
+        assert "The bridge was built on 1998-06-01." in store.holds()[0].message
+
+
+def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
+    midnight = datetime(2026, 5, 2, tzinfo=UTC)
+    for name, time, tension in (
+        ("a", day(0), 1.0),
+        ("b", day(0), 0.9),
+        ("c", midnight, 1.0),
+        ("d", midnight, 1.001),
+    ):
+        spool(workspace, name, time, tension)
+        ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["a", "c", "d"]
+        (hold,) = store.holds()
+        assert [doubt.check for doubt in hold.doubts] == [
+            "clock stuck",
+            "clock before the baseline",
+        ]
+        assert "may have lost 10 % of its tension" in hold.message
+
+
+def test_a_loss_dated_before_the_baseline_is_held_and_an_old_test_is_not(
+    workspace: Workspace,
+) -> None:
+    """A test from before the baseline can raise no alert: the watch takes it for the start."""
+    for name, number, tension in (("a", 10, 1.0), ("old", 3, 1.01), ("off", 9, 0.9)):
+        spool(workspace, name, day(number), tension)
+        ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["old", "a"]
+        (hold,) = store.holds()
+        assert [doubt.check for doubt in hold.doubts] == ["clock before the baseline"]
+
+
+def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> None:
+    test = spool(workspace, "a", day(0))
+    ingest(workspace)
+    renamed = dump(modes_document([replace(test, id="b")]))
+    put(workspace.spool / "b.modes.json", renamed)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["a"]
+        assert "copy" in [doubt.check for doubt in store.holds()[0].doubts]
+
+
+def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        flow.drain()
+        assert len(flow.store.holds()) == 1
+        former, _ = flow.store.alerts()
+        assert former.acknowledgement is not None
+
+
+def test_what_is_not_there_cannot_be_confirmed(held: Workspace) -> None:
+    with held.store() as store:
+        with pytest.raises(NothingThere, match="no recording 9"):
+            store.confirm(9, "Ann", "", START)
+        with pytest.raises(UsageError, match="recording 1 is not held"):
+            store.discard(1, "Ann", "", START)
+
+
+def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> None:
+    spool(held, "lost", EPOCH, tension=0.9)
+    with a_flow(held) as flow:
+        receipt = flow.receive(held.spool / "lost.modes.json")
+        assert receipt.outcome is Outcome.DUPLICATE
+        assert flow.store.recording(2).stage is Stage.HELD
+
+
+def a_recording(seed: int = 1) -> Recording:
+    state = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
+    plan, rng = HammerPlan(hits=3), np.random.default_rng(seed)
+    return hammer_test(HANGER_3, state, plan, rng, time=day(0), source="s")
+
+
+def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Workspace) -> None:
+    """It confirmed itself: the watch calls a change at the second test that shows it."""
+    first = a_recording()
+    write(first, workspace.spool / "a.npz")
+    ingest(workspace)
+    scaled = [replace(c, values=c.values[5:] * 1.0) for c in first.channels[::-1]]
+    again = replace(first, channels=tuple(scaled), time=day(30))
+    for name in ("b.uff", "c.csv", "d.h5"):
+        write(again, workspace.spool / name)
+        ingest(workspace)
+    write(replace(a_recording(2), time=day(60)), workspace.spool / "e.npz")
+    ingest(workspace)
+    with workspace.store() as store:
+        assert counted(store) == ["a", "e"]
+        assert [hold.file_name for hold in store.holds()] == ["b.uff", "c.csv", "d.h5"]
+        for hold in store.holds():
+            assert "copy" in [doubt.check for doubt in hold.doubts]
+            assert "again" in hold.message
+
+
+def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace) -> None:
+    write(a_recording(), workspace.spool / "a.uff")  # its sidecar says hanger 3
+    raw = (workspace.spool / "a.uff").read_bytes()
+    sidecar = (workspace.spool / "a.toml").read_text()
+    ingest(workspace)
+    with workspace.store() as store:
+        (before,) = store.tests(3)
+    put(workspace.spool / "a.toml", sidecar.replace("2026-05-01", "2026-05-09"))
+    put(workspace.spool / "a.uff", raw)
+    with a_flow(workspace) as flow:
+        receipt = flow.receive(workspace.spool / "a.uff")
+        assert receipt.outcome is Outcome.REDESCRIBED
+        flow.drain()
+        (after,) = flow.store.tests(3)
+        assert after.time == before.time + timedelta(days=8)
+        assert after.lineage.input_sha256 != before.lineage.input_sha256
+        former, _ = flow.store.former_tests(1)
+        assert former.superseded_at is not None
+        assert list(workspace.spool.iterdir()) == []
+
+
+def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
+    write(replace(a_recording(), time=EPOCH), workspace.spool / "a.uff")
+    raw = (workspace.spool / "a.uff").read_bytes()
+    sidecar = (workspace.spool / "a.toml").read_text()
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.stage_counts()[Stage.HELD] == 1
+    put(workspace.spool / "a.toml", sidecar.replace("1970-01-01", "2026-05-09"))
+    put(workspace.spool / "a.uff", raw)
+    ingest(workspace)
+    with workspace.store() as store:
+        assert store.holds() == ()
+        assert store.recording(1).stage is Stage.DONE
+        (notice,) = store.alerts()
+        assert notice.acknowledgement is not None

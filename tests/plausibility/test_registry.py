@@ -1,0 +1,110 @@
+"""Every check leaves a plain test alone, and what it says is made for a person to read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import UTC, date, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from shm.models import THESIS, build
+from shm.plausibility import CHECKS, Candidate, Check, doubts_about, implied_shift, notice_of
+from shm.values import Fingerprint, Hanger, KnownSamples
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.workspaces import START, modelled_test
+
+DAY = timedelta(days=1)
+PRINT = Fingerprint("0" * 64, np.eye(2, 256))
+PLAIN = Candidate(
+    hanger=HANGER_3,
+    test=modelled_test("t", HANGER_3, day=3),
+    received_at=START + 4 * DAY,
+    tolerance=DAY,
+    modified_at=START + 4 * DAY,
+    built=date(1990, 1, 1),
+    file_times=[START + 3 * DAY],
+    reference=[modelled_test("b", HANGER_3)],
+    reference_at=START,
+    fingerprint=PRINT,
+    copies=[KnownSamples("a.csv", 3, Fingerprint("1" * 64, np.eye(3, 256, 5)))],
+)
+HALVED = tuple(
+    replace(m, frequency_hz=m.frequency_hz / 2, frequency_sd_hz=m.frequency_sd_hz / 2)
+    for m in PLAIN.test.modes
+)
+DOUBTED = {
+    "clock before the bridge": {"test": replace(PLAIN.test, time=datetime(1970, 1, 1, tzinfo=UTC))},
+    "clock ahead": {"received_at": START + DAY},
+    "clock scattered": {"file_times": [START, START + 3 * DAY]},
+    "clock stuck": {"same_time": [modelled_test("other", HANGER_3, 3, 1.1)]},
+    "clock before the baseline": {
+        "reference": [modelled_test("b", HANGER_3, tension=1.1)],
+        "reference_at": START + 5 * DAY,
+    },
+    "right time base": {"test": replace(PLAIN.test, modes=HALVED), "earlier": PLAIN.reference},
+    "right signals": {"signals": ["acc_1 moves as 7 g would: right unit?"]},
+    "copy": {"copies": [KnownSamples("a.csv (recording 1)", 4, PRINT)]},
+}
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+def test_a_check_has_no_doubt_of_a_plain_test_nor_where_nothing_is_known(check: Check) -> None:
+    assert check(PLAIN) is None
+    bare = replace(PLAIN.test, time=None)
+    assert check(Candidate(HANGER_3, bare, START, DAY)) is None
+
+
+def test_every_check_is_tried_here() -> None:
+    assert len(DOUBTED) == len(CHECKS)
+
+
+@pytest.mark.parametrize("check", DOUBTED)
+def test_a_doubt_says_what_is_the_matter_what_to_do_and_why(check: str) -> None:
+    candidate = replace(PLAIN, **DOUBTED[check])  # type: ignore[arg-type]
+    doubts = doubts_about(candidate)
+    assert [doubt.check for doubt in doubts] == [check]
+    (doubt,) = doubts
+    assert doubt.why.endswith(".")
+    assert not doubt.state.endswith(".")
+    assert not doubt.action.endswith(".")
+    message = notice_of(candidate, doubts, 12, [])
+    for part in (doubt.state, doubt.action, doubt.why, "--confirm 12", "--discard 12"):
+        assert part in message
+    assert len(message.split(". ", maxsplit=1)[0].split()) <= 25
+
+
+@pytest.mark.parametrize("share", [0.8, 0.9, 0.95, 1.0, 1.1])
+def test_the_tension_that_the_modes_imply_is_that_of_the_beam(share: float) -> None:
+    """Clamped ends, as described: f(T) of beam1 is the closed form; linear in ln T to 10 %."""
+    found = implied_shift(modelled_test("t", HANGER_3, 0, share), PLAIN.reference, HANGER_3)
+    assert found == pytest.approx(share - 1, rel=0.1, abs=1e-9)
+
+
+def test_of_a_pinned_bar_too() -> None:
+    """f_n^2 ~ n^2 T (1 + n^2 pi^2 EI / (T L^2))."""
+    pinned = replace(HANGER_3, supports=replace(HANGER_3.supports, deck="pinned", arch="pinned"))
+
+    def of(tension: float) -> float:
+        xi = np.pi**2 * pinned.bending_stiffness_n_m2 / pinned.length_m**2
+        return float(np.sqrt(tension + xi))
+
+    before = modelled_test("b", HANGER_3)
+    first = replace(before, modes=(replace(before.modes[0], frequency_hz=of(711e3)),))
+    lost = replace(before, modes=(replace(before.modes[0], frequency_hz=of(0.95 * 711e3)),))
+    assert implied_shift(lost, [first], pinned) == pytest.approx(-0.05, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "hanger", [replace(HANGER_3, nominal_tension_n=0.0), HANGER_3], ids=["no tension", "no mode"]
+)
+def test_nothing_is_implied_where_nothing_can_be(hanger: Hanger) -> None:
+    reference = PLAIN.reference if hanger is not HANGER_3 else []
+    assert math.isnan(implied_shift(PLAIN.test, reference, hanger))
+
+
+def test_the_model_behind_the_helpers_is_the_clamped_beam() -> None:
+    model = build("beam1", HANGER_3, THESIS)
+    frequency = float(model.frequencies_hz(np.array([[1.0, 1.0]]), 1)[0, 0, 0])
+    assert PLAIN.reference[0].modes[0].frequency_hz == frequency
