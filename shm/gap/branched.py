@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch
 from shm.gap.landscape import log_normal
+from shm.gap.straight import Straight
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray, IntArray
@@ -26,28 +27,52 @@ _FROM_WHOLE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points w (n, p), each on the branch of index `branch` (n,)."""
+    """Points w (n, p), each on the branch of index `branch` (n,), straightened to y (n, p).
+
+    `log_volume` (n,) is the log of |dy/dw|.
+    """
 
     branch: IntArray
     w: FloatArray
+    y: FloatArray
+    log_volume: FloatArray
 
     def joined(self, other: Points) -> Points:
         """Both sets of points."""
-        return Points(np.append(self.branch, other.branch), np.vstack([self.w, other.w]))
+        return Points(
+            np.append(self.branch, other.branch),
+            np.vstack([self.w, other.w]),
+            np.vstack([self.y, other.y]),
+            np.append(self.log_volume, other.log_volume),
+        )
 
 
 class Proposal:
-    """A mixture of branches: `shares` (branches,), the t distributions of each or None."""
+    """A mixture of branches: `shares` (branches,), the t distributions of each or None.
 
-    def __init__(self, shares: FloatArray, mixtures: Sequence[TMixture | None], dimension: int):
+    These are of straightened points.
+    """
+
+    def __init__(
+        self,
+        shares: FloatArray,
+        mixtures: Sequence[TMixture | None],
+        dimension: int,
+        straight: Straight,
+    ):
         shares = np.maximum(shares, _LEAST_SHARE)
         self._shares: FloatArray = shares / shares.sum()
         self._mixtures = tuple(mixtures)
         self._dimension = dimension
+        self._straight = straight
 
     @classmethod
     def about(
-        cls, peaks: Sequence[Peak], branches: Sequence[Branch], columns: IntArray
+        cls,
+        peaks: Sequence[Peak],
+        branches: Sequence[Branch],
+        columns: IntArray,
+        straight: Straight,
     ) -> Proposal:
         """About the peaks of a fit, of whose parameters those of `columns` are drawn."""
         mixtures, log_shares = [], []
@@ -55,20 +80,22 @@ class Proposal:
             own = [each for each in peaks if np.array_equal(each.signs[columns], branch.signs)]
             log = np.array([each.log_evidence for each in own])
             log_shares.append(logsumexp(log) if own else -np.inf)
-            parts = [Normal(p.w[columns], p.covariance[np.ix_(columns, columns)]) for p in own]
+            parts = [_about(each, columns, straight) for each in own]
             mixtures.append(TMixture(parts, normalised(log)) if own else None)
-        return cls(normalised(np.array(log_shares)), mixtures, len(columns))
+        return cls(normalised(np.array(log_shares)), mixtures, len(columns), straight)
 
     def draw(self, count: int, rng: np.random.Generator) -> Points:
         """Points from this proposal."""
         branch = rng.choice(len(self._shares), count, p=self._shares)
         w = rng.standard_normal((count, self._dimension))
+        y = self._straight.y(w)
         own = rng.random(count) >= _FROM_PRIOR
         for k, mixture in enumerate(self._mixtures):
             rows = np.flatnonzero((branch == k) & own)
             if mixture is not None and len(rows):
-                w[rows] = mixture.draw(len(rows), rng)
-        return Points(branch, w)
+                y[rows] = mixture.draw(len(rows), rng)
+                w[rows] = self._straight.w(y[rows])
+        return Points(branch, w, y, self._straight.log_volume(w, y))
 
     def log_density(self, points: Points) -> FloatArray:
         """Log density (n,) by branch and w."""
@@ -77,7 +104,8 @@ class Proposal:
         for k, mixture in enumerate(self._mixtures):
             rows = np.flatnonzero(points.branch == k)
             if mixture is not None and len(rows):
-                own = np.log(1 - _FROM_PRIOR) + mixture.log_density(points.w[rows])
+                own = np.log(1 - _FROM_PRIOR) + mixture.log_density(points.y[rows])
+                own += points.log_volume[rows]
                 density[rows] = np.logaddexp(own, np.log(_FROM_PRIOR) + prior[rows])
         return np.asarray(np.log(self._shares)[points.branch] + density)
 
@@ -90,8 +118,14 @@ class Proposal:
         for k, mixture in enumerate(self._mixtures):
             rows = np.flatnonzero(points.branch == k)
             shares.append(float(np.exp(_total(log_weight[rows]) - _total(log_weight))))
-            mixtures.append(_refitted(mixture, points.w[rows], tempered[rows], rng))
-        return Proposal(np.array(shares), mixtures, self._dimension)
+            mixtures.append(_refitted(mixture, points.y[rows], tempered[rows], rng))
+        return Proposal(np.array(shares), mixtures, self._dimension, self._straight)
+
+
+def _about(peak: Peak, columns: IntArray, straight: Straight) -> Normal:
+    w, slopes = peak.w[columns], straight.slopes(peak.w[columns])
+    covariance = peak.covariance[np.ix_(columns, columns)]
+    return Normal(straight.y(w[None])[0], slopes @ covariance @ slopes.T)
 
 
 def _total(log_weight: FloatArray) -> float:

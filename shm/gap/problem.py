@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -16,6 +17,7 @@ from shm.gap.noise import nodes
 from shm.gap.readings import reading_loads
 from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
 from shm.gap.shapes import ShapeScaling, turn_loads
+from shm.gap.straight import Pair, Straight
 from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Variant, parameters_of
@@ -67,6 +69,20 @@ class GapProblem:
             parameters[first:last] = [cut(each, share) for each in parameters[first:last]]
             first = last
         return Coordinates(parameters, baseline, self.hanger.scatter)
+
+    def straight(self, coordinates: Coordinates) -> Straight:
+        """What straightens the posterior of the baseline's end springs among `other` columns."""
+        own = math.log10(
+            self._baseline.wave_stiffness_n_m_rad((1 + self.design.frequency_order.max()) / 2)
+        )
+        other = [coordinates.parameters[column] for column in coordinates.other]
+        at = {parameter.name: index for index, parameter in enumerate(other)}
+        return Straight(
+            [
+                Pair(at[one], at[two], other[at[one]].lower, other[at[one]].upper, own)
+                for one, two in self._baseline.pairs
+            ]
+        )
 
     def predict(
         self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None

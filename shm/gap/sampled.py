@@ -85,6 +85,7 @@ class _Sampler:
             branch.part(self._other) for branch in coordinates.branches
         ]
         self._conditional = Conditional(self._landscape, fit)
+        self._straight = problem.straight(coordinates)
         self._fit = fit
 
     @property
@@ -98,7 +99,7 @@ class _Sampler:
         The proposal is refitted to all draws so far. The answer rests on fresh draws; where too few
         of these are effective they join the others, and the proposal is refitted again.
         """
-        proposal = Proposal.about(self._fit.peaks, self._branches, self._other)
+        proposal = Proposal.about(self._fit.peaks, self._branches, self._other, self._straight)
         pool = _empty()
         for _ in range(attempts):
             for _ in range(_MOST_TRIALS):

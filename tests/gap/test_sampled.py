@@ -18,6 +18,7 @@ from shm.gap.noise import nodes
 from shm.gap.problem import GapProblem
 from shm.gap.sampled import sampled
 from shm.gap.sensitivity import scan, truncate
+from shm.gap.straight import Straight
 from shm.inference.tmcmc import normalised
 from shm.models.effects import Variant
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
@@ -183,7 +184,7 @@ def test_refitting_follows_a_bent_posterior_until_most_draws_count(s: float) -> 
     rng, bent = np.random.default_rng(3), _Bent(s)
     signs = np.zeros(2)
     peak = Peak(signs, np.array([0.0, -1.0]), np.diag([1.0, s**2]), 0.0)
-    proposal = Proposal.about([peak], [Branch(signs)], np.arange(2))
+    proposal = Proposal.about([peak], [Branch(signs)], np.arange(2), Straight(()))
     shares = []
     for _ in range(6):
         points = proposal.draw(1500, rng)

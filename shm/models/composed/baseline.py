@@ -54,6 +54,15 @@ class Baseline:
     def names(self) -> tuple[str, ...]:
         return tuple(parameter.name for parameter in self.parameters)
 
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The end springs of each plane that give way together."""
+        return tuple(self._model.swaps)
+
+    def wave_stiffness_n_m_rad(self, order: float) -> float:
+        """What an end spring is stiff or soft against in mode `order`."""
+        return self._model.wave_stiffness_n_m_rad(order)
+
     def physical(self, theta: FloatArray, sensors: int) -> PhysicalHanger:
         """The hangers of `theta` (n, parameters) before any effect, with that many sensors."""
         whole = self._whole(theta)
