@@ -80,7 +80,8 @@ class Proposal:
             own = [each for each in peaks if np.array_equal(each.signs[columns], branch.signs)]
             log = np.array([each.log_evidence for each in own])
             log_shares.append(logsumexp(log) if own else -np.inf)
-            parts = [_about(each, columns, straight) for each in own]
+            parts = [part for each in own for part in _about(each, columns, straight)]
+            log = np.repeat(log, len(parts) // max(len(own), 1))
             mixtures.append(TMixture(parts, normalised(log)) if own else None)
         return cls(normalised(np.array(log_shares)), mixtures, len(columns), straight)
 
@@ -122,10 +123,12 @@ class Proposal:
         return Proposal(np.array(shares), mixtures, self._dimension, self._straight)
 
 
-def _about(peak: Peak, columns: IntArray, straight: Straight) -> Normal:
+def _about(peak: Peak, columns: IntArray, straight: Straight) -> list[Normal]:
+    """Normal distributions of straightened points about a peak."""
     w, slopes = peak.w[columns], straight.slopes(peak.w[columns])
-    covariance = peak.covariance[np.ix_(columns, columns)]
-    return Normal(straight.y(w[None])[0], slopes @ covariance @ slopes.T)
+    covariance = slopes @ peak.covariance[np.ix_(columns, columns)] @ slopes.T
+    centre = straight.y(w[None])[0]
+    return [Normal(centre, np.outer(k, k) * covariance) for k in straight.widths(len(w))]
 
 
 def _total(log_weight: FloatArray) -> float:
@@ -142,10 +145,9 @@ def _refitted(
     if effective(share) >= _TO_CLUSTER * w.shape[1]:
         population = w[systematic(share, _POPULATION, rng)]
         # Equal copies of a point would make a cluster of no extent.
-        spread = _JITTER * population.std(axis=0)
-        return TMixture.of(
-            population + spread * rng.standard_normal(population.shape), _CLUSTERS, rng
-        ).joined([Normal.of(population)], _FROM_WHOLE)
+        whole = Normal.of(population)
+        spread = _JITTER * rng.standard_normal(population.shape) @ whole.factor.T
+        return TMixture.of(population + spread, _CLUSTERS, rng).joined([whole], _FROM_WHOLE)
     if mixture is None:
         mixture = TMixture([Normal(np.zeros(w.shape[1]), np.eye(w.shape[1]))], np.ones(1))
     log = [

@@ -27,8 +27,11 @@ from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 _TRIAL, _MOST_TRIALS = 150, 10
-_FINAL, _MOST_FINALS = 400, 4
+_FINAL, _MOST_FINALS = 300, 5
 _ATTEMPTS = 3
+_HOPELESS = 0.7 * ENOUGH_EFFECTIVE / _MOST_FINALS
+"""Effective draws of a batch: with fewer, the finals would not be enough in the end."""
+
 _TO_FIT = 150.0
 _UNSEEN = 1.25
 _MUCH_BETTER = 2.0
@@ -108,10 +111,12 @@ class _Sampler:
                 if _effective(pool) >= _TO_FIT:
                     break
             final = _empty()
-            for _ in range(_MOST_FINALS):
+            for count in range(1, _MOST_FINALS + 1):
                 self._draw(final, proposal, _FINAL, rng)
                 if _effective(final) >= ENOUGH_EFFECTIVE:
                     return final
+                if _effective(final) < count * _HOPELESS:
+                    break
             pool.absorb(final)
         return pool
 
