@@ -14,9 +14,10 @@ from scipy.special import logsumexp
 
 from shm.gap.contract import Fit
 from shm.gap.landscape import Landscape
+from shm.gap.straight import Straight
 from shm.values import BoolArray, FloatArray, IntArray
 
-_STEPS = 4
+_STEPS = 3
 _SETTLED_GAIN = 0.2
 _LONGEST_STEP = 2.5
 _NEVER = -1e300
@@ -50,13 +51,19 @@ class Settled:
 class Conditional:
     """Settles the linear parameters with the slopes that they have at a fit."""
 
-    def __init__(self, landscape: Landscape, fit: Fit):
+    def __init__(self, landscape: Landscape, fit: Fit, straight: Straight):
         self._landscape = landscape
         self._linear = landscape.coordinates.linear
         self._fit = fit
         slopes = fit.slopes[:, self._linear]
         self._weighed = landscape.likelihood.weighed(slopes)
         inner = self._weighed.products(slopes.T) + np.eye(len(self._linear))
+        rest = landscape.coordinates.other
+        self._straight, self._middle = straight, straight.y(fit.z[None, rest])[0]
+        bent = straight.slopes(fit.z[rest])
+        own = bent @ fit.covariance[np.ix_(rest, rest)] @ bent.T
+        shared = bent @ fit.covariance[np.ix_(rest, self._linear)]
+        self._pull = np.linalg.solve(own, shared)
         self._covariance: FloatArray = np.linalg.inv(inner).astype(np.float64)
         self._height = landscape.likelihood.log_height - np.linalg.slogdet(inner)[1] / 2
 
@@ -83,10 +90,7 @@ class Conditional:
         rest = self._landscape.coordinates.other
         z = np.empty((len(other), len(self._fit.z)))
         z[:, rest] = other
-        covariance = self._fit.covariance
-        own = covariance[np.ix_(rest, rest)]
-        pull = np.linalg.solve(own, covariance[np.ix_(rest, self._linear)])
-        away = (other - self._fit.z[rest]) @ pull
+        away = (self._straight.y(other) - self._middle) @ self._pull
         z[:, self._linear] = self._fit.z[self._linear] + away.clip(-_LONGEST_STEP, _LONGEST_STEP)
         return z
 

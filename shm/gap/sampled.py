@@ -87,8 +87,8 @@ class _Sampler:
         self._branches: Sequence[Branch] = [
             branch.part(self._other) for branch in coordinates.branches
         ]
-        self._conditional = Conditional(self._landscape, fit)
         self._straight = problem.straight(coordinates)
+        self._conditional = Conditional(self._landscape, fit, self._straight)
         self._fit = fit
 
     @property
