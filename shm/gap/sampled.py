@@ -1,7 +1,7 @@
 """The posterior of a fit by importance sampling, where a normal distribution is too plain.
 
-Only what is not nearly linear is drawn, from t distributions put on the fit's peaks and refitted
-to their own weighted draws (Cappe et al. 2008, population Monte Carlo), with a share of the prior
+Only what is not nearly linear is drawn, end springs in straightened coordinates, from t
+distributions put on the fit's peaks and refitted to their own weighted draws (Cappe et al. 2008, population Monte Carlo), with a share of the prior
 so that no weight is unbounded (Hesterberg 1995). Tension and the bar's deviations are integrated
 out at each draw. Where too few draws are effective it goes on, and a fit says how many are.
 """
@@ -26,9 +26,9 @@ from shm.inference.pool import Pool
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
-_TRIAL, _MOST_TRIALS = 150, 10
+_TRIAL, _MOST_TRIALS = 150, 16
 _FINAL, _MOST_FINALS = 300, 5
-_ATTEMPTS = 3
+_ATTEMPTS = 2
 _HOPELESS = 0.7 * ENOUGH_EFFECTIVE / _MOST_FINALS
 """Effective draws of a batch: with fewer, the finals would not be enough in the end."""
 
