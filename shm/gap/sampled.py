@@ -1,9 +1,11 @@
 """The posterior of a fit by importance sampling, where a normal distribution is too plain.
 
 Only what is not nearly linear is drawn, end springs in straightened coordinates, from t
-distributions put on the fit's peaks and refitted to their own weighted draws (Cappe et al. 2008, population Monte Carlo), with a share of the prior
-so that no weight is unbounded (Hesterberg 1995). Tension and the bar's deviations are integrated
-out at each draw. Where too few draws are effective it goes on, and a fit says how many are.
+distributions put on the fit's peaks and refitted to their own weighted draws (Cappe et al. 2008,
+population Monte Carlo), with a share of the prior so that no weight is unbounded (Hesterberg 1995).
+Tension and the bar's deviations are integrated out at each draw. The answer rests on fresh draws,
+since a proposal lies high on the very draws it was refitted to. Where too few draws are effective
+it goes on, and a fit says how many are.
 """
 
 from __future__ import annotations

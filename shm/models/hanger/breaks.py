@@ -68,7 +68,11 @@ def _columns(values: list[FloatArray], rows: int) -> FloatArray:
 def _inside(places: FloatArray) -> FloatArray:
     """The columns that lie inside the bar in any row, each once."""
     inside = np.any((places > _AT_END) & (places < 1 - _AT_END), axis=0)
-    return np.asarray(np.unique(places[:, inside], axis=1))
+    kept: list[FloatArray] = []
+    for column in places.T[inside]:
+        if not any(np.array_equal(column, other) for other in kept):
+            kept.append(column)
+    return _columns(kept, len(places))
 
 
 def _forces(physical: PhysicalHanger) -> FloatArray:
