@@ -16,13 +16,16 @@ from shm.inference.mixture import Normal, TMixture
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray, IntArray
 
-_FROM_PRIOR = 0.1
+_FROM_PRIOR, _FROM_FIRST = 0.05, 0.1
 _INFLATION = 1.3
 _FEWEST_TO_FIT = 12
 _LEAST_SHARE = 0.02
 _HEAVY = 0.1
 _TO_CLUSTER, _CLUSTERS, _POPULATION, _JITTER = 6, 6, 400, 0.2
 _FROM_WHOLE = 0.2
+_FROM_NARROW, _REFITS = 0.5, 3
+"""Steps after which a cluster is as narrow as its points: of narrow peaks far apart the spread and
+what it borrows from the whole are much wider. The wide ones stay, for what is not found yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,8 @@ class Points:
 class Proposal:
     """A mixture of branches: `shares` (branches,), the t distributions of each or None.
 
-    These are of straightened points.
+    These are of straightened points. A part is drawn from the `first` ones, those of a fit's peaks,
+    so that no peak is lost before it is found to matter.
     """
 
     def __init__(
@@ -59,10 +63,15 @@ class Proposal:
         mixtures: Sequence[TMixture | None],
         dimension: int,
         straight: Straight,
+        first: Sequence[TMixture | None] | None = None,
     ):
         shares = np.maximum(shares, _LEAST_SHARE)
         self._shares: FloatArray = shares / shares.sum()
-        self._mixtures = tuple(mixtures)
+        self._core, self._first = tuple(mixtures), tuple(mixtures if first is None else first)
+        self._mixtures = [
+            core if core is None or begun is None else core.mixed(begun, _FROM_FIRST)
+            for core, begun in zip(self._core, self._first, strict=True)
+        ]
         self._dimension = dimension
         self._straight = straight
 
@@ -116,11 +125,11 @@ class Proposal:
         """Moved towards weighted points: where these are many, new parts on their clusters."""
         tempered = _tempered(log_weight, _FEWEST_TO_FIT * self._dimension)
         shares, mixtures = [], []
-        for k, mixture in enumerate(self._mixtures):
+        for k, mixture in enumerate(self._core):
             rows = np.flatnonzero(points.branch == k)
             shares.append(float(np.exp(_total(log_weight[rows]) - _total(log_weight))))
             mixtures.append(_refitted(mixture, points.y[rows], tempered[rows], rng))
-        return Proposal(np.array(shares), mixtures, self._dimension, self._straight)
+        return Proposal(np.array(shares), mixtures, self._dimension, self._straight, self._first)
 
 
 def _about(peak: Peak, columns: IntArray, straight: Straight) -> list[Normal]:
@@ -147,7 +156,10 @@ def _refitted(
         # Equal copies of a point would make a cluster of no extent.
         whole = Normal.of(population)
         spread = _JITTER * rng.standard_normal(population.shape) @ whole.factor.T
-        return TMixture.of(population + spread, _CLUSTERS, rng).joined([whole], _FROM_WHOLE)
+        wide = narrow = TMixture.of(population + spread, _CLUSTERS, rng)
+        for _ in range(_REFITS):
+            narrow = narrow.refitted(w, share)
+        return wide.mixed(narrow, _FROM_NARROW).joined([whole], _FROM_WHOLE)
     if mixture is None:
         mixture = TMixture([Normal(np.zeros(w.shape[1]), np.eye(w.shape[1]))], np.ones(1))
     log = [

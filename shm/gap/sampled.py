@@ -28,13 +28,17 @@ from shm.inference.pool import Pool
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
-_TRIAL, _MOST_TRIALS = 150, 16
-_FINAL, _MOST_FINALS = 300, 5
-_ATTEMPTS = 2
-_HOPELESS = 0.7 * ENOUGH_EFFECTIVE / _MOST_FINALS
-"""Effective draws of a batch: with fewer, the finals would not be enough in the end."""
+_FIRST, _TRIAL, _FINAL = 450, 150, 300
+_MOST, _FEW = 6000, 3600
+_HOPEFUL = 0.1
+"""Effective share of the fresh draws from which on more of them are worth while."""
 
-_TO_FIT = 150.0
+_INSTEAD = 2.0
+"""Times as many effective draws, where they are not all fresh: the evidence is then 0.2 too low."""
+
+_TO_FIT = 50.0
+"""Effective draws, per parameter drawn, to which a proposal is fitted well enough to rest on."""
+
 _UNSEEN = 1.25
 _MUCH_BETTER = 2.0
 
@@ -62,7 +66,7 @@ def sampled(
     Where a draw is much more probable than the fit's `z`, the fit is made anew from there.
     """
     sampler = _Sampler(problem, fit)
-    final = sampler.run(rng, _ATTEMPTS if thorough else 1)
+    final = sampler.run(rng, _MOST if thorough else _FEW)
     points, settled = final.batch.points, final.batch.settled
     best = int((settled.log_marginal + log_normal(points.w)).argmax())
     if settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
@@ -98,27 +102,31 @@ class _Sampler:
         """The log likelihood at the fit's other parameters, the linear ones integrated out."""
         return float(self._conditional.settled(self._fit.z[None, self._other]).log_marginal[0])
 
-    def run(self, rng: np.random.Generator, attempts: int) -> _Pool:
-        """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as so many attempts have.
+    def run(self, rng: np.random.Generator, most: int) -> _Pool:
+        """Draws of which `ENOUGH_EFFECTIVE` are effective, or as many as `most` draws have.
 
         The proposal is refitted to all draws so far. The answer rests on fresh draws; where too few
-        of these are effective they join the others, and the proposal is refitted again.
+        of these are effective they join the others, and the proposal is refitted again, unless so
+        many are effective together that it does not matter what they were fitted to.
         """
         proposal = Proposal.about(self._fit.peaks, self._branches, self._other, self._straight)
-        pool = _empty()
-        for _ in range(attempts):
-            for _ in range(_MOST_TRIALS):
-                self._draw(pool, proposal, _TRIAL, rng)
-                proposal = proposal.refitted(pool.batch.points, pool.log_weights, rng)
-                if _effective(pool) >= _TO_FIT:
-                    break
-            final = _empty()
-            for count in range(1, _MOST_FINALS + 1):
+        pool, final = _empty(), _empty()
+        to_fit = _TO_FIT * max(len(self._other), 1)
+        while pool.draws + final.draws < most:
+            if pool.draws and _effective(pool) >= to_fit:
                 self._draw(final, proposal, _FINAL, rng)
                 if _effective(final) >= ENOUGH_EFFECTIVE:
                     return final
-                if _effective(final) < count * _HOPELESS:
+                if _effective(final) >= _HOPEFUL * final.draws:
+                    continue
+                pool.absorb(final)
+                final = _empty()
+                if _effective(pool) >= _INSTEAD * ENOUGH_EFFECTIVE:
                     break
+            else:
+                self._draw(pool, proposal, _TRIAL if pool.draws else _FIRST, rng)
+            proposal = proposal.refitted(pool.batch.points, pool.log_weights, rng)
+        if final.draws:
             pool.absorb(final)
         return pool
 

@@ -16,6 +16,7 @@ from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
 from shm.gap.sampled import sampled
 from shm.gap.sensitivity import scan, superposed, truncate
+from shm.gap.straight import Straight
 from shm.models.effects import Parameter, Variant
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy
@@ -47,6 +48,9 @@ class LinearProblem:
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
         return Likelihood(nodes(self.observations))
+
+    def straight(self, coordinates: Coordinates) -> Straight:
+        return Straight(())
 
     def exact_log_evidence(self) -> float:
         return toy.log_evidence(nodes(self.observations), self.slopes, self.observations.value)

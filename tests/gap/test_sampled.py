@@ -196,3 +196,24 @@ def test_refitting_follows_a_bent_posterior_until_most_draws_count(s: float) -> 
     log_weight = bent.log(points.w) - proposal.log_density(points)
     assert shares[-1] > max(0.15, 1.5 * shares[0])
     assert logsumexp(log_weight) - np.log(4000) == pytest.approx(0.0, abs=0.08)
+
+
+def test_refitting_keeps_to_narrow_peaks_far_apart() -> None:
+    """Each 0.03 wide and 4 apart: what a cluster borrows from the whole is much wider."""
+    rng, signs, sd = np.random.default_rng(4), np.zeros(2), 0.03
+    tops = [np.array([-2.0, 0.5]), np.array([2.0, 0.5])]
+    peaks = [Peak(signs, top, sd**2 * np.eye(2), 0.0) for top in tops]
+    proposal = Proposal.about(peaks, [Branch(signs)], np.arange(2), Straight(()))
+    for _ in range(4):
+        points = proposal.draw(400, rng)
+        log_target = logsumexp(
+            [stats.multivariate_normal.logpdf(points.w, top, sd**2) for top in tops], axis=0
+        )
+        log_weight = log_target - proposal.log_density(points)
+        proposal = proposal.refitted(points, log_weight, rng)
+    points = proposal.draw(400, rng)
+    log_target = logsumexp(
+        [stats.multivariate_normal.logpdf(points.w, top, sd**2) for top in tops], axis=0
+    )
+    weight = normalised(log_target - proposal.log_density(points))
+    assert 1 / np.sum(weight**2) > 0.25 * len(weight)
