@@ -29,7 +29,7 @@ from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 _FIRST, _TRIAL, _FINAL = 450, 150, 300
-_MOST, _FEW = 6000, 2700
+_MOST, _FEW = 6000, 3600
 _HOPEFUL = 0.1
 """Effective share of the fresh draws from which on more of them are worth while."""
 
