@@ -4,6 +4,8 @@ Uvicorn counts connections, not requests, and sets no deadline to a caller that 
 silent, or drips in a byte at a time. Here a connection *waits* until its request has come as a
 whole, and again once that is answered. Who waits too long is cut off; where too many wait, those
 that have waited longest make room, first of the same address, so that a new caller always gets in.
+Before them go those that were answered and have not sent all that they asked with: a thousand slow
+uploads that are refused at once would else push out who has just come.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import ssl
 import struct
 import termios
 from array import array
-from collections import defaultdict
+from collections import OrderedDict, defaultdict
 from contextlib import suppress
 from typing import Any, ClassVar
 
@@ -41,13 +43,18 @@ class Door:
 
     def __init__(self, certificate: ssl.SSLContext | None = None):
         self.certificate = certificate
-        self._waiting: dict[Guarded, str] = {}
-        self._of_address: defaultdict[str, dict[Guarded, None]] = defaultdict(dict)
+        self._waiting: OrderedDict[Guarded, str] = OrderedDict()
+        self._of_address: defaultdict[str, OrderedDict[Guarded, None]] = defaultdict(OrderedDict)
 
-    def waits(self, one: Guarded, address: str) -> None:
-        """A connection waits; where too many do, the one that has waited longest is cut off."""
+    def waits(self, one: Guarded, address: str, *, makes_room: bool) -> None:
+        """A connection waits; where too many do, the first is cut off: one that `makes_room`, else
+        the one that has waited longest.
+        """
         same = self._of_address[address]
         self._waiting[one], same[one] = address, None
+        if makes_room:
+            self._waiting.move_to_end(one, last=False)
+            same.move_to_end(one, last=False)
         if len(same) > FROM_AN_ADDRESS:
             self._cut_off(next(iter(same)))
         elif len(self._waiting) > FROM_ALL:
@@ -145,7 +152,8 @@ class Guarded(H11Protocol):
 
     def _wait(self) -> None:
         self._deadline = self.loop.call_later(DEADLINE_S, self._overdue)
-        self.door.waits(self, self._address)
+        refused = self.cycle is not None and self.cycle.response_complete and self.cycle.more_body
+        self.door.waits(self, self._address, makes_room=refused)
 
     def _stop_waiting(self) -> None:
         if self._deadline is not None:
