@@ -221,6 +221,7 @@ class Flow:
             log.info("%s %d: done", *running.job.key, extra=_about(running.job))
         except DamagedRow as error:
             self._stop(running.job, error)
+            return
         except StoreError as error:
             if error.retry_after_s is not None:
                 raise

@@ -8,6 +8,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from shm.errors import DamagedRow
 from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
 from shm.store import (
     Decision,
@@ -97,7 +98,12 @@ def _candidate(
 
 
 def _latest_of(store: Store, hanger: Hanger, recording: StoredRecording) -> Sequence[StoredTest]:
-    return store.latest_tests_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
+    """Of another hanger; none where a row of it is damaged, which must not stop this one."""
+    try:
+        return store.latest_tests_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
+    except DamagedRow as error:
+        store.note_damage(error, recording.received_at)
+        return ()
 
 
 def _possible(time: datetime | None) -> datetime | None:

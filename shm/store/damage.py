@@ -99,7 +99,7 @@ class Damage(Database):
             for row in connection.execute(chosen).all():
                 item = at_position.get(row.position)
                 if item is not None:
-                    values = {**test_contents(item, row.name), **vars(lineage)}
+                    values = {**test_contents(item, row.name), **lineage.columns}
                     _overwrite(connection, tests, row.id, values)
 
     def heal_posterior(
