@@ -7,6 +7,7 @@ killed at any instant and simply goes on.
 
 from __future__ import annotations
 
+import errno
 import logging
 from collections.abc import Callable
 from concurrent.futures import (
@@ -37,6 +38,8 @@ _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
 _LONGEST_S = 86400.0
 _AGAIN_S = 60.0
+_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENFILE)
+"""What a step meets that is no fault of its recording, and passes when somebody sees to it."""
 
 log = logging.getLogger(__name__)
 
@@ -205,6 +208,10 @@ class Flow:
             until = self.clock() + timedelta(seconds=error.retry_after_s)
             self._postponed.update(dict.fromkeys(job.recordings, until))
             log.warning("%s %s is tried again: %s", *job.key, error, extra=_about(job))
+        elif isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+            self._hold(job, _AGAIN_S)
+            said = "%s %s is tried again in %.0f s: %s. See to the disk and to temporary files."
+            log.warning(said, *job.key, _AGAIN_S, error, extra=_about(job))
         else:
             self._refuse(job, error)
 

@@ -16,7 +16,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -177,12 +177,16 @@ class Archive:
         self.refuse_damaged(file)
         assert file.archived_as is not None
         views = self.folder / ".open"
-        views.mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=views) as view:
-            path = Path(view) / Path(file.file_name).name
-            _link(self.folder / file.archived_as, path)
-            if file.sidecar_as is not None:
-                _link(self.folder / file.sidecar_as, sidecar_path(path))
+        with ExitStack() as stack:
+            try:
+                views.mkdir(exist_ok=True)
+                view = stack.enter_context(tempfile.TemporaryDirectory(dir=views))
+                path = Path(view) / Path(file.file_name).name
+                _link(self.folder / file.archived_as, path)
+                if file.sidecar_as is not None:
+                    _link(self.folder / file.sidecar_as, sidecar_path(path))
+            except OSError as error:
+                raise _explained(error, self.folder) from error
             try:
                 yield path
             except Exception as error:

@@ -22,6 +22,11 @@ class Feed:
     bad: set[str] = field(default_factory=set)
     drafts: Path | None = None
 
+    @property
+    def checksums(self) -> dict[str, str]:
+        """The SHA-256 of each file, by name."""
+        return {name: hashlib.sha256(content).hexdigest() for name, content in self.files.items()}
+
     def drop(self) -> None:
         name, content = self.made()
         put(self.workspace.spool / name, content)
@@ -45,7 +50,7 @@ class Feed:
 def assert_all_done_once(feed: Feed) -> None:
     """Every file stored once and brought to its end, none lost, nothing half written."""
     workspace = feed.workspace
-    names = {hashlib.sha256(content).hexdigest(): name for name, content in feed.files.items()}
+    names = {checksum: name for name, checksum in feed.checksums.items()}
     assert [path for path in workspace.spool.rglob("*") if path.is_file()] == []
     _assert_archive_holds(workspace.folder / "archive", set(names))
     with workspace.store() as store:

@@ -1,5 +1,8 @@
 /* Writes down what a process does to the files under $RECORD_ROOT, in order, into $RECORD_LOG.
 
+   It also lets the disk fill (record_fill): what would take room then answers ENOSPC, after half of
+   the first write.
+
    Preloaded into a process (LD_PRELOAD): each call that changes files is passed on to the C library
    and noted, one at a time. Read back by tests/helpers/power.py. What is mapped into memory is not
    seen: SQLite maps its index of the write-ahead log alone, which it makes anew after a crash. */
@@ -84,6 +87,26 @@ void record_mark(const char *text) {
     pthread_mutex_unlock(&lock);
 }
 
+static long asked = 0, full_from = 0, full_until = 0;
+
+/* From the n-th call that takes room, counted from now, until another the disk is full. */
+void record_fill(long from, long until) { asked = 0; full_from = from; full_until = until; }
+
+/* How many calls have taken or asked for room since. */
+long record_asked(void) { return asked; }
+
+static int is_full(void) {
+    asked++;
+    return full_from && asked >= full_from && asked < full_until;
+}
+#define REFUSED (errno = ENOSPC, pthread_mutex_unlock(&lock), -1)
+
+/* How much of a write the disk still takes. */
+static size_t room_for(size_t n) {
+    if (!is_full()) return n;
+    return asked == full_from ? n / 2 : 0;
+}
+
 static int opened(int at, const char *path, int flags, mode_t mode) {
     char full[4096];
     absolute(at, path, full);
@@ -92,6 +115,7 @@ static int opened(int at, const char *path, int flags, mode_t mode) {
     pthread_mutex_lock(&lock);
     struct stat s;
     int is_new = lstat(full, &s) != 0;
+    if (is_new && is_full()) return REFUSED;
     int fd = REAL(openat)(at, path, flags, mode);
     if (fd >= 0 && (is_new || (flags & O_TRUNC)))
         note('C', inode_of(fd), is_new, full, strlen(full), "", 0);
@@ -112,6 +136,7 @@ ssize_t write(int fd, const void *data, size_t n) {
     char full[4096];
     if (!of_descriptor(fd, full)) return REAL(write)(fd, data, n);
     pthread_mutex_lock(&lock);
+    if (n && !(n = room_for(n))) return REFUSED;
     off_t at = fcntl(fd, F_GETFL) & O_APPEND ? lseek(fd, 0, SEEK_END) : lseek(fd, 0, SEEK_CUR);
     ssize_t done = REAL(write)(fd, data, n);
     if (done > 0) note('W', inode_of(fd), at, data, done, "", 0);
@@ -123,6 +148,7 @@ static ssize_t written(int fd, const void *data, size_t n, off_t at) {
     char full[4096];
     if (!of_descriptor(fd, full)) return REAL(pwrite)(fd, data, n, at);
     pthread_mutex_lock(&lock);
+    if (n && !(n = room_for(n))) return REFUSED;
     ssize_t done = REAL(pwrite)(fd, data, n, at);
     if (done > 0) note('W', inode_of(fd), at, data, done, "", 0);
     pthread_mutex_unlock(&lock);
@@ -160,6 +186,7 @@ int fdatasync(int fd) { return synced(fd, REAL(fdatasync)); }
     absolute(at1, path1, one); absolute(at2, path2, two); \
     if (!is_under(one) && !is_under(two)) return call; \
     pthread_mutex_lock(&lock); \
+    if (is_full()) return REFUSED; \
     int result = call; \
     if (!result) note(kind, 0, 0, one, strlen(one), two, strlen(two)); \
     pthread_mutex_unlock(&lock); \
@@ -169,6 +196,7 @@ int fdatasync(int fd) { return synced(fd, REAL(fdatasync)); }
     absolute(at1, path1, one); \
     if (!is_under(one)) return call; \
     pthread_mutex_lock(&lock); \
+    if ((kind) == 'M' && is_full()) return REFUSED; \
     int result = call; \
     if (!result) note(kind, 0, 0, one, strlen(one), "", 0); \
     pthread_mutex_unlock(&lock); \

@@ -51,7 +51,14 @@ def compiler() -> str | None:
 
 def recorded(folder: Path, script: str, *arguments: str, where: Path) -> list[Operation]:
     """Runs a module in a process of its own; what it did to `folder`, in order."""
-    library, log = where / "recorder.so", where / "operations"
+    log = where / "operations"
+    watched(folder, script, *arguments, where=where, log=log)
+    return list(_read(log.read_bytes()))
+
+
+def watched(folder: Path, script: str, *arguments: str, where: Path, log: Path) -> None:
+    """Runs a module in a process of its own whose calls go through the recorder."""
+    library = where / "recorder.so"
     build = [str(compiler()), "-shared", "-fPIC", "-O1", "-o", str(library), str(_SOURCE), "-ldl"]
     subprocess.run([*build, "-lpthread"], check=True)
     environment = {
@@ -64,7 +71,6 @@ def recorded(folder: Path, script: str, *arguments: str, where: Path) -> list[Op
     }
     command = [sys.executable, "-m", script, str(folder), *arguments]
     subprocess.run(command, check=True, cwd=ROOT, env=environment)
-    return list(_read(log.read_bytes()))
 
 
 def mark(text: str) -> None:
