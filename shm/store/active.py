@@ -99,9 +99,16 @@ class FileLock:
             holder = file.read().strip() or "unknown"
             file.close()
             raise _busy(f"process {holder}", str(self._path.parent)) from None
-        file.truncate(0)
-        file.write(str(os.getpid()))
-        file.flush()
+        try:
+            os.ftruncate(file.fileno(), 0)
+            os.write(file.fileno(), str(os.getpid()).encode())
+        except OSError as error:
+            file.close()
+            raise StoreError(
+                f"{self._path} cannot be written ({error.strerror}).",
+                remedy="Free some space on its disk.",
+                retry_after_s=60.0,
+            ) from error
         self._file = file
 
     def held(self) -> bool:
