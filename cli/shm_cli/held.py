@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import getpass
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import date, datetime
 from typing import Any
 
 import rich_click as click
 
 from shm.documents import parse_time
-from shm.errors import BadInput, StoreBusy
+from shm.errors import BadInput, StoreBusy, UsageError
 from shm.pipeline import utc_now
+from shm.plausibility import FIRST_DAY
 from shm.store import Decision, Hold, Stage, StoredAlert, Workspace
 from shm_cli.common import paragraph, show
 from shm_cli.working import finish, working
@@ -42,6 +43,7 @@ def decide(
 
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
+    _refuse_impossible(time, workspace.bridge.built)
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}
@@ -57,6 +59,17 @@ def decide(
         return hold, [stored for stored in store.alerts() if stored.id not in known]
 
 
+def _refuse_impossible(time: datetime | None, built: date | None) -> None:
+    """The day of no recording, whatever a person says."""
+    first = max(FIRST_DAY, built or FIRST_DAY)
+    if time is not None and time.date() < first:
+        why = "the bridge was built" if first == built else "any recording"
+        raise UsageError(
+            f"that time is before {why} ({first:%Y-%m-%d}).",
+            remedy="Give the true time, or leave --time out: then that of its receipt counts.",
+        )
+
+
 def decided_words(hold: Hold, stage: Stage) -> str:
     """What became of a hold."""
     what = f"Recording {hold.recording_id} ({hold.file_name}) is {hold.decision}"
@@ -67,7 +80,7 @@ def decided_words(hold: Hold, stage: Stage) -> str:
         time = f" Its time is {hold.time:%Y-%m-%d %H:%M}."
     elif hold.time_unknown:
         time = " Its time is not known: that of its receipt counts."
-    return f"{what} and counts from now on; it is {stage}.{time}"
+    return f"{what} and counts from now on, for good; it is {stage}.{time}"
 
 
 def told(hold: Hold) -> str:

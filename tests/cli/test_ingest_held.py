@@ -112,6 +112,7 @@ def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspac
         (("--why", "because", "--again", 2), 2),
         (("--confirm", 2, "--time", "yesterday"), 3),
         (("--confirm", 2, "--time", "2999-01-01"), 2),
+        (("--confirm", 2, "--time", "1970-01-01"), 2),
         (("--confirm", 99), 4),
         (("--confirm", "nobody"), 4),
         (("--discard", 1), 2),
