@@ -14,11 +14,9 @@ import pytest
 import sqlalchemy as sa
 
 import shm_daemon
-from shm import plausibility
 from shm.pipeline import steps
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.reporting import hanger_report
-from shm.plausibility.bar import of_another_bar
 from shm.report import Status
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import check_store
@@ -27,6 +25,7 @@ from shm.values import FloatArray
 from shm_cli import working
 from shm_cli.main import run
 from tests.helpers import quick_update
+from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import change, damage, flipped
 from tests.helpers.flows import Clock, a_flow, receive_all, tension_kn, threads
@@ -37,9 +36,8 @@ from tests.helpers.workspaces import START, make_workspace, write_test
 def _quick() -> Iterator[None]:
     """The sampler's stand-in, also for the command line. Two equal hangers ring alike, which
     is not what is tried here."""
-    others = tuple(check for check in plausibility.CHECKS if check is not of_another_bar)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plausibility, "CHECKS", others)
+        take_any_bar(patch)
         for verb in ("update", "refresh", "select"):
             patch.setattr(steps, verb, getattr(quick_update, verb))
         patch.setattr(working, "executor_of", threads)

@@ -8,15 +8,14 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from shm import plausibility
 from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import modes_document
-from shm.plausibility.bar import of_another_bar
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, Workspace
 from shm.values import ModalTest, Recording
+from tests.helpers.any_bar import take_any_bar
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test, put
@@ -27,8 +26,7 @@ EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
 @pytest.fixture(autouse=True)
 def of_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
     """What rings here is no hanger: these tests are of clocks, copies and decisions."""
-    others = tuple(check for check in plausibility.CHECKS if check is not of_another_bar)
-    monkeypatch.setattr(plausibility, "CHECKS", others)
+    take_any_bar(monkeypatch)
 
 
 def spool(
