@@ -10,7 +10,7 @@ from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import utc_now
 from shm.pipeline.rebuilding import rebuild
 from shm.store import Rerun, Stage, Store, Workspace
-from shm_cli.working import finish, working
+from shm_cli.working import LEFT_TO_IT, finish, working
 
 
 def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
@@ -31,8 +31,8 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
     try:
         with working(workspace) as flow:
             finish(flow, [recording_id])
-    except StoreBusy as busy:
-        click.echo(f"{busy.message} It does the rest.", err=True)
+    except StoreBusy:
+        click.echo(LEFT_TO_IT, err=True)
     return rerun
 
 

@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.plausibility import FIRST_DAY
 from shm.store import Decision, Hold, Stage, StoredAlert, Workspace
 from shm_cli.common import paragraph, show
-from shm_cli.working import finish, working
+from shm_cli.working import LEFT_TO_IT, finish, working
 
 
 def show_held(workspace: Workspace, as_json: bool) -> int:
@@ -50,12 +50,13 @@ def decide(
         recording_id = int(which) if which.isdecimal() else store.recording_named(which)[0]
         if decision is Decision.DISCARDED:
             return store.discard(recording_id, who, why, utc_now()), ()
+        _refuse_copy_without_reason(store.latest_hold(recording_id), why)
         hold = store.confirm(recording_id, who, why, utc_now(), time)
         try:
             with working(workspace) as flow:
                 finish(flow, [recording_id])
-        except StoreBusy as busy:
-            click.echo(f"{busy.message} It does the rest.", err=True)
+        except StoreBusy:
+            click.echo(LEFT_TO_IT, err=True)
         return hold, [stored for stored in store.alerts() if stored.id not in known]
 
 
@@ -67,6 +68,16 @@ def _refuse_impossible(time: datetime | None, built: date | None) -> None:
         raise UsageError(
             f"that time is before {why} ({first:%Y-%m-%d}).",
             remedy="Give the true time, or leave --time out: then that of its receipt counts.",
+        )
+
+
+def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
+    """One impact that counts twice confirms itself: that is not done by one word."""
+    copies = [d for test in (hold.tests if hold else ()) for d in test.doubts if d.check == "copy"]
+    if copies and not why and hold is not None and hold.decision is None:
+        raise UsageError(
+            f"recording {hold.recording_id} is held because {copies[0].state}.",
+            remedy='Say why it counts all the same: --why "the other was filed wrongly".',
         )
 
 

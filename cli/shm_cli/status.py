@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import timedelta
 from typing import Any
 
@@ -15,7 +16,7 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.words import model_class
-from shm.store import ENDED, DeliveryState, Store, Workspace
+from shm.store import ENDED, DeliveryState, Store, StoredTest, Workspace
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages
@@ -96,8 +97,29 @@ def _show(document: dict[str, Any]) -> None:
             str(row["open_alerts"] or ""),
         )
     show_table(made)
-    for each in document["held"]:
-        click.echo(f"held, recording {each['recording']}: {paragraph(each['message'])}")
+    for said in _told_of_held(document["held"]):
+        click.echo(said)
+
+
+def _told_of_held(held: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Of each hanger how many are held, and the one whose modes say most."""
+    of_hangers: dict[int, list[Mapping[str, Any]]] = {}
+    for each in held:
+        of_hangers.setdefault(each["hanger"], []).append(each)
+    told = []
+    for hanger, own in sorted(of_hangers.items()):
+        leading = max(own, key=_shift)
+        many = f"{len(own)} recordings, of which " if len(own) > 1 else "recording "
+        told.append(
+            f"held, hanger {hanger}: {many}{leading['recording']}: {paragraph(leading['message'])}"
+        )
+    return told
+
+
+def _shift(held: Mapping[str, Any]) -> float:
+    """The largest shift of tension that its tests imply; 0 where nothing is known."""
+    shifts = [abs(test["tension_shift"]) for test in held["tests"]]
+    return max((shift for shift in shifts if not math.isnan(shift)), default=0.0)
 
 
 def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
@@ -168,8 +190,10 @@ def _hangers(
     damage = {each.hanger: str(each) for each in store.known_damage()}
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
+        of_baseline: Sequence[StoredTest] = ()
         try:
             baseline, watch = store.baseline(hanger.id), gap_watch(store, hanger.id)
+            of_baseline = store.tests_of(baseline) if baseline else ()
             adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
         except DamagedRow as error:
             damage[hanger.id] = str(error)
@@ -183,7 +207,7 @@ def _hangers(
                 "competing": list(names),
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
-                "baseline_since": (baseline.since or baseline.set_at) if baseline else None,
+                "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
                 "gap": _gap(watch),

@@ -13,6 +13,9 @@ from shm_cli.common import counting_bar
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.hooks import HookNotifier
 
+LEFT_TO_IT = "Noted. The daemon does the rest; see `shm status`."
+"""Where another process ingests already."""
+
 
 @contextmanager
 def working(workspace: Workspace) -> Iterator[Flow]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shm import modes_document
+from shm.read import modes_file
 from shm.read import read as read_file
 from shm.values import FrequencyResponse, ModalTest, Recording
 
@@ -28,11 +28,12 @@ def read(path: str | Path) -> Recording | FrequencyResponse:
 def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
     """The modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
 
-    One test each, modes in Hz by plane and order. Raises BadInput naming test, mode and remedy.
+    One test each, modes in Hz by plane and order. A sidecar NAME.modes.toml may say hanger, time
+    and temperature. Raises BadInput naming test, mode and remedy.
 
     Example:
         >>> tests = shm.load_modes("hanger3.modes.json")
         >>> tests[0].modes[0].frequency_hz
         5.82
     """
-    return modes_document.load_modes(Path(path))
+    return modes_file.load_modes(Path(path))

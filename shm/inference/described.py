@@ -105,11 +105,10 @@ class DescribedCoordinates:
         """End springs of a beam in the planes measured."""
         return self._felt if isinstance(self.model.model, Beam) else ()
 
-    def freedom(self, theta: FloatArray) -> FloatArray:
-        """Mean of 1/(1 + k L/EI) over the springs felt (n,): 0 for clamped ends, 1 for pins."""
-        columns = [self.names.index(name) for name in self.felt_springs]
-        unit = math.log10(self._hanger.bending_stiffness_n_m2 / self._hanger.length_m)
-        return np.asarray((1 / (1 + 10 ** (theta[:, columns] - unit))).mean(axis=1))
+    def springs_alike(self, restraint: float) -> dict[str, float]:
+        """The springs felt where k L/EI of all ends is `restraint`."""
+        unit = self._hanger.bending_stiffness_n_m2 / self._hanger.length_m
+        return dict.fromkeys(self.felt_springs, math.log10(restraint * unit))
 
     # ------------------------------------------------ what is seen, and what is not
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from shm.inference.climbing import climbed
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Weighted
@@ -28,13 +29,13 @@ _EDGE, _MANY = 0.02, 5.0
 a posterior as flat as the prior puts there."""
 
 
-_FREEDOM = (0.1, 0.35, 0.75)
-"""Between ends that clamp, give, turn and are pins, by the mean of 1/(1 + k L/EI): k L/EI of 9, 2
-and 1/3."""
+_ALIKE = 10.0 ** np.append(np.arange(-1.0, 1.6, 0.25), (2.0, 3.0))
+"""k L/EI of ends that are all alike, from nearly pins to nearly clamped."""
 
-_AS_WELL = 2.0
-"""A log likelihood that is lower by less does not speak against ends of a kind (a likelihood ratio
-of 95 % of one parameter), however rare such ends are by the prior."""
+_AS_WELL = 1.0
+"""A fit that is worse by less in its log likelihood is as good. The 90 % interval of a normal
+posterior reaches to 1.35: as good a fit beyond it is not its tail but another answer, which the
+prior of the ends has ruled out, not the data."""
 
 _MATERIAL = 0.1
 """Of the width of the interval, what lies farther beyond it is another answer."""
@@ -151,30 +152,11 @@ def _highest_described(
 ) -> FloatArray:
     """Of flat and normal priors: the squares of the deviates seen belong to the fit."""
     z = coordinates.places(samples[:, :-1])
-    shares, seen = coordinates.smooth(z)
+    _, seen = coordinates.smooth(z)
     at = int((log_likelihood - 0.5 * (seen**2).sum(axis=1)).argmax())
-    count, sigma = shares.shape[1], samples[at, -1]
-    noise = np.hypot(sigma, problem.likelihood.fit_error)
-
-    def scaled(points: FloatArray) -> FloatArray:
-        theta = coordinates.of_smooth(points[:, :count], points[:, count:])
-        return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, points[:, count:]])
-
-    def one(point: FloatArray) -> FloatArray:
-        return np.asarray(scaled(point[None])[0])
-
-    def slopes(point: FloatArray) -> FloatArray:
-        steps = np.where(point < 0.5, _DIFFERENCE, -_DIFFERENCE)
-        found = scaled(np.vstack([point, point + np.diag(steps)]))
-        return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
-
-    start = np.append(shares[at].clip(0, 1), seen[at])
-    lower = np.append(np.zeros(count), np.full(len(start) - count, -np.inf))
-    upper = np.append(np.ones(count), np.full(len(start) - count, np.inf))
-    fit = least_squares(one, start, slopes, bounds=(lower, upper), max_nfev=30)
-    theta = coordinates.of_smooth(fit.x[None, :count], fit.x[None, count:])
-    tau = problem.likelihood.likeliest_sigma(problem.run(theta))
-    return np.append(theta[0], tau)
+    theta, _ = climbed(problem, coordinates, z[at], samples[at, -1])
+    tau = problem.likelihood.likeliest_sigma(problem.run(theta[None]))
+    return np.append(theta, tau)
 
 
 def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
@@ -218,26 +200,35 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
 
 
 def _tension_of_other_ends_n(problem: Problem, outcome: Outcome) -> float:
-    """The median tension with ends of a kind that fits about as well as any, farthest off.
+    """The tension with ends all alike that fit as well as any, farthest beyond the interval.
 
-    NaN where no such tension lies beyond the 90 % interval materially: else the prior of the ends
-    decides the tension, not the data.
+    NaN where there is none. Frequencies tell springs from tension worst where all ends turn softly
+    and alike, which are few among all pairs of ends.
     """
-    coordinates = problem.coordinates
+    coordinates, likelihood = problem.coordinates, problem.likelihood
     if not isinstance(coordinates, DescribedCoordinates) or not coordinates.felt_springs:
         return math.nan
-    theta = outcome.samples[:, :-1]
-    kind = np.digitize(coordinates.freedom(theta), _FREEDOM)
-    fit = problem.likelihood.marginal(outcome.predicted)
-    tension_n = theta[:, 0] * problem.model.hanger.nominal_tension_n
-    low, high = np.quantile(tension_n, [0.05, 0.95])
-    beyond, found = _MATERIAL * (high - low), math.nan
-    for own in (kind == k for k in np.unique(kind[fit > fit.max() - _AS_WELL])):
-        median = float(np.median(tension_n[own]))
-        away = max(low - median, median - high)
-        if away > beyond:
-            beyond, found = away, median
-    return found
+    theta, sigma = outcome.samples[:, :-1], outcome.samples[:, -1]
+    places = coordinates.places(theta)
+    _, seen = coordinates.smooth(places)
+    fit = likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
+    best = int(fit.argmax())
+    climbs, squares = [], []
+    for alike in _ALIKE:
+        springs = coordinates.springs_alike(alike)
+        climb, square = climbed(problem, coordinates, places[best], sigma[best], springs)
+        climbs.append(climb)
+        squares.append(square)
+    others = np.array(climbs)
+    fit_of_others = likelihood.marginal(problem.run(others)) - 0.5 * np.array(squares)
+    as_well = fit_of_others > max(fit[best], fit_of_others.max()) - _AS_WELL
+    nominal_n = problem.model.hanger.nominal_tension_n
+    low, high = np.quantile(theta[:, 0] * nominal_n, [0.05, 0.95])
+    tension_n = others[as_well, 0] * nominal_n
+    away = np.maximum(low - tension_n, tension_n - high)
+    if not (away > _MATERIAL * (high - low)).any():
+        return math.nan
+    return float(tension_n[away.argmax()])
 
 
 def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:

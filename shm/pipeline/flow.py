@@ -204,14 +204,11 @@ class Flow:
             self._put_off(job.delivery, error)
         elif isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
             self._note_death(running, error)
-        elif isinstance(error, ShmError) and error.retry_after_s is not None:
-            until = self.clock() + timedelta(seconds=error.retry_after_s)
+        elif (wait_s := _passes_in_s(error)) is not None:
+            until = self.clock() + timedelta(seconds=wait_s)
             self._postponed.update(dict.fromkeys(job.recordings, until))
-            log.warning("%s %s is tried again: %s", *job.key, error, extra=_about(job))
-        elif isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
-            self._hold(job, _AGAIN_S)
-            said = "%s %s is tried again in %.0f s: %s. See to the disk and to temporary files."
-            log.warning(said, *job.key, _AGAIN_S, error, extra=_about(job))
+            said = "%s %s is tried again in %.0f s: %s"
+            log.warning(said, *job.key, wait_s, error, extra=_about(job))
         else:
             self._refuse(job, error)
 
@@ -319,6 +316,13 @@ class Flow:
         log.warning(
             "hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error, extra=about
         )
+
+
+def _passes_in_s(error: BaseException) -> float | None:
+    """After how long a step may do what it could not; None where trying again is of no use."""
+    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+        return _AGAIN_S
+    return error.retry_after_s if isinstance(error, ShmError) else None
 
 
 def _how_it_died(error: BaseException) -> str:

@@ -3,14 +3,14 @@ their channels say."""
 
 from __future__ import annotations
 
-from shm.plausibility.bars import Known, doubt_of
+from shm.plausibility.bars import Known, OtherOrigin, doubt_of
 from shm.plausibility.candidate import Candidate
 from shm.values import Doubt
 
 _ACTIONS = {
-    "hanger": "Discard it and drop it again with the right hanger's number, or confirm it",
-    "time base": "Correct the sampling rate in its sidecar and drop both again, or confirm it",
-    "planes": "Correct the plane in its sidecar and drop both again, or confirm it",
+    "hanger": "Drop it again with `hanger = {hanger}` in its sidecar, discard it, or confirm it",
+    "time base": "Correct {rate} and drop it again, discard it, or confirm it",
+    "planes": "Correct the planes in {place} and drop it again, discard it, or confirm it",
 }
 
 
@@ -22,7 +22,17 @@ def of_another_bar(candidate: Candidate) -> Doubt | None:
     if found is None or found.kind == "unknown bar":
         return None  # of such a bar the first line of its posterior says that it does not fit
     why = f"The probability that it is not what it is filed as is {found.probability:.2f}."
-    return Doubt(f"right {found.kind}", found.text.rstrip("?"), _ACTIONS[found.kind], why)
+    state = found.text[0].lower() + found.text[1:]
+    return Doubt(f"right {found.kind}", state, _action(candidate, found), why)
+
+
+def _action(candidate: Candidate, found: OtherOrigin) -> str:
+    has_samples = candidate.fingerprint is not None
+    return _ACTIONS[found.kind].format(
+        hanger=found.hanger,
+        rate="the sampling rate in its sidecar" if has_samples else "its frequencies",
+        place="its sidecar" if has_samples else "the file",
+    )
 
 
 def of_other_signals(candidate: Candidate) -> Doubt | None:
@@ -31,7 +41,7 @@ def of_other_signals(candidate: Candidate) -> Doubt | None:
         return None
     return Doubt(
         "right signals",
-        "; ".join(text.rstrip("?.") for text in candidate.signals),
-        "Correct units and channels in its sidecar and drop both again, or confirm it",
+        "; ".join(text.rstrip(".") for text in candidate.signals),
+        "Correct units and channels in its sidecar and drop both again, discard it, or confirm it",
         "The hits, the motion after them and the hanger's mass do not fit together.",
     )

@@ -16,10 +16,10 @@ def notice_of(
     Where its modes themselves are not in doubt, what they imply leads: a wrong clock must not hide
     a loss.
     """
-    of_others = any(doubt.check.startswith(("copy", "right")) for doubt in doubts)
-    loss = "" if of_others else _loss(candidate, others)
+    loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others)
     states = "; ".join(doubt.state for doubt in doubts)
-    held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}."
+    end = "" if states.endswith("?") else "."
+    held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}{end}"
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
     why = " ".join(doubt.why for doubt in doubts)
     return f"{lead} {_what_to_do(doubts, recording_id)} {why} Until then it counts in nothing."
@@ -27,10 +27,14 @@ def notice_of(
 
 def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
     time = " --time TIME" if any(doubt.check.startswith("clock") for doubt in doubts) else ""
-    return (
-        f"{doubts[0].action}: `shm ingest --confirm {recording_id}{time}` or "
-        f"`shm ingest --discard {recording_id}`."
-    )
+    ways = [f"--confirm {recording_id}{time}", f"--discard {recording_id}"]
+    if any(map(_is_of_others, doubts)):
+        ways.reverse()  # most of these are what they seem
+    return f"{doubts[0].action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
+
+
+def _is_of_others(doubt: Doubt) -> bool:
+    return doubt.check.startswith(("copy", "right"))
 
 
 def _loss(candidate: Candidate, others: Sequence[float]) -> str:

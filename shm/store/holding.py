@@ -165,9 +165,14 @@ def _undecided(connection: Connection, recording_id: int) -> Hold:
         known = sa.select(recordings.c.id).where(recordings.c.id == recording_id)
         if connection.scalar(known) is None:
             raise NothingThere(f"no recording {recording_id}.", remedy="See `shm ingest --held`.")
-        decided = "" if row is None else f": it was {row.decision} by {row.who}"
+        if row is None:
+            raise UsageError(
+                f"recording {recording_id} is not held.", remedy="See `shm ingest --held`."
+            )
         raise UsageError(
-            f"recording {recording_id} is not held{decided}.", remedy="See `shm ingest --held`."
+            f"recording {recording_id} is not held: it was {row.decision} by {row.who}.",
+            remedy="To decide anew, drop the file again beside a sidecar that says what is right: "
+            "it is judged again.",
         )
     return _hold(row)
 

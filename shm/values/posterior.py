@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -17,6 +18,8 @@ ENOUGH_EFFECTIVE = 200
 
 MOST_MISFIT_PERCENT = 1.0
 """Beyond it, predictions are off by more than tolerances of manufacture move any frequency."""
+
+_ENDS_DECIDE = "The ends decide"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +129,7 @@ class Posterior:
         if math.isfinite(self.tension_of_other_ends_n):
             other = force_unit(self.tension_of_other_ends_n)
             found.append(
-                "The ends decide: ends of another stiffness fit about as well, with a tension of "
+                f"{_ENDS_DECIDE}: ends of another stiffness fit about as well, with a tension of "
                 f"{other.of(self.tension_of_other_ends_n):.3g} {other.name}. A test with a known "
                 "mass, or a mode shape, tells which."
             )
@@ -192,5 +195,12 @@ class Selection:
             self.selected.repeatability_sd_n,
             float(np.mean(draws > above)) if above == above else NAN,
             float(np.mean(draws < slack)) if slack == slack else NAN,
-            tuple(dict.fromkeys(each for posterior in likely for each in posterior.caveats)),
+            _distinct([each for posterior in likely for each in posterior.caveats]),
         )
+
+
+def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
+    """Each once, in order; of the ends every class says the same with a tension of its own."""
+    found = dict.fromkeys(caveats)
+    of_ends = [each for each in found if each.startswith(_ENDS_DECIDE)]
+    return tuple(each for each in found if each not in of_ends[1:])

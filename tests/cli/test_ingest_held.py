@@ -88,7 +88,7 @@ def test_what_is_confirmed_while_a_daemon_serves_is_left_to_it(shm: Shm, held: W
     with held.lock():
         ended = shm("--workspace", held.folder, "ingest", "--confirm", 2)
     assert ended.code == 0
-    assert "It does the rest." in ended.err
+    assert "The daemon does the rest" in ended.err
     assert "its receipt counts" in ended.out
     with held.store() as store:
         assert store.stage_counts()[Stage.IDENTIFIED] == 1
@@ -101,6 +101,32 @@ def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspac
     again = shm("--workspace", held.folder, "ingest", "--confirm", 2)
     assert again.code == 2
     assert "it was discarded by" in again.err
+    assert "drop the file again beside a sidecar" in " ".join(again.err.split())
+
+
+def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Workspace) -> None:
+    say = ("--workspace", held.folder, "ingest")
+    assert shm(*say, "--confirm", 2).code == 0
+    assert "it was confirmed by" in shm(*say, "--discard", 2).err
+    put(held.spool / "lost.modes.toml", "temperature_c = 12.0\n")
+    put(held.spool / "lost.modes.json", epoch(held))
+    ingest(held)
+    assert [hold["recording"] for hold in shm(*say, "--held", "--json").document["held"]] == [2]
+    assert shm(*say, "--discard", 2).code == 0
+    with held.store() as store:
+        assert [test.test.id for test in store.tests(3)] == ["good"]
+        assert store.drifts(3) == ()
+
+
+def test_a_copy_is_not_confirmed_without_a_reason(shm: Shm, held: Workspace) -> None:
+    test = modelled_test("twin", held.bridge.hanger(3))
+    put(held.spool / "twin.modes.json", dump(modes_document([test])))
+    ingest(held)
+    say = ("--workspace", held.folder, "ingest", "--confirm", 3)
+    refused = shm(*say)
+    assert refused.code == 2
+    assert "is held because" in refused.err
+    assert shm(*say, "--why", "the other was filed wrongly").code == 0
 
 
 @pytest.mark.parametrize(

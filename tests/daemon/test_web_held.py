@@ -70,7 +70,10 @@ def test_health_asks_for_attention_and_does_not_fail(client: httpx.Client) -> No
     assert found.json() == {
         "status": "ok",
         "reasons": [],
-        "attention": ["2 recordings are held until a person decides."],
+        "attention": [
+            "hanger 3: recording 2 is held until a person decides.",
+            "hanger 4: recording 3 is held until a person decides.",
+        ],
     }
 
 

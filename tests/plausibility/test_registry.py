@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 
@@ -72,7 +73,7 @@ def test_a_doubt_says_what_is_the_matter_what_to_do_and_why(check: str) -> None:
     message = notice_of(candidate, doubts, 12, [])
     for part in (doubt.state, doubt.action, doubt.why, "--confirm 12", "--discard 12"):
         assert part in message
-    assert len(message.split(". ", maxsplit=1)[0].split()) <= 25
+    assert len(re.split(r"[.?] ", message, maxsplit=1)[0].split()) <= 25
 
 
 @pytest.mark.parametrize("share", [0.8, 0.9, 0.95, 1.0, 1.1])

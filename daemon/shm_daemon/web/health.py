@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -16,6 +16,8 @@ from typing import Any
 from shm.errors import ShmError
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
 from shm_daemon.web.site import Site
+
+_NAMED = 5  # of many: the pages list them all
 
 log = logging.getLogger(__name__)
 
@@ -81,7 +83,7 @@ def _of_strangers(site: Site) -> list[Notice]:
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
     if not missing:
         return []
-    named = ", ".join(map(str, missing[:5])) + (" and others" if missing[5:] else "")
+    named = _named(missing)
     return [
         Notice(
             f"bridge.toml: hanger {named} is not described, though tests of it are stored.",
@@ -132,12 +134,25 @@ def _daemon(site: Site) -> list[str]:
 
 def _held(site: Site) -> list[str]:
     try:
-        number = len(site.store.holds())
+        holds = site.store.holds()
     except ShmError:
         return []  # told as a trouble
-    if not number:
-        return []
-    return [f"{number} recording{' is' if number == 1 else 's are'} held until a person decides."]
+    of_hangers: dict[int, list[int]] = {}
+    for hold in holds:
+        of_hangers.setdefault(hold.hanger, []).append(hold.recording_id)
+    return [
+        f"hanger {hanger}: {_recordings(ids)} held until a person decides."
+        for hanger, ids in sorted(of_hangers.items())
+    ]
+
+
+def _recordings(ids: Sequence[int]) -> str:
+    few = f"recording {ids[0]} is"
+    return few if len(ids) == 1 else f"{len(ids)} recordings ({_named(ids)}) are"
+
+
+def _named(ids: Sequence[int]) -> str:
+    return ", ".join(map(str, ids[:_NAMED])) + (" and others" if ids[_NAMED:] else "")
 
 
 def _description(site: Site) -> list[str]:

@@ -19,11 +19,12 @@ from typing import Any
 
 from shm.documents import dump
 from shm.errors import BadInput, ShmError
-from shm.modes_document import load_modes, modes_document
+from shm.modes_document import modes_document
 from shm.read.apart.answers import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.apart.asking import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.apart.confinement import Confinement, confine, pythons_own
 from shm.read.limits import Limits, limited, limits, too_large
+from shm.read.modes_file import load_modes
 from shm.read.packed import unpacking_in
 from shm.read.sidecar import sidecar_path
 from shm.read.whole_test import peek_test, read_test

@@ -1,0 +1,54 @@
+"""A file of modes with a sidecar beside it: heeded, or refused where modes cannot have it."""
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+import shm
+from shm.errors import BadInput
+from shm.read import apart
+
+
+@pytest.fixture
+def modes(tmp_path: Path) -> Path:
+    """Two tests of hanger 3 without time or temperature."""
+    tests = [
+        {"id": name, "modes": [{"plane": "transverse", "order": 1, "frequency_hz": 5.8}]}
+        for name in ("a", "b")
+    ]
+    file = tmp_path / "sent.modes.json"
+    file.write_text(json.dumps({"schema": "shm.modes/1", "hanger": 3, "tests": tests}))
+    return file
+
+
+def only_first(modes: Path) -> None:
+    document = json.loads(modes.read_text())
+    modes.write_text(json.dumps({**document, "tests": document["tests"][:1]}))
+
+
+def test_what_a_sidecar_says_goes_before_the_document(modes: Path) -> None:
+    modes.with_suffix(".toml").write_text("hanger = 5\ntemperature_c = 12.5\n")
+    for found in (shm.load_modes(modes), apart.load_modes(modes)):
+        assert [(test.hanger, test.temperature_c) for test in found] == [(5, 12.5), (5, 12.5)]
+        assert [test.id for test in found] == ["a", "b"]
+
+
+def test_a_time_is_that_of_a_single_test(modes: Path) -> None:
+    modes.with_suffix(".toml").write_text("time = 2026-05-01T10:00:00Z\n")
+    with pytest.raises(BadInput, match="one time is said of 2 tests"):
+        shm.load_modes(modes)
+    only_first(modes)
+    assert shm.load_modes(modes)[0].time == datetime(2026, 5, 1, 10, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    "said", ["sampling_rate_hz = 512", '[channel.acc_1]\nunit = "g"', 'plane = "transverse"']
+)
+def test_what_only_samples_have_is_refused(modes: Path, said: str) -> None:
+    sidecar = modes.with_suffix(".toml")
+    sidecar.write_text(said)
+    with pytest.raises(BadInput) as refused:
+        shm.load_modes(modes)
+    assert refused.value.file == str(sidecar) or refused.value.file == sidecar
