@@ -34,7 +34,7 @@ _HALF = 32
 """Samples to either side that the choice of a place looks at; the mean of as many is taken off."""
 
 _CHIRP = np.cos(np.pi * np.arange(-_HALF, _HALF + 1) ** 2 / (4 * _HALF) + 1)
-"""Runs from the highest frequency to 0 and back: none escapes it."""
+"""Runs from half of the highest frequency to 0 and back: a hanger rings below that."""
 
 _PLACE, _REACH = 2, 3  # columns of the marks, after the channel and the number of its samples
 
@@ -44,11 +44,15 @@ _LEAST = 2
 _SHARE = 0.75
 """Of the shapes that both should have; numbers rounded to four digits keep 90 % of them."""
 
-_SAME = 1e-7
-"""1 - correlation of two shapes of copies at most. Numbers rounded to four digits stay below 1e-8.
-It would have to be 1e-4 for the closest of 780 pairs of simulated tests of one hanger with a single
-hit each to pass as copies; of 380 pairs with 100 times less noise the closest came to 2e-6; three
-hits, and the real ones of shared/data, would not pass below 0.01."""
+_SAME = 5e-8
+"""1 - correlation of two shapes of copies at most. Numbers rounded to four digits come to 8e-9 in
+the median and stay below 4.5e-8 in 2,500 shapes.
+
+It would have to be above 1e-4 for any of 780 pairs of simulated tests of one hanger with a single
+hit each to pass as copies, or of 780 with three, or of the five real hits in shared/data; 3e-6 with
+a tenth of the noise, 0.2 mm/s2. With a hundredth, which no sensor has, the closest of 378 pairs
+came to 5.6e-8: its hits fell at the same fraction of a sample.
+"""
 
 _ROUGHLY = 1e-4  # single precision errs by far less
 
@@ -58,7 +62,7 @@ that rings alone without noise, comes again in other tests, too."""
 
 _TELLING = 0.25
 """Of the shapes of a channel must come once: else those of another reach are only not seen twice.
-It is 0.1 of a hum at most, and above 0.9 of every response that we have."""
+It is 0.1 of a hum at most, and all of each simulated or real response that was tried."""
 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:

@@ -25,7 +25,9 @@ from shm.store.stepping import write_step
 from shm.store.tables import acknowledgements, alerts, fingerprints, holds, recordings, tests
 from shm.values import Fingerprint, KnownSamples
 
-_MOST_COMPARED = 1000  # recordings of a hanger: some 15 MB; older ones are found by their digest
+_MOST_COMPARED = (
+    1000  # recordings of a hanger: some 15 MB, at most 60; older ones are found by their digest
+)
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
 
