@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -31,3 +32,13 @@ def postgresql() -> Iterator[Databases]:
     """A PostgreSQL server of this process's own, begun at first need."""
     with postgresql_server() as databases:
         yield databases
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real data, which a checkout may be without."""
+    fallback = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("SHM_DATA", fallback))
+    if not folder.is_dir():
+        pytest.skip(f"no real data in {folder}; set SHM_DATA to run this test")
+    return folder

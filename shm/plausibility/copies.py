@@ -1,41 +1,86 @@
 """Whether the samples were here before: one impact must not confirm itself under another name.
 
 The digest finds the same numbers again in whatever file; the shapes find them rescaled, rounded,
-in another order, or cut by some samples.
+in another order, or cut to a part.
+
+A shape is a stretch of one channel about a place that the samples near by choose: there the motion
+resembles a fixed chirp more than anywhere within a reach to either side. So a part that was cut out
+chooses the same places as the whole, but for those whose reach is cut, and a shape lies
+within its reach. The places with the widest reach are kept: they lie spread over the record, in
+strong and in weak motion alike. One impact rings much like another, but neither its fraction of a
+sample nor noise comes again; and all shapes of a copy are moved by the same number of samples.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from shm.plausibility.candidate import Candidate
-from shm.values import Doubt, Fingerprint, FloatArray, FrequencyResponse, Recording
+from shm.values import Doubt, Fingerprint, FloatArray, FrequencyResponse, IntArray, Recording
 
-_SAMPLES = 128
-"""Of each channel from its onset on, and as many spread over the rest: a kilobyte a channel."""
+_SAMPLES = 32
+"""Of each shape, from its reach before its place up to its reach after it."""
 
-_ONSET = 0.5
-"""The shape begins where a channel first reaches half of its peak: rounding seldom moves that."""
+_MOST_A_CHANNEL, _MOST = 48, 800
+"""Shapes: some 3 kB a channel, and 60 kB a recording at most."""
 
-_SAME = 1e-7
-"""1 - correlation of a copy at most. Numbers rounded to four digits stay below 1e-8; of 780 pairs
-of simulated tests of one hanger the closest came to 0.1, and to 7e-6 with a single hit each."""
+_HALF = 32
+"""Samples to either side that the choice of a place looks at; the mean of as many is taken off."""
+
+_CHIRP = np.cos(np.pi * np.arange(-_HALF, _HALF + 1) ** 2 / (4 * _HALF) + 1)
+"""Runs from half of the highest frequency to 0 and back: a hanger rings below that."""
+
+_PLACE, _REACH = 2, 3  # columns of the marks, after the channel and the number of its samples
+
+_LEAST = 2
+"""Shapes that must be moved alike: a single one may look like another by chance."""
+
+_SHARE = 0.75
+"""Of the shapes that both should have; numbers rounded to four digits keep 90 % of them."""
+
+_SAME = 5e-8
+"""1 - correlation of two shapes of copies at most. Numbers rounded to four digits come to 8e-9 in
+the median and stay below 4.5e-8 in 2,500 shapes.
+
+It would have to be above 1e-4 for any of 780 pairs of simulated tests of one hanger with a single
+hit each to pass as copies, or of 780 with three, or of the five real hits in shared/data; 3e-6 with
+a tenth of the noise, 0.2 mm/s2. With a hundredth, which no sensor has, the closest of 378 pairs
+came to 5.6e-8: its hits fell at the same fraction of a sample.
+"""
+
+_ROUGHLY = 1e-4  # single precision errs by far less
+
+_REPEATED = 1e-5
+"""1 - correlation of two shapes in one channel, at which neither tells anything: a hum, or a mode
+that rings alone without noise, comes again in other tests, too."""
+
+_TELLING = 0.25
+"""Of the shapes of a channel must come once: else those of another reach are only not seen twice.
+It is 0.1 of a hum at most, and all of each simulated or real response that was tried."""
 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:
     """What the samples of one test look like; None where nothing moves in them."""
-    moved = [row for record in records for row in _motions(record)]
-    shapes = [shape for row in moved if (shape := _shape(row)) is not None]
-    if not shapes:
+    moved = [row for record in records for row in _motions(record) if _moves(row)]
+    if not moved:
         return None
     forces = [each.force for each in records if isinstance(each, Recording) and each.force]
     with np.errstate(over="ignore"):  # a number beyond single precision is infinite in each copy
         numbers = [row.astype("<f4") for row in (*moved, *(force.values for force in forces))]
     hashes = sorted(hashlib.sha256(row.tobytes()).digest() for row in numbers)
-    return Fingerprint(hashlib.sha256(b"".join(hashes)).hexdigest(), np.array(shapes))
+    most = max(2, min(_MOST_A_CHANNEL, _MOST // len(moved)))
+    found = [_shapes(row, channel, most) for channel, row in enumerate(moved)]
+    return Fingerprint(
+        hashlib.sha256(b"".join(hashes)).hexdigest(),
+        np.concatenate([shapes for shapes, _ in found])[:_MOST],
+        np.concatenate([marks for _, marks in found])[:_MOST],
+    )
 
 
 def copied(candidate: Candidate) -> Doubt | None:
@@ -56,9 +101,53 @@ def is_copy(own: Fingerprint, other: Fingerprint) -> bool:
     one, lest a dead channel that always hums alike condemns a test."""
     if own.digest == other.digest:
         return True
-    alike = 1 - np.abs(own.shapes @ other.shapes.T) < _SAME
-    shared = min(int(alike.any(axis=1).sum()), int(alike.any(axis=0).sum()))
-    return bool(2 * shared >= min(alike.shape))
+    if not len(own.marks) or not len(other.marks):
+        return False
+    here, there = _alike(own, other)
+    if not len(here):
+        return False
+    shifts = own.marks[here, _PLACE] - other.marks[there, _PLACE]
+    pairs = set[tuple[int, int]]()
+    for shift in np.unique(shifts):
+        by = shifts == shift
+        if by.sum() >= _LEAST:
+            pairs |= _channels(own.marks[here[by]], other.marks[there[by]], own, other)
+    alike = min(len({pair[side] for pair in pairs}) for side in (0, 1))
+    return bool(2 * alike >= min(len(np.unique(each.marks[:, 0])) for each in (own, other)))
+
+
+def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
+    """Which shapes of the one equal which of the other: roughly first, as hundreds of recordings
+    are looked through."""
+    rough = [each.shapes.astype(np.float32) for each in (own, other)]
+    mine, its = (each / np.linalg.norm(each, axis=1, keepdims=True) for each in rough)
+    here, there = np.nonzero(np.abs(mine @ its.T) > 1 - _ROUGHLY)
+    one, two = _unit(own.shapes[here]), _unit(other.shapes[there])
+    same = 1 - np.abs(np.sum(one * two, axis=1)) < _SAME
+    same &= own.marks[here, _REACH] == other.marks[there, _REACH]
+    return here[same], there[same]
+
+
+def _channels(
+    mine: IntArray, its: IntArray, own: Fingerprint, other: Fingerprint
+) -> set[tuple[int, int]]:
+    """The pairs of channels that are copies if one is moved as these marks are against each other:
+    most of the shapes that both should have, where both have samples, are the same."""
+    shift = int(mine[0, _PLACE] - its[0, _PLACE])
+    pairs = Counter(zip(mine[:, 0].tolist(), its[:, 0].tolist(), strict=True))
+    found = set[tuple[int, int]]()
+    for (one, two), count in pairs.items():
+        both = own.marks[own.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
+        both[1][:, _PLACE] += shift
+        start, end = max(0, shift), min(both[0][0, 1], both[1][0, 1] + shift)
+        within = [
+            (marks[:, _PLACE] - marks[:, _REACH] >= start)
+            & (marks[:, _PLACE] + marks[:, _REACH] < end)
+            for marks in both
+        ]
+        if count >= _SHARE * min(int(each.sum()) for each in within):
+            found.add((one, two))
+    return found
 
 
 def _doubt(what: str) -> Doubt:
@@ -78,27 +167,64 @@ def _motions(record: Recording | FrequencyResponse) -> list[FloatArray]:
     return [np.nan_to_num(channel.values) for channel in record.accelerations]
 
 
-def _shape(row: FloatArray) -> FloatArray | None:
-    """The first strong motion of a channel and samples spread over what follows; None where it
-    does not move.
+def _moves(row: FloatArray) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(len(row) and 0 < np.ptp(row) < np.inf)
 
-    One impact rings much like another, but neither hits nor noise come at the same moments after
-    it: each half has the same weight, so that the weak one tells, too. They are spread by a power
-    of two, which a record cut by some samples keeps.
+
+def _shapes(row: FloatArray, channel: int, most: int) -> tuple[NDArray[np.int16], IntArray]:
+    """At most so many shapes of a channel with their marks, those of the widest reach."""
+    row = row / np.abs(row).max()
+    likeness = _likeness(row)
+    reach = _reach(likeness)
+    places = np.flatnonzero(reach)
+    places = places[np.lexsort((-likeness[places], -reach[places]))[:most]]
+    reach = reach[places]
+    spread = np.outer(2 * reach // _SAMPLES, np.arange(-_SAMPLES // 2, _SAMPLES // 2))
+    shapes = _unit(row[places[:, None] + spread])
+    twins = (1 - np.abs(shapes @ shapes.T) < _REPEATED) & (reach == reach[:, None])
+    once = (twins.sum(axis=1) == 1) & shapes.any(axis=1)
+    once &= once.mean() >= _TELLING if len(once) else True
+    shapes, places, reach = shapes[once], places[once], reach[once]
+    highest = np.abs(shapes).max(axis=1, keepdims=True)
+    marks = np.full((len(places), 4), (channel, len(row), 0, 0))
+    marks[:, _PLACE], marks[:, _REACH] = places, reach
+    return np.rint(shapes / highest * np.iinfo(np.int16).max).astype(np.int16), marks
+
+
+def _likeness(row: FloatArray) -> FloatArray:
+    """Of the motion about each place to the chirp; 0 where it does not cross zero.
+
+    A crossing is where it was whatever is rounded; a crest is flat, and its highest sample may
+    change.
     """
-    moving = np.abs(row - np.median(row)) if len(row) else row
-    peak = moving.max(initial=0.0)
-    if not 0 < peak < np.inf:
-        return None
-    rest = row[int(np.argmax(moving >= _ONSET * peak)) :]
-    step = 2 ** max(0, int(np.log2(len(rest) / _SAMPLES)))
-    halves = [_unit(rest[:_SAMPLES]), _unit(rest[_SAMPLES::step][:_SAMPLES])]
-    return _unit(np.concatenate(halves), centred=False)
+    if len(row) <= 4 * _HALF:
+        return np.zeros(len(row))
+    ones = np.ones(2 * _HALF + 1)
+    motion = row - np.convolve(row, ones / len(ones), "same")
+    below = motion < 0
+    crossing = np.append(False, below[1:] != below[:-1])
+    power = np.convolve(motion**2, ones, "same")
+    likeness = np.abs(np.convolve(motion, _CHIRP, "same"))
+    return np.where(crossing & (power > 0), likeness / np.sqrt(np.where(power > 0, power, 1)), 0)
 
 
-def _unit(values: FloatArray, centred: bool = True) -> FloatArray:
-    """Of zero mean and unit norm, filled up with zeros; all zeros where nothing moves."""
-    found = np.zeros(max(_SAMPLES, len(values)))
-    found[: len(values)] = values - values.mean() if centred and len(values) else values
-    norm = np.linalg.norm(found)
-    return found / norm if norm > 0 else found
+def _reach(likeness: FloatArray) -> IntArray:
+    """The largest power of two of samples to either side, all in the record, without a greater
+    likeness; 0 where it is below what the likeness looks at."""
+    found = np.zeros(len(likeness), dtype=int)
+    reach = 2 * _HALF
+    while len(likeness) > 2 * reach:
+        inside = slice(reach, len(likeness) - reach)
+        highest = (maximum_filter1d(likeness, 2 * reach + 1) == likeness) & (likeness > 0)
+        found[inside][highest[inside]] = reach
+        reach *= 2
+    return found
+
+
+def _unit(shapes: FloatArray | NDArray[np.int16]) -> FloatArray:
+    """Each of zero mean and unit norm; zeros where nothing moves."""
+    centred = shapes - shapes.mean(axis=1, keepdims=True)
+    centred /= np.maximum(np.abs(centred).max(axis=1, keepdims=True, initial=0), 1e-300)
+    norm = np.linalg.norm(centred, axis=1, keepdims=True)
+    return np.asarray(centred / np.where(norm > 0, norm, 1))

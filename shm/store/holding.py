@@ -25,7 +25,9 @@ from shm.store.stepping import write_step
 from shm.store.tables import acknowledgements, alerts, fingerprints, holds, recordings, tests
 from shm.values import Fingerprint, KnownSamples
 
-_MOST_COMPARED = 2000  # recordings of a hanger: some 10 MB; older ones are found by their digest
+_MOST_COMPARED = (
+    1000  # recordings of a hanger: some 15 MB, at most 60; older ones are found by their digest
+)
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
 
@@ -100,15 +102,16 @@ class Holding(Queries):
         self, recording_id: int, hanger: int, fingerprint: Fingerprint
     ) -> tuple[KnownSamples, ...]:
         """Recordings that may hold the same samples: those of the hanger, and the same numbers of
-        any other."""
+        any other; the earliest first, as the others may be copies of it."""
+        same_numbers = fingerprints.c.digest == fingerprint.digest
         query = (
             sa.select(fingerprints, recordings.c.file_name, recordings.c.hanger)
             .join(recordings)
             .where(
-                (recordings.c.hanger == hanger) | (fingerprints.c.digest == fingerprint.digest),
+                (recordings.c.hanger == hanger) | same_numbers,
                 _before(recordings.c.id, recordings.c.stage, recording_id),
             )
-            .order_by(recordings.c.id.desc())
+            .order_by(same_numbers.desc(), recordings.c.id.desc())
             .limit(_MOST_COMPARED)
         )
         with self.reading() as connection:
@@ -119,7 +122,7 @@ class Holding(Queries):
                 row.hanger,
                 fingerprint_from(row),
             )
-            for row in rows
+            for row in sorted(rows, key=lambda row: int(row.recording_id))
         )
 
     def tests_at(self, hanger: int, time: datetime, recording_id: int) -> tuple[StoredTest, ...]:

@@ -67,7 +67,8 @@ def notice_key(hanger: int, hold_id: int) -> str:
 
 
 def fingerprint_from(row: Row[Any]) -> Fingerprint:
-    return Fingerprint(row.digest, unpack(row.shapes)["shapes"].astype(float))
+    """The marks are missing in those of before shapes had places."""
+    return Fingerprint(row.digest, **unpack(row.shapes))
 
 
 def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
@@ -86,9 +87,9 @@ def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
     former = fingerprints.c.recording_id == recording_id
     connection.execute(sa.delete(fingerprints).where(former))
-    # Single precision: copies are told apart at a thousandth of their motion.
-    row = {"digest": found.digest, "shapes": pack(shapes=found.shapes.astype("f4"))}
-    connection.execute(sa.insert(fingerprints).values(recording_id=recording_id, **row))
+    shapes = pack(shapes=found.shapes, marks=found.marks)
+    row = {"recording_id": recording_id, "digest": found.digest, "shapes": shapes}
+    connection.execute(sa.insert(fingerprints).values(row))
 
 
 def _hold_tests(

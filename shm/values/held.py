@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from shm.values.kinds import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.values.kinds import IntArray
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,15 @@ class Fingerprint:
     """What the samples of a recording look like, whatever the file around them says.
 
     `digest` is a SHA-256 of the samples of all channels, each to single precision and in whatever
-    order. `shapes` (channels, samples) is a stretch of each channel from its first strong motion
-    on, centred and of unit norm: the same for other units, and for a record cut at its ends.
+    order. `shapes` (shapes, samples) are stretches of the channels about places that the samples
+    near by choose, the same for other units, and in a part of the record. `marks` (shapes, 4) says
+    of each its channel, how many samples that has, its place and its reach to either side; prints
+    of before there were places have none, and tell by their digest alone.
     """
 
     digest: str
-    shapes: FloatArray
+    shapes: NDArray[np.int16]
+    marks: IntArray = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,20 +13,25 @@ import pytest
 from shm.plausibility import fingerprint_of
 from shm.plausibility.copies import is_copy
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.values import Channel, FrequencyResponse, Recording, ResponsePoint
+from shm.store.blobs import pack
+from shm.values import Channel, Fingerprint, FrequencyResponse, Recording, ResponsePoint
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START
 
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 
 
-def a_recording(seed: int = 1, hits: int = 3) -> Recording:
-    plan = HammerPlan(hits=hits)
+def a_recording(seed: int = 1, hits: int = 3, noise_m_s2: float = 0.002) -> Recording:
+    plan = HammerPlan(hits=hits, acceleration_noise_m_s2=noise_m_s2)
     return hammer_test(HANGER_3, STATE, plan, np.random.default_rng(seed), time=START, source="s")
 
 
 def changed(recording: Recording, change: Callable[[Channel], Channel]) -> Recording:
     return replace(recording, channels=tuple(change(each) for each in recording.channels))
+
+
+def duration_s(recording: Recording) -> float:
+    return len(recording.channels[0].values) / recording.sampling_rate_hz
 
 
 def rounded(channel: Channel, digits: int) -> Channel:
@@ -35,6 +41,12 @@ def rounded(channel: Channel, digits: int) -> Channel:
 
 def cut(channel: Channel, samples: int) -> Channel:
     return replace(channel, values=channel.values[samples:-samples])
+
+
+def part(recording: Recording, start_s: float, end_s: float) -> Recording:
+    """What a recording holds from a time on until another; a negative one counts from its end."""
+    first, last = (round(time * recording.sampling_rate_hz) for time in (start_s, end_s))
+    return changed(recording, lambda c: replace(c, values=c.values[first:last]))
 
 
 COPIES: dict[str, Callable[[Recording], Recording]] = {
@@ -48,6 +60,18 @@ COPIES: dict[str, Callable[[Recording], Recording]] = {
         r, lambda c: replace(c, values=c.values.astype("f4").astype(float))
     ),
     "cut": lambda r: changed(r, lambda c: cut(c, 7)),
+    "cut at both ends": lambda r: part(r, 0.6, -1.8),
+    "without its onset": lambda r: part(r, 3.9, 1e9),
+    "70 % of it": lambda r: part(r, 0, 0.7 * duration_s(r)),
+    "other unit, rounded, cut": lambda r: part(
+        changed(r, lambda c: rounded(replace(c, values=c.values / 9.80665), 4)), 1000 / 512, 1e9
+    ),
+    "a tenth of it, rounded": lambda r: part(
+        changed(r, lambda c: rounded(c, 4)), 0.3 * duration_s(r), 0.4 * duration_s(r)
+    ),
+    "zeros after it": lambda r: changed(
+        r, lambda c: replace(c, values=np.append(c.values, np.zeros(4000)))
+    ),
     "one sensor left out": lambda r: replace(r, channels=r.channels[:-1]),
     "all at once": lambda r: changed(
         replace(r, channels=r.channels[::-1]),
@@ -59,7 +83,7 @@ COPIES: dict[str, Callable[[Recording], Recording]] = {
 @pytest.mark.parametrize("hits", [1, 3])
 @pytest.mark.parametrize("how", COPIES)
 def test_a_copy_is_known(how: str, hits: int) -> None:
-    original = a_recording(hits=hits)
+    original = a_recording(seed=2, hits=hits)  # it has hit before the 0.6 s
     own, copy = fingerprint_of([original]), fingerprint_of([COPIES[how](original)])
     assert own is not None
     assert copy is not None
@@ -67,12 +91,35 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
     assert is_copy(own, copy)
 
 
+@pytest.mark.parametrize("noise_m_s2", [0.002, 2e-5])
 @pytest.mark.parametrize("hits", [1, 3])
-def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int) -> None:
-    prints = [fingerprint_of([a_recording(seed, hits)]) for seed in range(8)]
+def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: float) -> None:
+    prints = [fingerprint_of([a_recording(seed, hits, noise_m_s2)]) for seed in range(8)]
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
     assert len(pairs) == 28
     assert not any(is_copy(*pair) for pair in pairs)
+
+
+def test_each_hit_of_a_recording_is_a_copy_of_it_but_not_of_another_hit() -> None:
+    whole = a_recording()
+    prints = [fingerprint_of([part(whole, *span)]) for span in ((0, 20), (20, 40), (40, 60))]
+    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
+    assert len(pairs) == 3
+    assert not any(is_copy(*pair) for pair in pairs)
+    own = fingerprint_of([whole])
+    assert own is not None
+    assert all(hit is not None and is_copy(hit, own) and is_copy(own, hit) for hit in prints)
+
+
+def test_real_hits_of_one_structure_are_copies_of_their_own_halves_alone(shared_data: Path) -> None:
+    paths = sorted((shared_data / "pyfrf_hits").glob("*.npy"))
+    rows = [np.load(path)[2] for path in paths]
+    wholes = [Recording("s", (Channel("a", "acceleration", row),), 25_600.0) for row in rows]
+    halves = [part(whole, 0.3, 0.8) for whole in wholes]
+    prints, cuts = ([fingerprint_of([each]) for each in some] for some in (wholes, halves))
+    alike = [[a and b and is_copy(a, b) for b in prints] for a in cuts]
+    assert len(rows) == 5
+    assert alike == np.eye(5, dtype=bool).tolist()
 
 
 def test_the_digest_is_that_of_the_numbers_alone() -> None:
@@ -98,16 +145,52 @@ def test_one_file_of_a_test_of_several_is_a_copy() -> None:
     assert is_copy(part, whole)
 
 
-def test_a_dead_channel_that_hums_alike_condemns_nothing() -> None:
-    hum = np.sin(2 * np.pi * 50 * np.arange(5120) / 512)
-    first, second = (
-        replace(r, channels=(*r.channels, Channel("dead", "acceleration", hum)))
-        for r in (a_recording(1), a_recording(2))
+@pytest.mark.parametrize("hum_hz", [50.0, 50.0123])
+@pytest.mark.parametrize("live", [1, 3])
+def test_dead_channels_that_hum_alike_condemn_nothing(live: int, hum_hz: float) -> None:
+    """However many they are, and at whatever time of the hum the recordings begin."""
+    prints = []
+    for seed in range(4):
+        recording = a_recording(seed, hits=1)
+        time_s = np.arange(10_240) / 512 + seed / 7
+        hums = [
+            Channel(name, "acceleration", np.sin(2 * np.pi * hum_hz * time_s)) for name in "abc"
+        ]
+        channels = (*recording.accelerations[:live], *hums)
+        prints.append(fingerprint_of([replace(recording, channels=channels)]))
+    assert not any(is_copy(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b)
+
+
+def test_a_hum_alone_is_known_by_its_numbers() -> None:
+    hums = [np.sin(2 * np.pi * 50 * np.arange(size) / 512) for size in (5120, 5120, 5000)]
+    own, same, other = (
+        fingerprint_of([Recording("s", (Channel("dead", "acceleration", hum),), 512.0)])
+        for hum in hums
     )
-    own, other = fingerprint_of([first]), fingerprint_of([second])
     assert own is not None
+    assert same is not None
     assert other is not None
+    assert is_copy(own, same)
     assert not is_copy(own, other)
+
+
+def test_a_print_of_before_shapes_had_places_tells_by_its_digest() -> None:
+    own = fingerprint_of([a_recording()])
+    assert own is not None
+    old = np.ones((4, 256), dtype=np.float32) / 16
+    assert is_copy(own, Fingerprint(own.digest, old))
+    assert not is_copy(own, Fingerprint("0" * 64, old))
+    assert not is_copy(Fingerprint("0" * 64, old), own)
+
+
+@pytest.mark.parametrize("channels", [2, 40, 900])
+def test_a_print_stays_small(channels: int) -> None:
+    rows = np.random.default_rng(1).normal(size=(channels, 2000))
+    many = tuple(Channel(f"a{n}", "acceleration", row) for n, row in enumerate(rows))
+    found = fingerprint_of([Recording("s", many, 512.0)])
+    assert found is not None
+    assert len(found.marks)
+    assert len(pack(shapes=found.shapes, marks=found.marks)) < 64_000
 
 
 def test_frequency_responses_are_compared_too() -> None:

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-import os
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,13 +43,3 @@ def response() -> FrequencyResponse:
         time=datetime(2026, 5, 2, tzinfo=UTC),
         temperature_c=8.0,
     )
-
-
-@pytest.fixture(scope="session")
-def shared_data() -> Path:
-    """The folder of real data, which a checkout may be without."""
-    fallback = Path(__file__).resolve().parents[3] / "shared" / "data"
-    folder = Path(os.environ.get("SHM_DATA", fallback))
-    if not folder.is_dir():
-        pytest.skip(f"no real data in {folder}; set SHM_DATA to run this test")
-    return folder

@@ -12,13 +12,15 @@ import pytest
 from shm.errors import NothingThere
 from shm.store import (
     IdentifiedTest,
+    Judged,
     Lineage,
     Stage,
     Store,
     StoredTest,
+    holding,
 )
 from shm.store.blobs import unpack
-from shm.values import AddedMass, Posterior, Selection
+from shm.values import AddedMass, Fingerprint, Posterior, Selection
 from tests.helpers.nouns import (
     NOW,
     a_check,
@@ -216,3 +218,19 @@ def test_a_pickled_blob_is_not_read() -> None:
     np.savez(buffer, samples=np.array([{"a": 1}], dtype=object))
     with pytest.raises(ValueError, match="allow_pickle"):
         unpack(buffer.getvalue())
+
+
+def test_samples_are_compared_with_the_earliest_first_and_always_with_the_same_numbers(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A copy of a copy is one of the original, which is named."""
+    prints = [Fingerprint(f"{n:064x}", np.zeros((1, 32), dtype=np.int16)) for n in range(5)]
+    for number, print_ in enumerate(prints, 1):
+        recording = store.receive(a_file(number), NOW).recording
+        items = [IdentifiedTest(a_test(f"t{number}", days=number))]
+        store.identified(recording.id, items, LINEAGE, NOW, Judged(None, print_))
+    known = [each.fingerprint.digest for each in store.known_samples(5, 3, prints[4])]
+    assert known == [each.digest for each in prints[:4]]
+    monkeypatch.setattr(holding, "_MOST_COMPARED", 2)
+    known = [each.fingerprint.digest for each in store.known_samples(5, 3, prints[0])]
+    assert known == [prints[0].digest, prints[3].digest]
