@@ -14,15 +14,18 @@ from sqlalchemy.engine import Connection
 
 from shm.pipeline import steps
 from shm.store import Store, Workspace
+from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import check_store
 from shm.store.database import make_engine
 from shm.store.missing import MissingRow, missing_rows
+from shm.store.numbering import NUMBERED, noted
 from shm.store.tables import metadata
 from shm_cli import working
 from shm_cli.main import run
 from tests.helpers import quick_update
 from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
+from tests.helpers.damaging import damage
 from tests.helpers.flows import threads
 from tests.helpers.histories import a_history
 from tests.helpers.postgres import Databases
@@ -137,3 +140,41 @@ def test_what_can_be_made_again_is(
     assert run(["--workspace", str(bridge.folder), *words]) == 0
     after = checked(bridge)
     assert not [row for row in after if said in row.message]
+
+
+def test_a_backup_that_lacks_a_row_restores_and_goes_on_missing_it(
+    bridge: Workspace, tmp_path: Path
+) -> None:
+    take_out(bridge.location, "tokens", 1)
+    with bridge.store() as store:
+        (told,) = back_up(store, tmp_path / "may.db", quiet).troubles
+    assert told.startswith("row 1 of tokens is missing: its number is skipped.")
+    restore(bridge.location, tmp_path / "may.db", tmp_path / "kept.db", quiet, replace=True)
+    assert [(row.table, row.id) for row in checked(bridge)] == [("tokens", 1)]
+
+
+def test_gaps_that_a_file_began_with_say_nothing(bridge: Workspace, tmp_path: Path) -> None:
+    """As of a copy of a store in PostgreSQL, which skips numbers."""
+    take_out(bridge.location, "tokens", 1)
+    with unguarded(bridge.location) as connection:
+        connection.exec_driver_sql("PRAGMA user_version = 0")
+        connection.commit()
+    Store.upgrade(bridge.location)
+    with bridge.store() as store:
+        copy_store(store, tmp_path / "copy.db", quiet)
+    with Store.open(tmp_path / "copy.db") as copy, copy.reading() as connection:
+        assert missing_rows(connection) == ()
+        others = 2 ** len(NUMBERED) - 1 - (1 << NUMBERED.index("tokens"))
+        assert noted(connection) == others
+
+
+def test_what_is_dropped_for_its_damage_is_not_missed(bridge: Workspace) -> None:
+    with bridge.store() as store, store.reading() as connection:
+        of_drift = sa.text(
+            "SELECT t.recording_id FROM tests t JOIN drifts d ON d.test_id = t.id WHERE d.id = 1"
+        )
+        recording = str(connection.scalar(of_drift))
+    damage(bridge, "drifts", "value", 1)
+    words = ("ingest", "--again", recording, "--from", "watched")
+    assert run(["--workspace", str(bridge.folder), *words]) == 0
+    assert checked(bridge) == ()
