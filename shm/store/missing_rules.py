@@ -89,7 +89,7 @@ RULES = (
     Rule(
         "acknowledgements",
         "the acknowledgement of alert {alert} is missing: its hold was {decision}.",
-        "Acknowledge it anew: `shm alerts acknowledge {alert}`.",
+        "Acknowledge it anew: `shm alerts ack {alert} --why WHY`.",
         """
         SELECT a.id AS alert, h.decision FROM holds h JOIN recordings r ON r.id = h.recording_id
         JOIN alerts a ON a.key = 'hanger-' || CAST(r.hanger AS TEXT) || ':held-'

@@ -126,6 +126,7 @@ def checked(workspace: Workspace) -> tuple[MissingRow, ...]:
         ("holds", 6, "the hold of recording 11 is missing"),
         ("watches", 9, "what the watch said of test"),
         ("drifts", 9, "a shift of test"),
+        ("acknowledgements", 1, "the acknowledgement of alert"),
     ],
 )
 def test_what_can_be_made_again_is(
