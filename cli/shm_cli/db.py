@@ -15,6 +15,7 @@ from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import CheckedArchive, archived_names, check_archive, check_store
 from shm.store.copying import TableContent
+from shm.store.missing import MissingRow
 from shm_cli.common import (
     counting_bar,
     json_option,
@@ -78,6 +79,7 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
 def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
     """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
 
+    Rows that somebody took out are missed, by what others say of them, with what makes them again.
     With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
     with the same rows and checksums hold the same.
 
@@ -95,6 +97,7 @@ def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
             "tables": [asdict(each) for each in checked.tables],
             "archive": asdict(archive) if archive else None,
             "damaged": [_damage_document(each) for each in checked.damaged],
+            "missing": [_missing_document(each) for each in checked.missing],
             "troubles": list(troubles),
         }
         show(document)
@@ -107,7 +110,7 @@ def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
     _raise_troubles(
         troubles,
         "What cannot be made again is restored, store or raw files, from a backup."
-        if checked.damaged
+        if checked.damaged or checked.missing
         else "Restore the store, or its raw files, from a backup.",
     )
 
@@ -211,6 +214,10 @@ def copy(ctx: click.Context, target: str, as_json: bool) -> None:
 
 def _damage_document(row: DamagedRow) -> dict[str, object]:
     return {"table": row.table, "id": row.id, "hanger": row.hanger, "remedy": row.remedy}
+
+
+def _missing_document(row: MissingRow) -> dict[str, object]:
+    return {"table": row.table, "id": row.id, "message": row.message, "remedy": row.remedy}
 
 
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:

@@ -141,7 +141,7 @@ def _made_present(engine: Engine, file: Path) -> None:
 
 
 def _must_be_whole(engine: Engine, file: Path, tell: Tell) -> None:
-    troubles = check_store(Database(engine), tell).troubles
+    troubles = check_store(Database(engine), tell).unfit
     if troubles:
         raise StoreError(
             f"the backup {file} is damaged: {'; '.join(troubles)}.", remedy="Take an older one."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
@@ -28,7 +28,8 @@ from shm.store.checksums import (
 from shm.store.columns import Document
 from shm.store.copying import Rows, TableContent, Tell, contents
 from shm.store.database import Database
-from shm.store.tables import APART, metadata, recordings
+from shm.store.missing import MissingRow, missing_rows
+from shm.store.tables import APART, recordings
 from shm.store.upkeep import Upkeep
 
 
@@ -39,6 +40,14 @@ class CheckedStore:
     tables: tuple[TableContent, ...]
     troubles: tuple[str, ...]
     damaged: tuple[DamagedRow, ...] = ()
+    missing: tuple[MissingRow, ...] = ()
+
+    @property
+    def unfit(self) -> tuple[str, ...]:
+        """Troubles for which it cannot be put in another's place: not rows that only are no more,
+        since an older backup may lack more than that."""
+        gone = {str(row) for row in self.missing if not row.referred}
+        return tuple(each for each in self.troubles if each not in gone)
 
 
 @dataclass(frozen=True)
@@ -81,10 +90,14 @@ def check_store(store: Database, tell: Tell) -> CheckedStore:
     """Reads everything that the store holds; raises StoreError where it cannot be read."""
     with store.reading() as connection:
         try:
-            structure = (*_damage(connection), *_orphans(connection))
+            structure, missing = tuple(_damage(connection)), missing_rows(connection)
         except sa.exc.DatabaseError as error:
-            structure = (f"the file is damaged: {error.orig}",)
-        return read_rows(connection, tell, structure)
+            if connection.dialect.name != "sqlite":
+                raise
+            structure, missing = (f"the file is damaged: {error.orig}",), ()
+        checked = read_rows(connection, tell, structure)
+        troubles = (*checked.troubles, *map(str, missing))
+        return replace(checked, troubles=troubles, missing=missing)
 
 
 def read_rows(connection: Connection, tell: Tell, troubles: tuple[str, ...] = ()) -> CheckedStore:
@@ -191,21 +204,3 @@ def _damage(connection: Connection) -> list[str]:
         return []
     found = connection.exec_driver_sql("PRAGMA integrity_check").scalars()
     return [f"the file is damaged: {said}" for said in found if said != "ok"]
-
-
-def _orphans(connection: Connection) -> list[str]:
-    """Rows that refer to rows that are not there."""
-    found = []
-    for table in metadata.sorted_tables:
-        for column in table.columns:
-            for key in column.foreign_keys:
-                there = key.column.table.alias()
-                missing = ~sa.exists().where(there.c[key.column.name] == column)
-                query = sa.select(sa.func.count()).select_from(table)
-                count = connection.scalar(query.where(column.is_not(None), missing))
-                if count:
-                    found.append(
-                        f"{count} rows of {table.name} refer to {key.column.table.name} "
-                        f"that are not there (column {column.name})"
-                    )
-    return found

@@ -12,6 +12,7 @@ from sqlalchemy.engine import Connection, RowMapping
 from shm.errors import StoreError
 from shm.store.checksums import digest_of, plain_table
 from shm.store.columns import Document
+from shm.store.numbering import noted, renote_numbering
 from shm.store.tables import metadata
 
 Tell = Callable[[str, float], None]
@@ -72,6 +73,7 @@ def copy_rows(source: Connection, target: Connection, tell: Tell) -> tuple[Table
             remedy="Run `shm db check` on both.",
         )
     _number_on(target)
+    renote_numbering(target, noted(source))
     return arrived
 
 

@@ -18,6 +18,7 @@ from shm.errors import DamagedRow
 from shm.store.checking import damaged_among
 from shm.store.checksums import healed, plain_table
 from shm.store.database import Database, insert
+from shm.store.numbering import forget
 from shm.store.results import posterior_values, test_contents
 from shm.store.rows import IdentifiedTest, Lineage, StoredTest
 from shm.store.tables import (
@@ -151,7 +152,9 @@ def _damaged_ids(connection: Connection, table: sa.Table, ids: Iterable[int]) ->
 def _drop(connection: Connection, table: sa.Table, chosen: sa.Select[Any]) -> int:
     key = next(iter(table.primary_key))
     ids = _damaged_ids(connection, table, connection.scalars(chosen).all())
-    connection.execute(sa.delete(table).where(key.in_(ids)))
+    if ids:
+        connection.execute(sa.delete(table).where(key.in_(ids)))
+        forget(connection, table.name)
     return len(ids)
 
 

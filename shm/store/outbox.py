@@ -33,7 +33,8 @@ def raise_alert(
         "test_id": test_id,
         "baseline_id": baseline_id,
         "raised_at": at,
-        "document": alert_document(alert),
+        # Names its hooks, so that a delivery that is gone is missed.
+        "document": {**alert_document(alert), "hooks": list(hooks)},
     }
     alert_id = insert(connection, alerts, values)
     for hook in hooks:

@@ -10,6 +10,7 @@ from shm.resources import migrations_folder
 from shm.store.checksums import seal
 from shm.store.database import reading, writing
 from shm.store.location import shown
+from shm.store.numbering import note_numbering
 from shm.store.tables import SCHEMA
 
 
@@ -34,6 +35,7 @@ def upgrade(engine: Engine) -> None:
                 remedy="Restore it from a backup.",
             ) from error
         seal(connection)
+        note_numbering(connection)
 
 
 def check(engine: Engine) -> None:

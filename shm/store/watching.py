@@ -77,13 +77,15 @@ class Watching(Database):
                 return None
             for drift in found.drifts:
                 insert(connection, drifts, _drift_values(drift, test, baseline))
-            insert(connection, watches, _watch_values(found, test, baseline))
+            raised = None
+            if alert is not None:
+                raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
+            values = _watch_values(found, test, baseline, raised)
+            insert(connection, watches, values)
             if state is not None:
                 _keep_state(connection, baseline, state)
             move(connection, [test], Stage.WATCHED, at)
-            if alert is None:
-                return None
-            return raise_alert(connection, test.id, baseline.id, alert, hooks, at)
+            return raised
 
     def kept_watch(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
@@ -234,13 +236,20 @@ def _drift(row: Row[Any]) -> Drift:
     return Drift(test=row.test, **{name: getattr(row, name) for name in _DRIFT_COLUMNS})
 
 
-def _watch_values(found: WatchedTest, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
+def _watch_values(
+    found: WatchedTest, test: StoredTest, baseline: Baseline, raised: StoredAlert | None
+) -> dict[str, Any]:
+    # Names its shifts and its alert, so that one that is gone is missed.
+    told = {
+        "shifts": [drift.quantity for drift in found.drifts],
+        "alert": None if raised is None else raised.id,
+    }
     return {
         "test_id": test.id,
         "baseline_id": baseline.id,
         "hanger": test.hanger,
         "time": found.time,
-        "document": watch_document(found),
+        "document": {**watch_document(found), **told},
         "called": found.change.called,
     }
 

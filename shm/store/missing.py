@@ -1,0 +1,225 @@
+"""Rows that somebody took out, found by what other rows say of them.
+
+A row leaves traces: others refer to it, a number is skipped, a stage was reached or an event is
+told of it, a document names it. What leaves none (see `docs/operation.md`) is not missed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row, RowMapping
+
+from shm.store.missing_rules import (
+    HISTORY,
+    RESTORE,
+    RULES,
+    WATCH_AGAIN,
+    WATCH_MISSING,
+    Rule,
+)
+from shm.store.numbering import skipped
+from shm.store.tables import metadata
+
+_ROWS_AT_ONCE = 500
+
+
+@dataclass(frozen=True)
+class MissingRow:
+    """A row that must be there: of which table, its number where that is known, and what tells.
+
+    `referred`: others refer to it, so that a store with foreign keys does not take their rows.
+    """
+
+    table: str
+    id: int | None
+    message: str
+    remedy: str
+    referred: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.remedy}"
+
+
+def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
+    """Every row that is missed; one whose number is known is named once."""
+    found: dict[tuple[str, object], MissingRow] = {}
+    for row in (*_referred(connection), *_by_documents(connection), *_by_rules(connection)):
+        found.setdefault((row.table, row.id or row.message), row)
+    known = {(row.table, row.id) for row in found.values()}
+    gaps = [row for row in _gaps(connection) if (row.table, row.id) not in known]
+    return (*found.values(), *gaps)
+
+
+def _by_rules(connection: Connection) -> Iterator[MissingRow]:
+    for rule, query in _queries():
+        for row in connection.execute(query).mappings():
+            yield _missed(rule, row)
+
+
+@cache
+def _queries() -> tuple[tuple[Rule, sa.TextClause], ...]:
+    return tuple((rule, sa.text(rule.query.replace(":", "\\:"))) for rule in RULES)
+
+
+def _missed(rule: Rule, row: RowMapping) -> MissingRow:
+    told = {str(name): value for name, value in row.items()}
+    return MissingRow(rule.table, None, rule.said.format(**told), rule.remedy.format(**told))
+
+
+def _referred(connection: Connection) -> Iterator[MissingRow]:
+    """Rows that others refer to."""
+    referring: defaultdict[tuple[str, int], Counter[str]] = defaultdict(Counter)
+    for name, table, query in _references():
+        for id_, count in connection.execute(query):
+            referring[name, id_][table] += count
+    for (name, id_), counts in referring.items():
+        told = " and ".join(f"{count} of {by}" for by, count in counts.items())
+        yield MissingRow(
+            name, id_, f"row {id_} of {name} is missing: rows refer to it, {told}.", RESTORE, True
+        )
+
+
+@cache
+def _references() -> tuple[tuple[str, str, sa.Select[Any]], ...]:
+    """Each table that is referred to, by which, and how often to rows of it that are not there."""
+    found = []
+    for table in metadata.sorted_tables:
+        for column in table.columns:
+            for key in column.foreign_keys:
+                there = key.column.table.alias()
+                gone = ~sa.exists().where(there.c[key.column.name] == column)
+                query: sa.Select[Any] = sa.select(column, sa.func.count())
+                query = query.where(column.is_not(None), gone).group_by(column)
+                found.append((key.column.table.name, table.name, query))
+    return tuple(found)
+
+
+def _gaps(connection: Connection) -> Iterator[MissingRow]:
+    for table, ids in skipped(connection).items():
+        remedy = HISTORY if table in ("steps", "events") else RESTORE
+        for id_ in ids:
+            yield MissingRow(
+                table, id_, f"row {id_} of {table} is missing: its number is skipped.", remedy
+            )
+
+
+def _by_documents(connection: Connection) -> Iterator[MissingRow]:
+    """Rows that are named by the documents of others."""
+    for name, columns, told in (
+        ("holds", ("recording_id",), _held_steps),
+        ("posteriors", (), _made_of),
+        ("watches", ("test_id", "baseline_id", "superseded_at"), _said_of),
+        ("alerts", ("key",), _told_to),
+    ):
+        yield from told(connection, _documents(connection, name, columns))
+
+
+_Documents = Iterable[tuple[Row[Any], dict[str, Any]]]
+_Told = Callable[[Connection, _Documents], Iterator[MissingRow]]
+
+
+def _documents(connection: Connection, name: str, columns: Iterable[str]) -> _Documents:
+    """Rows with their documents; one that cannot be read is damaged, which is told elsewhere."""
+    named: list[sa.ColumnClause[Any]] = [sa.column(c) for c in ("id", "document", *columns)]
+    query = sa.select(*named).select_from(sa.table(name))
+    for row in connection.execute(query.execution_options(yield_per=_ROWS_AT_ONCE)):
+        try:
+            document = json.loads(row.document)
+        except ValueError:
+            continue
+        if isinstance(document, dict):
+            yield row, document
+
+
+def _counts(connection: Connection, query: str) -> Mapping[Any, int]:
+    """How many rows there are, by what the query has before that."""
+    return {tuple(row)[:-1]: row[-1] for row in connection.execute(sa.text(query))}
+
+
+def _held_steps(connection: Connection, held: _Documents) -> Iterator[MissingRow]:
+    steps = _counts(
+        connection,
+        "SELECT recording_id, count(*) FROM steps "
+        "WHERE stage = 'held' AND test_id IS NOT NULL GROUP BY recording_id",
+    )
+    named: Counter[int] = Counter()
+    for row, document in held:
+        named[row.recording_id] += len(document.get("tests", ()))
+    for recording, count in named.items():
+        if count > steps.get((recording,), 0):
+            said = f"a step of recording {recording} is missing: {count} times a test was held."
+            yield MissingRow("steps", None, said, HISTORY)
+
+
+def _made_of(connection: Connection, made: _Documents) -> Iterator[MissingRow]:
+    pairs = _counts(
+        connection, "SELECT posterior_id, count(*) FROM posterior_tests GROUP BY posterior_id"
+    )
+    for row, document in made:
+        named, there = len(document.get("tests", ())), pairs.get((row.id,), 0)
+        if named > there:
+            said = f"posterior {row.id} was made of {named} tests, {there} are noted."
+            yield MissingRow("posterior_tests", None, f"a row is missing: {said}", RESTORE)
+
+
+def _said_of(connection: Connection, watched: _Documents) -> Iterator[MissingRow]:
+    """Shifts and alerts of what the watch said; watches of the shifts."""
+    shifts = _counts(
+        connection,
+        "SELECT test_id, baseline_id, count(*) FROM drifts "
+        "WHERE superseded_at IS NULL GROUP BY test_id, baseline_id",
+    )
+    raised = set(_counts(connection, "SELECT id, test_id, 1 FROM alerts"))
+    seen = set()
+    for row, document in watched:
+        test = row.test_id
+        if row.superseded_at is None:
+            seen.add((test, row.baseline_id))
+            named, there = len(document.get("shifts", ())), shifts.get((test, row.baseline_id), 0)
+            if named > there:
+                recording = _recording_of(connection, test)
+                said = f"a shift of test {test} is missing: {named} were told, {there} are there."
+                yield MissingRow("drifts", None, said, WATCH_AGAIN.format(recording=recording))
+        alert = document.get("alert")
+        if alert is not None and (alert, test) not in raised:
+            said = f"row {alert} of alerts is missing: the watch raised it after test {test}."
+            yield MissingRow("alerts", alert, said, RESTORE)
+    # Schemas before 0004 had shifts without a watch.
+    first = connection.scalar(sa.text("SELECT min(test_id) FROM watches"))
+    for test, baseline in shifts:
+        if (test, baseline) not in seen and first is not None and test >= first:
+            told = {"test": test, "recording": _recording_of(connection, test)}
+            said, remedy = WATCH_MISSING.format(**told), WATCH_AGAIN.format(**told)
+            yield MissingRow("watches", None, said, remedy)
+
+
+def _recording_of(connection: Connection, test: int) -> object:
+    of_test: sa.Select[Any] = sa.select(sa.column("recording_id")).select_from(sa.table("tests"))
+    return connection.scalar(of_test.where(sa.column("id") == test))
+
+
+def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]:
+    """What is owed of alerts, holds that were told of, and notices of holds."""
+    owed = set(_counts(connection, "SELECT alert_id, hook, 1 FROM deliveries"))
+    holds = {id_ for (id_,) in _counts(connection, "SELECT id, 1 FROM holds")}
+    told = set()
+    for row, document in alerts:
+        for hook in document.get("hooks", ()):
+            if (row.id, hook) not in owed:
+                said = f"the delivery of alert {row.id} to {hook} is missing: it may not be told."
+                yield MissingRow("deliveries", None, said, f"See `shm alerts`. {RESTORE}")
+        _, is_notice, number = str(row.key).partition(":held-")
+        if is_notice and number.isdecimal():
+            told.add(int(number))
+            if int(number) not in holds:
+                said = f"row {number} of holds is missing: alert {row.id} tells of it."
+                yield MissingRow("holds", int(number), said, RESTORE)
+    for hold in sorted(holds - told):
+        yield MissingRow("alerts", None, f"the alert that told of hold {hold} is missing.", RESTORE)

@@ -1,0 +1,181 @@
+"""A row that somebody took out is missed, whichever it is, but for those that leave no trace."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection
+
+from shm.pipeline import steps
+from shm.store import Store, Workspace
+from shm.store.backups import back_up, copy_store, restore
+from shm.store.checking import check_store
+from shm.store.database import make_engine
+from shm.store.missing import MissingRow, missing_rows
+from shm.store.numbering import NUMBERED, noted
+from shm.store.tables import metadata
+from shm_cli import working
+from shm_cli.main import run
+from tests.helpers import quick_update
+from tests.helpers.any_bar import take_any_bar
+from tests.helpers.contents import quiet
+from tests.helpers.damaging import damage
+from tests.helpers.flows import threads
+from tests.helpers.histories import a_history
+from tests.helpers.postgres import Databases
+from tests.store.make_released_database import fill
+
+MAY_GO = ("summaries", "watch_states")
+"""Made again by themselves: nothing is lost with a row of these."""
+
+LAST = ("acknowledgements", "archive_copies", "diagnoses", "events", "tokens")
+"""Of these the last row leaves no gap, and nothing else tells of it: what a person did."""
+
+ON_A_SERVER = ("drifts", "fingerprints", "steps", "watches")
+"""Where a skipped number says nothing: what was superseded, steps between others, and what came
+without the time of its file, as from before schema 0007."""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return a_history(tmp_path_factory.mktemp("missing")).folder
+
+
+@pytest.fixture
+def bridge(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """The history, to be changed at will, with the sampler's stand-in."""
+    take_any_bar(monkeypatch)
+    for verb in ("update", "refresh", "select"):
+        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    monkeypatch.setattr(working, "executor_of", threads)
+    return Workspace.open(Path(shutil.copytree(made, tmp_path / "bridge")))
+
+
+@contextmanager
+def unguarded(location: str | Path) -> Iterator[Connection]:
+    """A transaction that no foreign key is asked in, undone at its end unless it is committed."""
+    engine = make_engine(location, poolclass=sa.NullPool)
+    with engine.connect() as connection:
+        if engine.dialect.name == "sqlite":
+            raw = connection.connection.dbapi_connection
+            assert raw is not None
+            raw.execute("PRAGMA foreign_keys = OFF")  # type: ignore[attr-defined]
+        else:
+            connection.exec_driver_sql("SET session_replication_role = replica")
+        yield connection
+        connection.rollback()
+
+
+def take_out(location: str | Path, table: str, id_: int) -> None:
+    with unguarded(location) as connection:
+        key = next(iter(metadata.tables[table].primary_key))
+        connection.execute(sa.delete(metadata.tables[table]).where(key == id_))
+        connection.commit()
+
+
+def not_missed(location: str | Path) -> tuple[dict[str, int], dict[str, list[tuple[int, ...]]]]:
+    """Takes out each row by itself: how many were tried, and those that were not missed."""
+    tried: Counter[str] = Counter()
+    unseen: dict[str, list[tuple[int, ...]]] = {}
+    with unguarded(location) as connection:
+        assert missing_rows(connection) == ()
+        for table in metadata.sorted_tables:
+            keys = list(table.primary_key)
+            for key in connection.execute(sa.select(*keys).order_by(*keys)).all():
+                here = (column == value for column, value in zip(keys, key, strict=True))
+                with connection.begin_nested() as deleted:
+                    connection.execute(sa.delete(table).where(*here))
+                    if not missing_rows(connection):
+                        unseen.setdefault(table.name, []).append(tuple(key))
+                    deleted.rollback()
+                tried[table.name] += 1
+    return tried, unseen
+
+
+def test_each_row_is_missed_but_for_those_that_leave_no_trace(made: Path) -> None:
+    tried, unseen = not_missed(made / "shm.db")
+    assert set(tried) == set(metadata.tables)  # each table has a row
+    expected = {name: tried[name] for name in MAY_GO} | dict.fromkeys(LAST, 1)
+    assert {name: len(keys) for name, keys in unseen.items()} == expected
+    assert all(unseen[name] == [(tried[name],)] for name in LAST)
+
+
+def test_on_a_server_a_skipped_number_says_nothing(postgresql: Databases) -> None:
+    with postgresql.store() as url:
+        with Store.open(url) as store:
+            fill(store)
+        tried, unseen = not_missed(url)
+    assert set(unseen) <= {*MAY_GO, *LAST, *ON_A_SERVER}
+    assert {"holds", "alerts", "deliveries", "tests", "recordings", "baselines"} <= set(tried)
+
+
+def checked(workspace: Workspace) -> tuple[MissingRow, ...]:
+    with workspace.store() as store:
+        return check_store(store, quiet).missing
+
+
+@pytest.mark.parametrize(
+    ("table", "id_", "said"),
+    [
+        ("holds", 6, "the hold of recording 11 is missing"),
+        ("watches", 9, "what the watch said of test"),
+        ("drifts", 9, "a shift of test"),
+        ("acknowledgements", 1, "the acknowledgement of alert"),
+    ],
+)
+def test_what_can_be_made_again_is(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str], table: str, id_: int, said: str
+) -> None:
+    """The number that is skipped is all that is left to be said, where it is."""
+    take_out(bridge.location, table, id_)
+    assert run(["--workspace", str(bridge.folder), "db", "check"]) == 5
+    assert said in " ".join(capsys.readouterr().err.split())
+    (found,) = (row for row in checked(bridge) if said in row.message)
+    words = found.remedy[found.remedy.index("`shm ") + 5 : found.remedy.rindex("`")].split()
+    assert run(["--workspace", str(bridge.folder), *words]) == 0
+    after = checked(bridge)
+    assert not [row for row in after if said in row.message]
+
+
+def test_a_backup_that_lacks_a_row_restores_and_goes_on_missing_it(
+    bridge: Workspace, tmp_path: Path
+) -> None:
+    take_out(bridge.location, "tokens", 1)
+    with bridge.store() as store:
+        (told,) = back_up(store, tmp_path / "may.db", quiet).troubles
+    assert told.startswith("row 1 of tokens is missing: its number is skipped.")
+    restore(bridge.location, tmp_path / "may.db", tmp_path / "kept.db", quiet, replace=True)
+    assert [(row.table, row.id) for row in checked(bridge)] == [("tokens", 1)]
+
+
+def test_gaps_that_a_file_began_with_say_nothing(bridge: Workspace, tmp_path: Path) -> None:
+    """As of a copy of a store in PostgreSQL, which skips numbers."""
+    take_out(bridge.location, "tokens", 1)
+    with unguarded(bridge.location) as connection:
+        connection.exec_driver_sql("PRAGMA user_version = 0")
+        connection.commit()
+    Store.upgrade(bridge.location)
+    with bridge.store() as store:
+        copy_store(store, tmp_path / "copy.db", quiet)
+    with Store.open(tmp_path / "copy.db") as copy, copy.reading() as connection:
+        assert missing_rows(connection) == ()
+        others = 2 ** len(NUMBERED) - 1 - (1 << NUMBERED.index("tokens"))
+        assert noted(connection) == others
+
+
+def test_what_is_dropped_for_its_damage_is_not_missed(bridge: Workspace) -> None:
+    with bridge.store() as store, store.reading() as connection:
+        of_drift = sa.text(
+            "SELECT t.recording_id FROM tests t JOIN drifts d ON d.test_id = t.id WHERE d.id = 1"
+        )
+        recording = str(connection.scalar(of_drift))
+    damage(bridge, "drifts", "value", 1)
+    words = ("ingest", "--again", recording, "--from", "watched")
+    assert run(["--workspace", str(bridge.folder), *words]) == 0
+    assert checked(bridge) == ()
