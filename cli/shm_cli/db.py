@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -26,6 +27,7 @@ from shm_cli.common import (
     table,
     waiting,
 )
+from shm_cli.record import Words
 
 _copies_option = click.option(
     "--archive",
@@ -74,14 +76,22 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
 
 @command.command()
 @click.option("--archive", "with_archive", is_flag=True, help="Read the raw files too.")
+@click.option(
+    "--accept",
+    "accepted",
+    type=Words(),
+    metavar="WHY",
+    help="The rows that are missing are gone for good: they are missed no more.",
+)
 @json_option
 @click.pass_context
-def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
+def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json: bool) -> None:
     """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
 
     Rows that somebody took out are missed, by what others say of them, with what makes them again.
-    With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
-    with the same rows and checksums hold the same.
+    Those that nothing makes again, and no backup has, are accepted with --accept. With --archive,
+    each raw file must be there with the SHA-256 that it is named by. Two stores with the same rows
+    and checksums hold the same.
 
     \b
     Example: shm db check --archive
@@ -89,6 +99,11 @@ def check(ctx: click.Context, with_archive: bool, as_json: bool) -> None:
     workspace = open_workspace(ctx)
     with workspace.store() as store, progress_bar("checking") as tell:
         checked, location = check_store(store, tell), store.location
+        if accepted is not None:
+            gone = [row for row in checked.missing if row.only_in_backup]
+            store.accept_missing(gone, getpass.getuser(), accepted, datetime.now(UTC))
+            click.echo(f"Accepted as gone for good: {len(gone)} rows.", err=True)
+            checked = check_store(store, tell)
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
     troubles = (*checked.troubles, *(archive.troubles if archive else ()))
     if as_json:

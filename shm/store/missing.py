@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -25,7 +25,10 @@ from shm.store.missing_rules import (
     Rule,
 )
 from shm.store.numbering import skipped
-from shm.store.tables import metadata
+from shm.store.tables import events, metadata
+
+ACCEPTED = "accepted"
+"""The kind of event by which a person accepts that a row is gone."""
 
 _ROWS_AT_ONCE = 500
 
@@ -46,15 +49,31 @@ class MissingRow:
     def __str__(self) -> str:
         return f"{self.message} {self.remedy}"
 
+    @property
+    def only_in_backup(self) -> bool:
+        """Nothing here makes it again, and nothing stands on it."""
+        return self.remedy in (RESTORE, HISTORY) and not self.referred
+
+    @property
+    def key(self) -> str:
+        """What it is called by where a person has accepted that it is gone."""
+        return self.message if self.id is None else f"{self.table}/{self.id}"
+
 
 def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
-    """Every row that is missed; one whose number is known is named once."""
-    found: dict[tuple[str, object], MissingRow] = {}
+    """Every row that is missed and not accepted as gone; of a number that is known, named once."""
+    accepted = _accepted(connection)
+    found: dict[str, MissingRow] = {}
     for row in (*_referred(connection), *_by_documents(connection), *_by_rules(connection)):
-        found.setdefault((row.table, row.id or row.message), row)
-    known = {(row.table, row.id) for row in found.values()}
-    gaps = [row for row in _gaps(connection) if (row.table, row.id) not in known]
-    return (*found.values(), *gaps)
+        found.setdefault(row.key, row)
+    for row in _gaps(connection, accepted):
+        found.setdefault(row.key, row)
+    return tuple(row for key, row in found.items() if key not in accepted)
+
+
+def _accepted(connection: Connection) -> frozenset[str]:
+    query = sa.select(events.c.file_name).where(events.c.kind == ACCEPTED)
+    return frozenset(connection.scalars(query))
 
 
 def _by_rules(connection: Connection) -> Iterator[MissingRow]:
@@ -101,8 +120,8 @@ def _references() -> tuple[tuple[str, str, sa.Select[Any]], ...]:
     return tuple(found)
 
 
-def _gaps(connection: Connection) -> Iterator[MissingRow]:
-    for table, ids in skipped(connection).items():
+def _gaps(connection: Connection, accepted: Collection[str]) -> Iterator[MissingRow]:
+    for table, ids in skipped(connection, accepted).items():
         remedy = HISTORY if table in ("steps", "events") else RESTORE
         for id_ in ids:
             yield MissingRow(

@@ -8,6 +8,9 @@ were once seen without a gap: from then on a gap is a row that was taken out.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from itertools import islice
+
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
@@ -67,11 +70,13 @@ def forget(connection: Connection, table: str) -> None:
         _write(connection, noted(connection) & ~(1 << NUMBERED.index(table)))
 
 
-def skipped(connection: Connection) -> dict[str, tuple[int, ...]]:
-    """The numbers that are missing, by table: of each the first ones."""
+def skipped(connection: Connection, accepted: Collection[str]) -> dict[str, tuple[int, ...]]:
+    """The numbers that are missing, by table: of each the first ones but those that were
+    `accepted`, as in holds/14.
+    """
     seen = noted(connection)
     return {
-        table: _skipped(connection, table)
+        table: _skipped(connection, table, accepted)
         for bit, table in enumerate(NUMBERED)
         if seen >> bit & 1 and _has_gap(connection, table)
     }
@@ -87,11 +92,12 @@ def _has_gap(connection: Connection, table: str) -> bool:
     return bool(count != (highest or 0))
 
 
-def _skipped(connection: Connection, table: str) -> tuple[int, ...]:
+def _skipped(connection: Connection, table: str, accepted: Collection[str]) -> tuple[int, ...]:
     expected, found = 1, list[int]()
     there = sa.select(_ID).select_from(sa.table(table)).order_by(_ID)
     for id_ in connection.scalars(there):
-        found.extend(range(expected, min(id_, expected + _MOST_NAMED)))
+        gap = (id_ for id_ in range(expected, id_) if f"{table}/{id_}" not in accepted)
+        found.extend(islice(gap, _MOST_NAMED))
         expected = id_ + 1
         if len(found) >= _MOST_NAMED:
             break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import sqlalchemy as sa
 from shm.store.archive import Archive
 from shm.store.database import Database, insert
 from shm.store.files import write_event
+from shm.store.missing import ACCEPTED, MissingRow
 from shm.store.rows import StoredRecording
 from shm.store.tables import events, recordings
 
@@ -18,6 +20,12 @@ _REMOVED, _BACKUP = "removed", "backup"
 
 class Upkeep(Database):
     """The part of the store that remembers what was done to keep it in order."""
+
+    def accept_missing(self, rows: Sequence[MissingRow], who: str, why: str, at: datetime) -> None:
+        """Notes that a person knows these rows to be gone for good: they are missed no more."""
+        with self.writing() as connection:
+            for row in rows:
+                write_event(connection, at, ACCEPTED, None, row.key, f"by {who}: {why}")
 
     def note_removed(self, recording: StoredRecording, copy_folder: str, at: datetime) -> None:
         """Notes that a raw file is no longer here, and where its copy lies."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -179,3 +180,22 @@ def test_what_is_dropped_for_its_damage_is_not_missed(bridge: Workspace) -> None
     words = ("ingest", "--again", recording, "--from", "watched")
     assert run(["--workspace", str(bridge.folder), *words]) == 0
     assert checked(bridge) == ()
+
+
+def test_what_no_backup_has_is_accepted_and_no_more_than_that(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with sqlite3.connect(bridge.database) as connection:
+        connection.execute("DELETE FROM tokens WHERE id = 1")
+        connection.execute(
+            "DELETE FROM holds WHERE id = (SELECT max(id) FROM holds WHERE decision IS NULL)"
+        )
+    check = ["--workspace", str(bridge.folder), "db", "check"]
+    assert run([*check, "--accept", "taken out by hand"]) == 5
+    said = capsys.readouterr()
+    assert "Accepted as gone for good:" in said.err
+    assert "waits for a decision that nobody can make" in " ".join(said.err.split())
+    assert "tokens" not in said.err
+    with bridge.store() as store:
+        accepted = {event.file_name: event.message for event in store.events("accepted")}
+    assert accepted["tokens/1"].endswith(": taken out by hand")
