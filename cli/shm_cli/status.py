@@ -1,4 +1,7 @@
-"""`shm status`: what the workspace holds and what waits."""
+"""`shm status`: what the workspace holds and what waits.
+
+`shm status --of ID`: each stage that a recording has reached, and every result it ever had.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import timedelta
 from typing import Any
 
@@ -16,10 +20,17 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.words import model_class
-from shm.store import ENDED, DeliveryState, Store, StoredTest, Workspace
+from shm.store import (
+    ENDED,
+    DeliveryState,
+    FormerPosterior,
+    FormerTest,
+    Store,
+    StoredTest,
+    Workspace,
+)
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
-from shm_cli.stages import show_stages
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 
@@ -215,3 +226,40 @@ def _hangers(
             }
         )
     return rows
+
+
+def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
+    """Raises NothingThere where there is no such recording or test."""
+    with opened_store(ctx) as (_, store):
+        recording_id, _ = store.recording_named(which)
+        recording = store.recording(recording_id)
+        steps, tests = store.steps(recording_id), store.former_tests(recording_id)
+    if as_json:
+        show(
+            {
+                "recording": recording_id,
+                "file": recording.file.file_name,
+                "stage": recording.stage.value,
+                "steps": [asdict(step) for step in steps],
+                "results": [asdict(test) for test in tests],
+            }
+        )
+        return
+    made = table(f"recording {recording_id}: {recording.file.file_name}", "stage", "test", "at")
+    made.add_column("shm", justify="right")
+    for step in steps:
+        made.add_row(step.stage, step.test or "", f"{step.at:%Y-%m-%d %H:%M:%S}", step.version)
+    show_table(made)
+    for test in tests:
+        _tell(test)
+
+
+def _tell(test: FormerTest) -> None:
+    click.echo(f"{test.name}: identified by shm {test.lineage.version}{_until(test)}")
+    for made in test.posteriors:
+        click.echo(f"  posterior of {made.model} by shm {made.lineage.version}{_until(made)}")
+
+
+def _until(result: FormerTest | FormerPosterior) -> str:
+    superseded_at = result.superseded_at
+    return f", superseded {superseded_at:%Y-%m-%d %H:%M:%S}" if superseded_at else ""

@@ -1,4 +1,7 @@
-"""A `[[hanger]]` table: section, ends, turnbuckles, admitted model classes, thresholds, gap."""
+"""A `[[hanger]]` table: section, ends, turnbuckles, admitted model classes, thresholds, gap.
+
+What an owner says of the ends: how they are held, and what hangs from a free one.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,18 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 from shm.bridge.effects import effect_priors_of, scatter_of
-from shm.bridge.supports import supports_of
 from shm.bridge.table import Table
-from shm.values import NAN, EndPlate, Hanger, Kind, Limits, Thresholds, Turnbuckle
+from shm.values import (
+    NAN,
+    EndPlate,
+    Hanger,
+    Kind,
+    Limits,
+    Support,
+    Supports,
+    Thresholds,
+    Turnbuckle,
+)
 
 _REQUIRED = ("id", "length_m", "elastic_modulus_pa", "nominal_tension_n")
 _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
@@ -207,3 +219,38 @@ def _turnbuckles(tables: list[Table], hanger_length_m: float) -> tuple[Turnbuckl
             )
         reached, before = last, f"the turnbuckle that ends at {last:g} m"
     return tuple(turnbuckle for turnbuckle, _ in found)
+
+
+_KINDS: tuple[Support, ...] = get_args(Support)
+_KNOWN_SUPPORTS = ("deck", "arch", "both", "hanging_mass_kg")
+
+
+def supports_of(table: Table | None) -> Supports:
+    """The `[hanger.supports]` table; raises BadInput naming the key at fault."""
+    if table is None:
+        return Supports()
+    table.refuse_unknown(_KNOWN_SUPPORTS)
+    if "both" in table and ("deck" in table or "arch" in table):
+        raise table.refusal("both stands beside deck or arch", "Give both, or each end.")
+    both = _support_kind(table, "both", "clamped")
+    supports = Supports(
+        _support_kind(table, "deck", both),
+        _support_kind(table, "arch", both),
+        table.positive("hanging_mass_kg") if "hanging_mass_kg" in table else 0.0,
+    )
+    if supports.hanging_mass_kg and len(supports.ends("free")) != 1:
+        raise table.refusal(
+            "hanging_mass_kg needs one free end that it hangs from",
+            'Write deck = "free", or leave the mass out.',
+        )
+    return supports
+
+
+def _support_kind(table: Table, key: str, usual: Support) -> Support:
+    value = table.values.get(key, usual)
+    for kind in _KINDS:
+        if value == kind:
+            return kind
+    raise table.refusal(
+        f"{key} = {value!r} is no way to hold an end", f"Known: {', '.join(_KINDS)}."
+    )

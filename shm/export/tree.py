@@ -3,6 +3,8 @@
 The layout is ArviZ's schema of inference data: dimensions `chain` and `draw` first. The draws come
 by importance sampling, equally weighted and in no order, so they are one chain of independent draws
 and `r_hat` is an attribute (ArviZ's own needs several chains).
+
+The unit of a parameter, from its name and the model class that has it.
 """
 
 from __future__ import annotations
@@ -16,7 +18,6 @@ import numpy as np
 from shm import __version__
 from shm.errors import UsageError
 from shm.export.predictive import predictive
-from shm.export.units import unit_of
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
 
 if TYPE_CHECKING:
@@ -170,3 +171,20 @@ def _lineage(posterior: Posterior) -> dict[str, Any]:
         "inference_library_version": __version__,
     }
     return {name: value for name, value in told.items() if value is not None and value == value}
+
+
+_NONE = ("theta_F", "theta_L", "sigma", "section", "density", "length", "modulus")
+_UNITS = {"kg": "kg", "m": "m", "n": "N", "hz": "Hz", "s": "s", "rad": "rad", "c": "degC"}
+
+
+def unit_of(name: str, model: str) -> str:
+    """As a text, `1` where it has none; empty where the name does not say.
+
+    End springs are in N m/rad for beams, in N/m a node for solids; of a logarithm, the unit of what
+    it is the logarithm of.
+    """
+    if name in _NONE:
+        return "1"
+    if name.startswith("log10_k") and "+" not in model:
+        return "log10(N m/rad)" if model.startswith("beam") else "log10(N/m)"
+    return _UNITS.get(name.rpartition("_")[2], "")

@@ -3,6 +3,13 @@
 A shape is scaled to unit length over its own components. Where they are not equally certain, the
 length is the one weighted by 1/sd^2 (to a mean weight of 1), lest the error of an uncertain
 component spread over the certain ones.
+
+How much of a shape's standard deviations is that of its direction about the hanger's axis.
+
+Where two planes' frequencies are all but equal, noise turns both shapes at will: every component
+errs by the same angle times the other component at its place, so that the larger of a place's two
+standard deviations grows with the shape, sd^2 = own^2 + (turn size)^2. Components err independently
+by `own` alone.
 """
 
 from __future__ import annotations
@@ -11,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import nnls
 
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
-from shm.gap.turns import told_apart
 from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
@@ -223,3 +230,22 @@ def _nearest(x_m: Sequence[float], places_m: Sequence[float]) -> IntArray:
 
 def _integers(values: Sequence[int]) -> IntArray:
     return np.array(values, dtype=np.int64)
+
+
+_FEWEST = 3
+
+
+def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArray, float]:
+    """The components' own standard deviations (places,) and the turn's, in radians.
+
+    `sd` and `size` (places,) are the larger standard deviation and the larger component of each
+    place. Own ones are at least `least`. Where a turn is not most of what the largest component may
+    err by it counts as none, for standard deviations scatter, too. Least squares of relative
+    errors.
+    """
+    if len(sd) < _FEWEST:
+        return sd, 0.0
+    (own, turn), _ = nnls(np.column_stack([np.ones_like(sd), size**2]) / sd[:, None] ** 2, sd / sd)
+    if turn * np.max(size**2) <= max(own, least**2):
+        return sd, 0.0
+    return np.full_like(sd, np.sqrt(max(own, least**2))), float(np.sqrt(turn))

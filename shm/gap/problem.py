@@ -1,9 +1,12 @@
-"""What a hypothesis predicts of a hanger's tests."""
+"""What a hypothesis predicts of a hanger's tests.
+
+What the error of a tension that was read leaves in the frequencies of its test.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -14,7 +17,6 @@ from shm.gap.coordinates import DEVIATIONS, Coordinates, cut
 from shm.gap.flexible import flexible_nodes
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
-from shm.gap.readings import reading_loads
 from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
 from shm.gap.shapes import ShapeScaling, turn_loads
 from shm.gap.straight import Pair, Straight
@@ -240,3 +242,28 @@ def _part(observations: Observations, rows: BoolArray | IntArray) -> Observation
         shape_component=design.shape_component[shapes],
     )
     return observations.part(part, data)
+
+
+_STEP_SD = 0.01
+
+Predict = Callable[[Design], FloatArray]
+"""The logarithms of the frequencies (F,) that the baseline predicts of a design."""
+
+
+def reading_loads(design: Design, predict: Predict) -> FloatArray:
+    """Loads (F, tests with a reading): what one standard deviation of each reading does.
+
+    All modes of a test move together, those of other tests do not.
+    """
+    read = [t for t, each in enumerate(design.conditions) if each.tension_shift_sd_n > 0]
+    if not read:
+        return np.zeros((design.frequencies, 0))
+    moved = replace(
+        design,
+        conditions=tuple(
+            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
+            for each in design.conditions
+        ),
+    )
+    change = (predict(moved) - predict(design)) / _STEP_SD
+    return np.where(design.frequency_test[:, None] == read, change[:, None], 0.0)

@@ -1,4 +1,7 @@
-"""From records of one test to its identified modes: the whole of the room in one function."""
+"""From records of one test to its identified modes: the whole of the room in one function.
+
+What a finding must still pass once an identifier has made it.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
-from shm.identify.contract import Dropped, Finding, Hit, Measurement, Poles
+from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
 from shm.identify.finding.jackknife import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.finding.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
-from shm.identify.finishing import coherent_only, without_window
 from shm.identify.joining.fit import fitted
 from shm.identify.joining.joined import Joined, joined
 from shm.identify.joining.products import joined_response
@@ -24,6 +26,7 @@ from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.values import (
     NAN,
     ComplexArray,
+    FloatArray,
     ForeignMode,
     FrequencyResponse,
     Hanger,
@@ -193,3 +196,46 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     """Median peak force of the used hits over that of the reference level."""
     forces = [hit.peak_force_n for hit in hits if hit.used]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
+
+
+_LINES_AROUND = 4
+
+
+def without_window(found: Finding, measurement: Measurement) -> Finding:
+    """The finding with the damping of an exponential window taken off its damping ratios."""
+    rate = 1 / measurement.decay_time_constant_s
+    modes = tuple(
+        replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
+        for m in found.modes
+    )
+    return replace(found, modes=modes)
+
+
+def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
+    """The finding without modes at which the measured coherence is low.
+
+    Only for decays made from frequency responses: after hits, coherence also falls where a hit came
+    before the last had rung down, which free decays do not mind.
+    """
+    response = measurement.frequency_response
+    if measurement.hits or response is None or response.coherence is None:
+        return found
+    frequency_hz, coherence = response.frequency_hz, response.coherence
+    good = [
+        _coherence(mode, frequency_hz, coherence) >= options.min_coherence for mode in found.modes
+    ]
+    reason = f"coherence below {options.min_coherence:g}"
+    dropped = tuple(
+        Dropped(f"mode at {mode.frequency_hz:.4g} Hz", 1, reason)
+        for mode, ok in zip(found.modes, good, strict=True)
+        if not ok
+    )
+    modes = tuple(mode for mode, ok in zip(found.modes, good, strict=True) if ok)
+    return replace(found, modes=modes, dropped=found.dropped + dropped)
+
+
+def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:
+    """Median coherence over the points and the lines around a mode."""
+    line = int(np.argmin(np.abs(frequency_hz - mode.frequency_hz)))
+    near = coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
+    return float(np.median(near))

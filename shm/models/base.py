@@ -1,9 +1,13 @@
-"""What a model class is: named parameters with a prior, and a map from them to frequencies."""
+"""What a model class is: named parameters with a prior, and a map from them to frequencies.
+
+What a known mass, clamped on for one test, does to the frequencies of any model class.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -11,8 +15,9 @@ import numpy as np
 from shm.errors import BadInput, UsageError
 from shm.models.conditions import Conditions
 from shm.models.end_effects import EndWaves
-from shm.models.laden import laden_ratio
-from shm.values import FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
+from shm.models.hanger import PointMass, solve
+from shm.models.turnbuckles import coupled_bar
+from shm.values import AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
 
@@ -187,3 +192,27 @@ class Model:
                 remedy=f"It takes {', '.join(self.parameter_names)}.",
             )
         return np.array([values[name] for name in self.parameter_names], dtype=float)
+
+
+_NOWHERE = np.empty(0)
+
+
+def laden_ratio(
+    hanger: Hanger,
+    length_m: FloatArray,
+    tension_n: FloatArray,
+    springs_n_m_rad: tuple[FloatArray, FloatArray],
+    added_mass: AddedMass,
+    modes: int,
+) -> FloatArray:
+    """Frequencies with the mass over those without (n, 2, modes), by the general model.
+
+    Of bars of `length_m` (n,) from the deck end at tensions (n,), on rotational springs at the deck
+    and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
+    """
+    bare = coupled_bar(hanger, length_m, tension_n).on_springs(springs_n_m_rad)
+    one = np.ones(len(tension_n))
+    mass = PointMass(added_mass.x_m * one, added_mass.mass_kg * one)
+    laden = replace(bare, masses=(mass,))
+    found = [solve(each, modes, _NOWHERE, shapes=False).frequency_hz for each in (laden, bare)]
+    return np.asarray(found[0] / found[1])

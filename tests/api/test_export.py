@@ -15,7 +15,7 @@ import xarray
 
 import shm
 from shm.errors import BadInput, UsageError
-from shm.export.units import unit_of
+from shm.export.tree import unit_of
 
 
 @pytest.fixture(scope="module")

@@ -369,7 +369,7 @@ def test_an_extra_that_the_settings_call_for_must_be_installed(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert only(workspace, "extras").level is Level.OK
-    monkeypatch.setattr("shm_daemon.doctor.installed.find_spec", lambda name: None)
+    monkeypatch.setattr("shm_daemon.doctor.examining.find_spec", lambda name: None)
     monkeypatch.setenv("SHM_MQTT_URL", "mqtts://broker:8883")
     finding = only(workspace, "extras")
     assert (finding.level, finding.remedy) == (Level.FAULT, "pip install 'shm[mqtt]'")

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.gap.attribution import LAW_TO_CAUSE, without_faint
 from shm.gap.chances import Tried, families
 from shm.gap.contract import Hypothesis
-from shm.gap.faint import LAW_TO_CAUSE, without_faint
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import pytest
 
-from shm.gap.imitation import EVEN, LED_FALSELY, LED_WITH_TURNED_SENSORS, imitation
+from shm.gap.chances import EVEN, LED_FALSELY, LED_WITH_TURNED_SENSORS, imitation
 from shm.models.effects import EFFECTS
 
 

@@ -10,10 +10,10 @@ import pytest
 
 from shm.gap.attribution import attributed
 from shm.gap.diagnose import diagnose
-from shm.gap.numbering import misnumbered
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
+from shm.gap.setting_aside import misnumbered
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.values import ModalTest
 from tests.helpers.effects import all_but

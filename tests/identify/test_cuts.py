@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.measuring.cuts import LEAD_SECONDS, Cut, cut
 from shm.identify.measuring.frf import HitRecord
 from shm.identify.measuring.hits import find_pulses
+from shm.identify.measuring.setups import LEAD_SECONDS, Cut, cut
 from tests.identify.signals import Planted, Sensor, recording
 
 RATE_HZ = 1024.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.measuring.estimators import response_of
+from shm.identify.measuring.frf import response_of
 from shm.values import ComplexArray
 
 HITS = 4000

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.joining.pooling import pooled
+from shm.identify.joining.joined import pooled
 from shm.values import FloatArray
 
 

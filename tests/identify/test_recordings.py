@@ -9,8 +9,7 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Dropped, IdentifyOptions, identify
-from shm.identify.measuring.recordings import measurement_of_recordings
-from shm.identify.measuring.setups import measured
+from shm.identify.measuring.setups import measured, measurement_of_recordings
 from shm.values import Channel, Recording
 from tests.identify.signals import BIAXIAL, Sensor, half_sine, hanger_modes, recording
 

@@ -10,7 +10,7 @@ import pytest
 from shm.identify import IdentifyOptions
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.joining.ringing import levels, ringing
-from shm.identify.measuring.recordings import measurement_of_recordings
+from shm.identify.measuring.setups import measurement_of_recordings
 from shm.values import FloatArray
 from tests.identify.signals import PULSE_S, Planted, hanger_modes, recording
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shm.inference.importance import along
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.options import silent
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, search
 from shm.inference.updating import infer
-from shm.inference.valley import along
 from shm.models import THESIS, build
 from shm.values import PLANES, BoolArray, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3

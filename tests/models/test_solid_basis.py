@@ -10,7 +10,7 @@ import pytest
 from shm.errors import UsageError
 from shm.models import build
 from shm.models.base import silent
-from shm.models.solid import S1, Solid0, Solid2, basis, cache, reduction
+from shm.models.solid import S1, Solid0, Solid2, basis, reduction
 from shm.values import Turnbuckle
 from tests.helpers.hangers import HANGER_3
 
@@ -45,7 +45,7 @@ def test_a_broken_file_is_reported_and_made_anew(empty_cache, monkeypatch, caplo
     again = a_basis()
     assert "cannot be read" in caplog.text
     np.testing.assert_array_equal(again.projected.matrices, first.projected.matrices)
-    assert cache.load(S1(SHORT).description().key(6)) is not None
+    assert basis.load(S1(SHORT).description().key(6)) is not None
 
 
 def test_a_folder_that_cannot_be_written_is_reported_and_work_goes_on(

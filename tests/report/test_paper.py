@@ -9,7 +9,7 @@ import pytest
 
 from shm import report
 from shm.report import HangerReport
-from shm.report.paper import columns
+from shm.report.paper import setting
 from shm.report.paper.hanger import hanger_paper
 from shm.report.paper.setting import WIDTH
 from shm.report.table import Table
@@ -102,11 +102,11 @@ def test_names_from_outside_are_set_as_they_are(bare: HangerReport) -> None:
 
 def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
     table = Table("t", ("no.", "what was found"), (("12.5 ms", "word " * 80), ("3", "x")))
-    narrow, wide = columns.widths(table, 300.0, 8.0, 6.0)
+    narrow, wide = setting.widths(table, 300.0, 8.0, 6.0)
     assert narrow < 60
     assert narrow + wide == pytest.approx(300.0)
     small = Table("t", ("a", "b"), (("1", "2"),))
-    assert sum(columns.widths(small, 300.0, 8.0, 6.0)) < 60
+    assert sum(setting.widths(small, 300.0, 8.0, 6.0)) < 60
 
 
 def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:

@@ -1,16 +1,39 @@
-"""All checks of a workspace, whatever is broken: what cannot be looked at is told, never raised."""
+"""All checks of a workspace, whatever is broken: what cannot be looked at is told, never raised.
+
+Whether alerts reach people: hooks, and what is owed to them.
+
+Versions, and whether what the settings call for is there. Needs no store.
+
+The workspace as files: folders, permissions, room on the disks. Needs no store.
+"""
 
 from __future__ import annotations
 
+import os
+import platform
+import pwd
+import shutil
+import sqlite3
+import stat
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 
+from shm import __version__
+from shm.bridge import AppriseHook, Hook, WebhookHook
 from shm.errors import ShmError
+from shm.models import competing_names
+from shm.read import apart
 from shm.report.words import counted
+from shm.settings import Settings
 from shm.store import Workspace
-from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, unknown
+from shm.store.rows import DeliveryState
+from shm.store.workspace import FOLDERS
+from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, some, unknown, warning
 from shm_daemon.doctor.flowing import (
     check_daemon,
     check_held,
@@ -19,15 +42,77 @@ from shm_daemon.doctor.flowing import (
     check_spool,
     check_under_way,
 )
-from shm_daemon.doctor.folders import check_disks, check_folders
-from shm_daemon.doctor.installed import (
-    check_confinement,
-    check_extras,
-    check_models,
-    check_versions,
-)
 from shm_daemon.doctor.keeping import check_backup, check_clock, check_hangers, check_store
-from shm_daemon.doctor.telling import check_deliveries, check_hooks
+from shm_daemon.heartbeat import told
+from shm_daemon.hooks import HookFailed, HookNotifier
+
+_LATE = timedelta(minutes=10)
+_REMEMBERED = timedelta(days=30)
+
+
+def check_hooks(workspace: Workspace) -> Iterator[Finding]:
+    """Whether the described hooks could be run; nothing is sent. Needs no store."""
+    if not workspace.bridge.hooks:
+        yield warning("hooks", "none is described: nobody is told of alerts", "See docs/alerts.md.")
+    timeout_s = workspace.settings.hook_timeout_seconds
+    notifier = HookNotifier(workspace.folder, timeout_s, os.environ)
+    try:
+        for hook in workspace.bridge.hooks:
+            yield _ready(notifier, hook)
+            yield from _secrecy(workspace, hook)
+    finally:
+        notifier.close()
+
+
+def check_deliveries(examined: Examined) -> Iterator[Finding]:
+    """Whether alerts wait for their hooks, or were given up."""
+    store, now = examined.store, examined.now
+    waiting = store.deliveries(DeliveryState.WAITING)
+    late = [each for each in waiting if each.attempts or now - each.next_attempt_at > _LATE]
+    if late:
+        worst = max(late, key=lambda each: each.attempts)
+        said = worst.last_error or "not tried yet: is a daemon active?"
+        yield warning(
+            "deliveries",
+            f"{len(late)} alerts have not reached their hook; {worst.hook}, tried "
+            f"{worst.attempts} times: {said}",
+            f"`shm alerts test --hook {worst.hook}`; they are tried again by themselves.",
+        )
+    ended = store.deliveries(DeliveryState.GIVEN_UP)
+    lost = [each for each in ended if each.ended_at and now - each.ended_at < _REMEMBERED]
+    if lost:
+        last = lost[-1]
+        yield warning(
+            "deliveries",
+            f"{len(lost)} were given up in the last {told(_REMEMBERED)}; {last.hook}: "
+            f"{last.last_error}",
+            "See `shm alerts` for what nobody was told of, and mend the hook.",
+        )
+    if not late and not lost:
+        yield ok("deliveries", f"{len(waiting)} on their way" if waiting else "none owed")
+
+
+def _ready(notifier: HookNotifier, hook: Hook) -> Finding:
+    check = f"hook {hook.name}"
+    try:
+        return ok(check, notifier.ready(hook))
+    except HookFailed as error:
+        if isinstance(hook, WebhookHook) and hook.secret_env:
+            # The daemon's environment may hold what ours does not.
+            return unknown(check, error.message, "Try it as the daemon's user, with its variables.")
+        return fault(check, error.message, error.remedy)
+
+
+def _secrecy(workspace: Workspace, hook: Hook) -> Iterator[Finding]:
+    name = ""
+    if isinstance(hook, WebhookHook):
+        name = hook.secret_file
+    if isinstance(hook, AppriseHook):
+        name = hook.address_file
+    path = workspace.folder / name
+    if name and path.exists() and path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH):
+        yield warning(f"hook {hook.name}", f"others can read {name}", f"chmod 600 {path}")
+
 
 _CHECKS: Sequence[tuple[str, Check]] = (
     ("store", check_store),
@@ -92,3 +177,148 @@ def _broken(name: str, error: ShmError | OSError) -> Finding:
         where = f"{error.where}: " if error.where else ""
         return fault(name, f"{where}{error.message}", error.remedy)
     return fault(name, f"{error.filename or ''}: {error.strerror or error}", "See permissions.")
+
+
+_MODULES = {
+    "alerts": ("apprise",),
+    "distributed": ("distributed",),
+    "mqtt": ("paho",),
+    "postgres": ("psycopg",),
+    "web": ("fastapi", "prometheus_client", "uvicorn"),
+}
+_SHOWN = ("numpy", "scipy", "sqlalchemy")
+
+
+def check_versions() -> Iterator[Finding]:
+    """What results depend on."""
+    libraries = ", ".join(f"{name} {_version(name)}" for name in _SHOWN)
+    yield ok(
+        "versions",
+        f"shm {__version__}, Python {platform.python_version()}, {libraries}, "
+        f"SQLite {sqlite3.sqlite_version}",
+    )
+
+
+def check_extras(workspace: Workspace) -> Iterator[Finding]:
+    """Whether what the settings call for is installed."""
+    installed = [extra for extra, modules in _MODULES.items() if all(map(find_spec, modules))]
+    settings, hooks = workspace.settings, workspace.bridge.hooks
+    needed = {
+        "alerts": any(isinstance(hook, AppriseHook) for hook in hooks),
+        "distributed": bool(settings.scheduler),
+        "mqtt": bool(settings.mqtt_url),
+        "postgres": "://" in settings.store,
+    }
+    missing = [extra for extra, wanted in needed.items() if wanted and extra not in installed]
+    if missing:
+        names = ",".join(missing)
+        yield fault("extras", f"not installed: {names}", f"pip install 'shm[{names}]'")
+    else:
+        yield ok("extras", f"installed: {', '.join(installed) or 'none'}; none other is needed")
+
+
+def check_models(workspace: Workspace) -> Iterator[Finding]:
+    """Whether each hanger has a model class; raises UsageError, as the daemon does."""
+    names = workspace.settings.model_names
+    for hanger in workspace.bridge.hangers:
+        competing_names(hanger, names)
+    yield ok("models", f"{', '.join(names)}; each hanger has one that applies")
+
+
+def check_confinement() -> Iterator[Finding]:
+    """Whether files of others are read within all bounds that we know; ShmError where they cannot.
+
+    A file is read by a child process here, as the daemon's are.
+    """
+    missing = apart.missing_bounds()
+    for name, why in missing.items():
+        yield warning(
+            "confinement",
+            f"files are read without {name}: {why}",
+            "A file made to take its reader over could do what this user may: let nobody send "
+            "files whom you do not trust, or run shm on a newer Linux, on x86_64 or aarch64.",
+        )
+    if not missing:
+        yield ok("confinement", "files are read within limits, Landlock and a list of system calls")
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+_GIGABYTE = 1e9
+_NEARLY_FULL = 0.1
+
+
+def check_folders(folder: Path) -> Iterator[Finding]:
+    """Whether the folders of a workspace are there and we may write in them."""
+    missing = [name for name in FOLDERS if not (folder / name).is_dir()]
+    if missing:
+        yield fault(
+            "folders",
+            f"{some(missing)} missing in {folder}",
+            "Is a disk not mounted? Else the next command makes them, empty.",
+        )
+    wanted = [folder, *(folder / name for name in FOLDERS if name not in missing)]
+    closed = [path for path in wanted if not os.access(path, os.R_OK | os.W_OK | os.X_OK)]
+    if closed:
+        yield fault(
+            "permissions",
+            f"this user cannot write in {some([str(path) for path in closed])}",
+            "Give the folders to the user who runs the daemon: chown -R.",
+        )
+    yield from _owner(folder)
+    if not missing and not closed:
+        yield ok("folders", str(folder))
+
+
+def _owner(folder: Path) -> Iterator[Finding]:
+    owner, ours = folder.stat().st_uid, os.geteuid()
+    if owner != ours:
+        yield warning(
+            "permissions",
+            f"the folder belongs to user {_name(owner)}, this is user {_name(ours)}",
+            f"Ask as that user, who sees what the daemon sees: sudo -u {_name(owner)} shm doctor.",
+        )
+    described = folder / "bridge.toml"
+    if described.exists() and described.stat().st_mode & stat.S_IWOTH:
+        yield fault(
+            "permissions",
+            "everybody can change bridge.toml, and so the programs that hooks run",
+            f"chmod o-w {described}",
+        )
+
+
+def check_disks(folder: Path, settings: Settings) -> Iterator[Finding]:
+    """Whether there is room wherever we write."""
+    places = {
+        "workspace": folder,
+        "archive": folder / "archive",
+        "temporary files": Path(tempfile.gettempdir()),
+    }
+    seen: set[int] = set()
+    for what, path in places.items():
+        if path.exists() and path.stat().st_dev not in seen:
+            seen.add(path.stat().st_dev)
+            yield _room(what, path, settings.min_free_bytes)
+
+
+def _room(what: str, path: Path, wanted_bytes: int) -> Finding:
+    usage = shutil.disk_usage(path)
+    found = f"{what}: {usage.free / _GIGABYTE:.1f} of {usage.total / _GIGABYTE:.0f} GB free"
+    remedy = "Free some space; `shm archive prune --dry-run` says what could go."
+    if usage.free < _NEARLY_FULL * wanted_bytes:
+        return fault("disk", found, remedy)
+    if usage.free < wanted_bytes:
+        return warning("disk", found, remedy)
+    return ok("disk", found)
+
+
+def _name(user: int) -> str:
+    try:
+        return pwd.getpwuid(user).pw_name
+    except KeyError:
+        return str(user)

@@ -1,24 +1,35 @@
-"""One case: its files, and its line of the key."""
+"""One case: its files, and its line of the key.
+
+What is measured in a case of each richness; the hanger's tension is drawn with the hanger.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from shm.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE
 from shm.blind.making.mix import Draft
-from shm.blind.making.plans import PLANS
 from shm.blind.making.planting import Site, planted_effects
 from shm.bridge import load_hanger
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document
 from shm.read.single import write_single
-from shm.simulate import PLANTED, CampaignTruth, PlantedEffect, campaign_with_truth, drawn_hanger
+from shm.simulate import (
+    PLANTED,
+    CampaignPlan,
+    CampaignTruth,
+    PlantedEffect,
+    Reality,
+    campaign_with_truth,
+    drawn_hanger,
+)
 from shm.simulate.recorded import Recorder, recorded
-from shm.values import TrueCase, TrueEffect
+from shm.values import Richness, TrueCase, TrueEffect
 
 BASELINE = "beam1"
 _DRAWS = 5
@@ -106,3 +117,15 @@ def _left_out(
     if draft.kind == "unknown":
         return ()
     return tuple(each.name for each in effects) or (str(rng.choice(list(PLANTED))),)
+
+
+_ALL = CampaignPlan(tension_spread=0.0, reality=Reality())
+_ONE_TEST = replace(_ALL, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
+PLANS: dict[Richness, CampaignPlan] = {
+    "one plane": replace(_ONE_TEST, planes=("transverse",)),
+    "two planes": _ONE_TEST,
+    "known mass": replace(_ONE_TEST, mass_share=_ALL.mass_share),
+    "shapes": replace(_ONE_TEST, shapes=True),
+    "conditions": replace(_ALL, shapes=False, mass_share=0.0),
+    "everything": _ALL,
+}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from shm.errors import UsageError
 from shm.identify.contract import Identifier
 from shm.identify.finding.response_fit import common_denominator_fit
-from shm.identify.finding.ssi import summed_hankel_ssi
-from shm.identify.finding.ssi_input import summed_hankel_ssi_with_input
+from shm.identify.finding.ssi import summed_hankel_ssi, summed_hankel_ssi_with_input
 
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,

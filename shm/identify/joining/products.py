@@ -4,6 +4,8 @@ After a hit the residue of a mode is its shape at the sensor times its shape at 
 2000, section 2.4). All set-ups together fill a table with a row for each hammer place and a column
 for each sensor, whose factors are the shape at the sensors and, by reciprocity, at the hammer's
 places. Without a force a set-up's shape has a scale of its own, which takes the hammer's place.
+
+The two factors of a product of which only some entries are known.
 """
 
 from __future__ import annotations
@@ -12,11 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from shm.errors import BadInput
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.finding.jackknife import jackknife_sd
-from shm.identify.joining.rank_one import factors, hang_together
 from shm.identify.joining.ringing import Ringing
 from shm.identify.measuring.points import Place, place_of
 from shm.values import BoolArray, FloatArray, FrequencyResponse, Plane, ResponsePoint
@@ -191,3 +194,50 @@ def _share(
     part = at_sensor[:, [own == plane for own in planes]]
     largest = np.take_along_axis(part, np.argmax(np.abs(part), axis=1)[:, np.newaxis], axis=1)
     return np.asarray(np.sign(largest[:, 0]) * np.linalg.norm(part, axis=1))
+
+
+_MOST_ROUNDS = 200
+_TOLERANCE = 1e-9
+
+
+def hang_together(known: BoolArray) -> bool:
+    """Whether the known entries (rows, columns) are joined by steps along rows and columns.
+
+    Only then all entries of a factor have one scale.
+    """
+    rows, columns = known.shape
+    places = np.nonzero(known)
+    graph = csr_array(
+        (np.ones(len(places[0])), (places[0], rows + places[1])), shape=2 * (rows + columns,)
+    )
+    return bool(connected_components(graph, directed=False)[0] == 1)
+
+
+def factors(products: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Least-squares factors (modes, rows), (modes, columns) of `products` (modes, rows, columns).
+
+    Only the `known` entries (rows, columns) count. By turns each factor is the least-squares
+    solution given the other; the second has the norm 1.
+    """
+    values = np.where(known, products, 0.0)
+    column = _first_guess(values)
+    row = np.zeros(values.shape[:2])
+    for _ in range(_MOST_ROUNDS):
+        row = np.einsum("mrc,mc->mr", values, column) / _energy(column, known.T)
+        new = np.einsum("mrc,mr->mc", values, row) / _energy(row, known)
+        new /= np.maximum(np.linalg.norm(new, axis=1, keepdims=True), _TINY)
+        change = np.max(np.abs(new - column), initial=0.0)
+        column = new
+        if change < _TOLERANCE:
+            break
+    return row, column
+
+
+def _first_guess(values: FloatArray) -> FloatArray:
+    """The largest row of each mode; columns it does not know are 0 and take no part at first."""
+    largest = np.argmax(np.sum(values**2, axis=2), axis=1)
+    return np.asarray(values[np.arange(len(values)), largest])
+
+
+def _energy(factor: FloatArray, known: BoolArray) -> FloatArray:
+    return np.asarray(np.maximum(factor**2 @ known, _TINY))

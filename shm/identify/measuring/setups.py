@@ -2,6 +2,10 @@
 
 Records belong to one set-up where the same sensors and the hammer were at the same places. A test
 with a roving hammer or a roving sensor has several.
+
+Cuts what belongs to one hit out of its record, low-passed and thinned to the band.
+
+From time records of hits, as received, to the measurement of one set-up.
 """
 
 from __future__ import annotations
@@ -10,15 +14,19 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Hit, Measurement
 from shm.identify.measuring.ambient import ambient_measurement
-from shm.identify.measuring.frf import common_window
-from shm.identify.measuring.recordings import measurement_of_recordings, screened_measurement
+from shm.identify.measuring.bandlimit import band_limited, filter_reach
+from shm.identify.measuring.frf import Window, averaged_response, common_window
+from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
+from shm.identify.measuring.points import point_of
 from shm.identify.measuring.responses import measurement_of_responses
 from shm.identify.measuring.screening import Screening, screened
 from shm.identify.options import IdentifyOptions
-from shm.values import Channel, FrequencyResponse, Recording
+from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording
 
 _SAME_RATE = 1e-5
 """Rates read off columns of rounded times differ by less, and no frequency feels it."""
@@ -157,3 +165,110 @@ def _renumbered(found: Screening, set_up: _SetUp) -> Screening:
         replace(hit, record=set_up.places[hit.record]) for hit in found.hits
     )
     return replace(found, hits=hits)
+
+
+LEAD_SECONDS = 0.02
+"""The force's pulse, smeared by the filter, begins at least so long after a cut's first sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """One hit: `driven` (1 + points, samples), force first, at `sampling_rate_hz`.
+
+    From column `free` on, the filter saw nothing of the force: there the hanger rings freely. The
+    first column lies equally long before the hit in all hits of one sampling rate.
+    """
+
+    driven: FloatArray
+    free: int
+    sampling_rate_hz: float
+
+    @property
+    def decay(self) -> FloatArray:
+        """The free motion, (points, samples)."""
+        return self.driven[1:, self.free :]
+
+
+def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
+    """The hit and its ring-down; force and accelerations pass the same filter.
+
+    Where the record begins too late, the hanger is taken to have been at rest before.
+    """
+    reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
+    lead = int(LEAD_SECONDS * sampling_rate_hz) + reach
+    begin = hit.pulse.start - lead - reach
+    free = hit.pulse.end + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
+    signals = _centred(hit, begin, free)
+    driven, rate = band_limited(signals, sampling_rate_hz, band_high_hz)
+    first_free = -((begin - free) // factor)
+    return Cut(driven, first_free, rate)
+
+
+def _centred(hit: HitRecord, begin: int, free: int) -> FloatArray:
+    """Force and accelerations from `begin` to the end of the ring-down, free of their offset."""
+    first = max(0, begin)
+    stop = hit.pulse.stop
+    signals = np.zeros((1 + len(hit.accelerations), stop - begin))
+    known = signals[:, first - begin :]
+    np.subtract(hit.force[first:stop], np.median(hit.force[free:stop]), out=known[0])
+    offset = hit.accelerations[:, free:stop].mean(axis=1, keepdims=True)
+    np.subtract(hit.accelerations[:, first:stop], offset, out=known[1:])
+    before = known[:, : hit.pulse.start - first]
+    before[:] = np.nan_to_num(before)
+    return signals
+
+
+def measurement_of_recordings(
+    records: Sequence[Recording], options: IdentifyOptions
+) -> Measurement:
+    """The measurement in records of one set-up, each with one hit or several.
+
+    Raises NotIdentifiable where no hit is left to use.
+    """
+    found = screened(records, options)
+    window = common_window(found.used, records[0].sampling_rate_hz, options.band_high_hz)
+    return screened_measurement(records, found, window, options)
+
+
+def screened_measurement(
+    records: Sequence[Recording], found: Screening, window: Window, options: IdentifyOptions
+) -> Measurement:
+    """The measurement in records of one set-up, of which `found` says what can be used."""
+    rate = records[0].sampling_rate_hz
+    cuts = [cut(hit, rate, options.band_high_hz) for hit in found.used]
+    response, spectra = _response(records[0], found, window, options)
+    force = records[0].force
+    return Measurement(
+        source=records[0].source,
+        points=response.points,
+        decays=tuple(each.decay for each in cuts),
+        sampling_rate_hz=cuts[0].sampling_rate_hz,
+        frequency_response=response,
+        driven=tuple(each.driven for each in cuts),
+        spectra=spectra,
+        hammer=point_of(force) if force else None,
+        window_time_constant_s=window.time_constant_s,
+        hits=found.hits,
+        dropped=found.dropped,
+    )
+
+
+def _response(
+    first: Recording, found: Screening, window: Window, options: IdentifyOptions
+) -> tuple[FrequencyResponse, ComplexArray]:
+    """The frequency response of a set-up, and the spectra it is an average of."""
+    average = averaged_response(
+        found.used, first.sampling_rate_hz, options.band_high_hz, options.estimator, window
+    )
+    response = FrequencyResponse(
+        source=first.source,
+        points=tuple(point_of(first.accelerations[row]) for row in found.rows),
+        frequency_hz=average.frequency_hz,
+        accelerance=average.accelerance,
+        coherence=average.coherence,
+        hanger=first.hanger,
+        time=first.time,
+        temperature_c=first.temperature_c,
+        added_mass=first.added_mass,
+    )
+    return response, average.spectra

@@ -1,14 +1,20 @@
-"""What a figure declares about itself, and what it is once drawn."""
+"""What a figure declares about itself, and what it is once drawn.
+
+Figures as PNG bytes or as SVG text fit to stand inside an HTML page.
+"""
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Generic, TypeVar
 
 from matplotlib.figure import Figure
 
-from shm.report.figures.render import png, svg
+from shm.report.figures.style import PALETTE
 
 Data = TypeVar("Data")
 
@@ -56,3 +62,48 @@ def illustration(member: Member[Data], data: Data) -> Illustration | None:
     if figure is None:
         return None
     return Illustration(member.name, member.title, member.caption(data), member.alt(data), figure)
+
+
+_ID = re.compile(r'\bid="([^"]+)"')
+_REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
+
+
+def png(figure: Figure, dots_per_inch: int) -> bytes:
+    """The figure on white."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white")
+    return buffer.getvalue()
+
+
+def svg(figure: Figure, name: str, title: str, alt: str) -> str:
+    """The figure as one `<svg>` element: named for screen readers, its ids prefixed by `name`
+    and counted (so that they are unique on the page and the same on every run), its colours
+    CSS variables with the printed colour as fallback."""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    body = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    return _named(_themed(_own_ids(body, name)), name, title, alt)
+
+
+def _own_ids(body: str, name: str) -> str:
+    numbers: dict[str, str] = {}
+    for found in _ID.findall(body):
+        numbers.setdefault(found, f"{name}-{len(numbers)}")
+    body = _ID.sub(lambda match: f'id="{numbers[match[1]]}"', body)
+    return _REFERENCE.sub(lambda match: match[1] + numbers[match[2]], body)
+
+
+def _themed(body: str) -> str:
+    for variable, colour in PALETTE.items():
+        body = body.replace(colour, f"var(--{variable}, {colour})")
+    return body
+
+
+def _named(body: str, name: str, title: str, alt: str) -> str:
+    labels = f'role="img" aria-labelledby="{name}-title {name}-alt"'
+    words = (
+        f'<title id="{name}-title">{escape(title)}</title>'
+        f'<desc id="{name}-alt">{escape(alt)}</desc>'
+    )
+    return re.sub(r"<svg\b([^>]*)>", rf"<svg {labels}\1>{words}", body, count=1, flags=re.DOTALL)

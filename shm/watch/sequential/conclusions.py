@@ -1,4 +1,7 @@
-"""What the bank says after a test: what changed, since when, and how far each quantity is."""
+"""What the bank says after a test: what changed, since when, and how far each quantity is.
+
+Shifts in the units that people read, of mixtures of normal distributions in the coordinate.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
+from scipy.special import ndtr
 
 from shm.values import (
     NAN,
@@ -21,10 +25,9 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.options import WatchOptions
-from shm.watch.quantities import value_at
+from shm.watch.quantities import coordinate_of, shift_of, value_at
 from shm.watch.sequential.bank import STEP, Bank, log_total
 from shm.watch.sequential.measurement import DAYS_PER_YEAR
-from shm.watch.sequential.shifts import Shift, beyond, shift_of_mixture
 
 _ALIKE_NATS = 3.0
 _TAIL = 0.05
@@ -235,3 +238,59 @@ def _drift(
         threshold=threshold,
         probability=probability,
     )
+
+
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_NEGLIGIBLE = 1e-7
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Mean and sd of a shift."""
+
+    mean: float
+    sd: float
+
+
+def shift_of_mixture(
+    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
+) -> Shift:
+    """Of normal distributions (B,) in units of a step; no shift at all with what `weights` leave.
+
+    By Gauss-Hermite quadrature of seven nodes in each.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights = weights[kept]
+    mean, sd = mean[kept] * quantity.step_sd, sd[kept] * quantity.step_sd
+    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
+    first = float(weights @ shifts @ _WEIGHTS)
+    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
+    second += (1 - float(weights.sum())) * first**2
+    return Shift(first, math.sqrt(max(second, 0.0)))
+
+
+def beyond(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float,
+) -> float:
+    """Probability of a shift beyond a threshold, the likelier way, by the same mixture."""
+    kept = weights > _NEGLIGIBLE
+    weights, mean = weights[kept], mean[kept] * quantity.step_sd
+    sd = np.maximum(sd[kept] * quantity.step_sd, 1e-12)
+    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    down = float(weights @ ndtr((low - mean) / sd))
+    up = float(weights @ ndtr((mean - high) / sd))
+    return min(max(down, up), 1.0)
+
+
+def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
+    """The coordinate of a shift; infinite where the quantity's table ends before it."""
+    tension = quantity.name == TENSION
+    value = quantity.baseline * (1 + shift) if tension else quantity.baseline + shift
+    if not min(quantity.values) < value < max(quantity.values):
+        return math.copysign(math.inf, shift)
+    return coordinate_of(quantity, value)

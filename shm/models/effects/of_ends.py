@@ -1,0 +1,363 @@
+"""Effects of the ends: springs that turn or give way, lengths, stiff zones, a support that swings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places, scales
+from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger, SupportMode, Zone
+from shm.values import NAN, PLANES, FloatArray, Hanger
+
+
+class RotationalEndFlexibility(Effect):
+    """The joint, the gusset plate or the deck behind it turns when the hanger bends.
+
+    A rotational spring stands between the bar and the structure; k1 and k3 act in the transverse
+    plane (deck end, arch end), k2 and k4 in the longitudinal one. It lowers all frequencies, the
+    low orders most, and so passes for less tension where ends are taken as clamped. At both ends
+    the ends are alike: k3 = k1 and k4 = k2. Where the description has a hinge it is the other way
+    round: what holds the end resists its turning.
+    """
+
+    name = "rotational_end_flexibility"
+    title = "Ends that turn"
+    source = (
+        "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; "
+        "Geier, De Roeck and Flesch (2006), Accurate cable force determination using ambient "
+        "vibration measurements."
+    )
+    seen_by = ("frequencies", "the other plane", "shapes near the ends")
+    imitated_by = (
+        "joint_softening",
+        "skewed_principal_axes",
+        "effective_length",
+        "bending_stiffness",
+        "translational_end_flexibility",
+    )
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        everywhere = places.springs(survey)
+        turning = places.at_ends(everywhere, hanger.supports.ends("pinned"))
+        return places.at_ends(everywhere, hanger.supports.ends("clamped")) + turning
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        first = 1 + 2 * variant.ends[0]
+        hinge = variant.ends[0] in hanger.supports.ends("pinned")
+        return tuple(
+            scales.rotational_stiffness(f"log10_k{first + plane}", hanger, hinge)
+            for plane in places.free_planes(variant)
+        )
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        compliance = physical.rotational_compliance_rad_n_m.copy()
+        for end in variant.ends:
+            for plane in variant.planes:
+                column = 0 if variant.alike else variant.planes.index(plane)
+                own, added = compliance[:, end, plane, plane], 10.0 ** -values[:, column]
+                compliance[:, end, plane, plane] = np.where(np.isinf(own), added, own + added)
+        return replace(physical, rotational_compliance_rad_n_m=compliance)
+
+
+_SOFT, _STIFF = 3.0, 3000.0
+
+
+class TranslationalEndFlexibility(Effect):
+    """What holds the end bends: a thin cross beam, a long bracket, a soft bearing.
+
+    A spring without mass holds the end in the plane; kt1 and kt3 act in the transverse plane (deck
+    end, arch end), kt2 and kt4 in the longitudinal one. At both ends the ends are alike.
+    """
+
+    name = "translational_end_flexibility"
+    title = "Ends that give way sideways"
+    source = "Rao and Mirza (1989), A note on vibrations of generally restrained beams."
+    seen_by = ("frequencies", "the other plane", "shapes near the ends")
+    imitated_by = ("support_motion", "shear_and_rotary_inertia", "stiff_end_zones", "point_mass")
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        held = hanger.supports.ends("clamped", "pinned")
+        return places.at_ends(places.springs(survey), held)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        first = 1 + 2 * variant.ends[0]
+        own = _lateral_stiffness_n_m(hanger)
+        return tuple(
+            Parameter(
+                f"log10_kt{first + plane}",
+                "N/m",
+                math.log10(_SOFT * own),
+                math.log10(_STIFF * own),
+                np.inf,
+                "3 to 3000 times T/L + 100 EI/L^3, what the bar itself resists with: what holds a "
+                "hanger is stiffer than the hanger, nobody knows by how many orders of magnitude.",
+            )
+            for plane in places.free_planes(variant)
+        )
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        compliance = physical.translational_compliance_m_n.copy()
+        for end in variant.ends:
+            for plane in variant.planes:
+                column = 0 if variant.alike else variant.planes.index(plane)
+                compliance[:, end, plane] += 10.0 ** -values[:, column]
+        return replace(physical, translational_compliance_m_n=compliance)
+
+
+def _lateral_stiffness_n_m(hanger: Hanger) -> float:
+    length_m = hanger.length_m
+    return hanger.nominal_tension_n / length_m + 100 * hanger.bending_stiffness_n_m2 / length_m**3
+
+
+class EffectiveLength(Effect):
+    """The bar vibrates over another length than the one given.
+
+    It is held inside of its plate or socket (negative), or beyond the face that the drawing shows
+    (positive). At both ends the change is shared evenly.
+    """
+
+    name = "effective_length"
+    title = "Another length than the drawing's"
+    source = (
+        "Amabili, Carra, Collini, Garziera and Panno (2010), Estimation of tensile force in "
+        "tie-rods using a frequency-based identification method."
+    )
+    seen_by = ("frequencies", "shapes", "a known mass")
+    imitated_by = (
+        "distributed_mass",
+        "timebase",
+        "bending_stiffness",
+        "stiff_end_zones",
+        "rotational_end_flexibility",
+    )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.ends()
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "length_change_m",
+            "m",
+            0.001 * hanger.length_m,
+            0.12 * hanger.length_m,
+            0.0,
+            "0.1 to 12 % of the length, either way: from the tolerance of a drawing to a whole end "
+            "plate that holds the bar or does not.",
+            spread="logarithmic",
+            signed=True,
+            most=hanger.length_m / 2,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        each = values[:, 0] / len(variant.ends)
+        return replace(
+            physical,
+            deck_end_m=physical.deck_end_m - each * (0 in variant.ends),
+            arch_end_m=physical.arch_end_m + each * (1 in variant.ends),
+        )
+
+
+class StiffEndZones(Effect):
+    """Next to its end the bar is stiffer: a slotted plate, a fork, a socket, a threaded sleeve.
+
+    The zone keeps the bar's mass per length; its bending stiffness is multiplied, by a plate in its
+    own plane alone.
+    """
+
+    name = "stiff_end_zones"
+    title = "Stiff zones at the ends"
+    source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
+    seen_by = ("frequencies", "shapes near the ends")
+    imitated_by = ("effective_length", "bending_stiffness", "shear_and_rotary_inertia")
+    other_laws = (
+        "the stiffness falls gradually, as in a socket that tapers",
+        "the compliance rises gradually, as in a socket that is cut to a cone",
+    )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.ends_and_planes(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "zone_m",
+            "m",
+            0.0005 * hanger.length_m,
+            0.12 * hanger.length_m,
+            0.0,
+            "0.05 to 12 % of the length at each end: from a weld to a whole end plate.",
+            spread="logarithmic",
+            most=hanger.length_m / 2,
+        )
+        ratio = Parameter(
+            "stiffness_ratio",
+            "times EI",
+            2.0,
+            100.0,
+            NAN,
+            "2 to 100 times the bar's: a sleeve doubles it, a plate in its stiff plane is all but "
+            "rigid.",
+            spread="logarithmic",
+        )
+        return size, ratio
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        deck_m, arch_m = physical.deck_end_m, physical.arch_end_m
+        reach_m, ratio = values.T
+        same = np.ones_like(ratio)
+        zones = []
+        for step, times in _steps(ratio, variant.law):
+            factor = np.ones((len(ratio), len(PLANES)))
+            factor[:, list(variant.planes)] = times[:, None]
+            both = (
+                Zone(deck_m, deck_m + step * reach_m, factor, same),
+                Zone(arch_m - step * reach_m, arch_m, factor, same),
+            )
+            zones += [both[end] for end in variant.ends]
+        return replace(physical, zones=(*physical.zones, *zones))
+
+
+def _steps(ratio: FloatArray, law: int) -> list[tuple[float, FloatArray]]:
+    """The reaches of steps one in another, each with the factor by which it stiffens."""
+    if law == 0:
+        return [(1.0, ratio)]
+    if law == 1:
+        return [(reach, ratio ** (1 / len(GRADUAL))) for reach in GRADUAL]
+    left = 1 / ratio + (1 - 1 / ratio) * np.array([[0.0], [0.25], [0.75], [1.0]])
+    return list(zip(GRADUAL, left[1:] / left[:-1], strict=True))
+
+
+_FASTER = (1.6, 2.0, 2.5, 3.2, 4.0, 5.0)
+"""A beam's second mode lies at 2.8 (clamped) to 4 times (pinned) the first; with several spans, or
+where a deck turns, lower."""
+_HEAVIER = 4.0
+"""A second mode deflects less than the first where the hanger is fixed: more mass goes with it."""
+
+
+class SupportMotion(Effect):
+    """What holds the hanger vibrates itself, as a mass on a spring, and drags the end along.
+
+    A cross beam or the deck with a frequency near one of the hanger's shifts that mode, down where
+    the support's frequency is the higher one, up where it is the lower one. The support's own modes
+    are not counted among the hanger's.
+
+    A support is a structure: where the hanger is fixed it deflects by the sum of its modes, and one
+    of them may lie near another of the hanger's.
+    """
+
+    name = "support_motion"
+    title = "A support that swings along"
+    source = (
+        "Gattulli and Lepidi (2007), Localization and veering in the dynamics of cable-stayed "
+        "bridges."
+    )
+    seen_by = ("frequencies near the support's own", "the other plane", "shapes near the ends")
+    imitated_by = ("intermediate_support", "sag", "translational_end_flexibility")
+    other_laws = tuple(
+        f"with a second mode at {faster:g} times the frequency, {_HEAVIER:g} times as heavy"
+        for faster in _FASTER
+    )
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        held = hanger.supports.ends("clamped", "pinned")
+        everywhere = places.at_ends(places.ends_and_planes(survey), held)
+        return tuple(each for each in everywhere if len(each.ends) == len(each.planes) == 1)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        own_kg = scales.mass_kg(hanger)
+        size = Parameter(
+            "support_mass_kg",
+            "kg",
+            0.3 * own_kg,
+            1000 * own_kg,
+            np.inf,
+            "0.3 to 1000 times the hanger's mass: from a light bracket to a span of the deck.",
+            spread="logarithmic",
+        )
+        frequency = Parameter(
+            "support_frequency_hz",
+            "Hz",
+            0.5,
+            60.0,
+            NAN,
+            "0.5 to 60 Hz: from the first mode of a bridge to a local mode of a cross beam.",
+            spread="logarithmic",
+        )
+        return size, frequency
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        mass_kg, frequency_hz = values.T
+        where = (slice(None), variant.ends[0], variant.planes[0])
+        first = _mode(physical, where, mass_kg, frequency_hz)
+        physical = replace(
+            physical,
+            translational_compliance_m_n=physical.translational_compliance_m_n
+            + first.compliance_m_n,
+            support_mass_kg=physical.support_mass_kg + first.mass_kg,
+        )
+        if not variant.law:
+            return physical
+        faster = _FASTER[variant.law - 1]
+        further = _mode(physical, where, _HEAVIER * mass_kg, faster * frequency_hz)
+        return replace(physical, support_modes=(*physical.support_modes, further))
+
+
+def _mode(
+    physical: PhysicalHanger,
+    where: tuple[slice, int, int],
+    mass_kg: FloatArray,
+    frequency_hz: FloatArray,
+) -> SupportMode:
+    """A mode at one end in one plane; none where the mass is infinite."""
+    compliance, moving = np.zeros((2, *physical.support_mass_kg.shape))
+    compliance[where] = 1 / (mass_kg * (2 * np.pi * frequency_hz) ** 2)
+    moving[where] = np.where(np.isinf(mass_kg), 0.0, mass_kg)
+    return SupportMode(compliance, moving)

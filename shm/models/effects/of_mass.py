@@ -1,0 +1,149 @@
+"""Effects of mass that nobody described: all along, at one place, or that of the sensors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places, scales
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger, PointMass
+from shm.values import FloatArray, Hanger
+
+
+class DistributedMass(Effect):
+    """The bar has more mass per length than described: coating, grout, a pipe round it, ice."""
+
+    name = "distributed_mass"
+    title = "More mass along the hanger"
+    source = (
+        "Blevins (1979), Formulas for Natural Frequency and Mode Shape; ISO 12494:2001, "
+        "Atmospheric icing of structures."
+    )
+    seen_by = ("frequencies", "a known mass")
+    imitated_by = ("timebase", "bending_stiffness", "effective_length", "stiff_end_zones")
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "mass_change",
+            "fraction",
+            0.002,
+            0.3,
+            0.0,
+            "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
+            "are put on hangers, not taken off.",
+            spread="logarithmic",
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        mass = physical.mass_per_length_kg_m * (1 + values[:, 0])
+        return replace(physical, mass_per_length_kg_m=mass)
+
+
+GYRATION_M = 0.1
+
+
+class UnknownPointMass(Effect):
+    """Something heavy sits at one place: a clamp, a coupler, a lamp, a bracket left behind.
+
+    It lowers the modes that move there and leaves those with a node there alone. Frequencies of a
+    uniform hanger cannot tell its place from the mirrored one; shapes can.
+    """
+
+    name = "point_mass"
+    title = "A mass at one place"
+    source = "Chen (1963), On the vibration of beams or rods carrying a concentrated mass."
+    seen_by = ("frequencies of many orders", "shapes")
+    imitated_by = (
+        "translational_end_flexibility",
+        "intermediate_support",
+        "section_loss",
+        "sensor_mass",
+    )
+    other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        own_kg = scales.mass_kg(hanger)
+        size = Parameter(
+            "mass_kg",
+            "kg",
+            5e-5 * own_kg,
+            0.1 * own_kg,
+            0.0,
+            "0.005 to 10 % of the hanger's mass: from a cable tie to a coupler or a heavy clamp.",
+            spread="logarithmic",
+        )
+        return size, places.place_along(hanger)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        mass_kg, x_m = values.T
+        if not variant.law:
+            return replace(physical, masses=(*physical.masses, PointMass(x_m, mass_kg)))
+        halves = [PointMass(x_m + side * GYRATION_M, mass_kg / 2) for side in (-1, 1)]
+        return replace(physical, masses=(*physical.masses, *halves))
+
+
+class SensorMass(Effect):
+    """Sensors with their clamps and magnets are heavy: each adds the same mass where it sits."""
+
+    name = "sensor_mass"
+    title = "Heavy sensors"
+    source = (
+        "Ewins (2000), Modal Testing: Theory, Practice and Application; Maes, Peeters, Reynders, "
+        "Lombaert and De Roeck (2013), Identification of axial forces in beam members by local "
+        "vibration measurements."
+    )
+    seen_by = ("frequencies of many orders", "known places of the sensors")
+    imitated_by = ("point_mass", "section_loss")
+    of_the_hanger = False
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if survey.sensor_places_m:
+            return ""
+        return "It takes sensors with known places: give the mode shapes with their x_m."
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return (Variant("all sensors", places_m=survey.sensor_places_m),)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "mass_kg",
+            "kg",
+            0.01,
+            20.0,
+            0.0,
+            "10 g to 20 kg each: from a piezo on wax to a boxed seismometer on a clamp.",
+            spread="logarithmic",
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        mass_kg = values[:, 0]
+        added = tuple(
+            PointMass(np.full_like(mass_kg, place_m), mass_kg) for place_m in variant.places_m
+        )
+        return replace(physical, masses=physical.masses + added)

@@ -1,0 +1,194 @@
+"""Effects of the section: its stiffness, a stretch that has lost some, shear and rotary inertia."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places
+from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger, Zone
+from shm.values import NAN, FloatArray, Hanger
+
+
+class BendingStiffness(Effect):
+    """EI differs from the description, all along the hanger.
+
+    Wires of a strand slide (less), a tube or grout round the bar bends with it (more), or the
+    section is not the one of the drawing. In one plane only: a section that is not round, which a
+    hanger with a diameter has not.
+    """
+
+    name = "bending_stiffness"
+    title = "Another bending stiffness"
+    source = (
+        "Papailiou (1997), On the bending stiffness of transmission line conductors; Cardou and "
+        "Jolicoeur (1997), Mechanical models of helical strands."
+    )
+    seen_by = ("frequencies", "the other plane")
+    imitated_by = (
+        "distributed_mass",
+        "timebase",
+        "effective_length",
+        "stiff_end_zones",
+        "rotational_end_flexibility",
+    )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        round_section = math.isfinite(hanger.diameter_m)
+        return (Variant(),) if round_section else places.planes(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "stiffness_change",
+            "fraction",
+            0.005,
+            0.8,
+            0.0,
+            "0.5 to 80 %, either way: from a rolling tolerance to wires that slide freely or a "
+            "grouted tube.",
+            spread="logarithmic",
+            signed=True,
+            most=0.99,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        factor = np.ones_like(physical.bending_stiffness_n_m2)
+        factor[:, list(variant.planes)] += values[:, :1]
+        return replace(physical, bending_stiffness_n_m2=physical.bending_stiffness_n_m2 * factor)
+
+
+_STEEP = (0.8, 1.0, 1.2)
+"""Half as gradual: three steps stand for a slope that is a half wider than they span."""
+
+
+class SectionLoss(Effect):
+    """Corrosion, wear or a machined neck: over a stretch the bar has lost a share of its area.
+
+    Mass falls with the area, bending stiffness with its square, as in a thinner round bar.
+    """
+
+    name = "section_loss"
+    title = "Lost section over a stretch"
+    source = (
+        "Cawley and Adams (1979), The location of defects in structures from measurements of "
+        "natural frequencies."
+    )
+    seen_by = ("frequencies of many orders", "shapes")
+    imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
+    other_laws = (
+        "the loss begins and ends gradually, over three fifths of its extent at each end",
+        "pits reach into the section: the stiffness falls as the area, not as its square",
+        "the loss begins and ends gradually, over three tenths of its extent at each end",
+    )
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "loss",
+            "fraction",
+            0.005,
+            0.6,
+            0.0,
+            "0.5 to 60 % of the area: from surface rust to a bar about to break.",
+            spread="logarithmic",
+            most=0.99,
+        )
+        extent = Parameter(
+            "extent_m",
+            "m",
+            0.02 * hanger.length_m,
+            0.5 * hanger.length_m,
+            NAN,
+            "2 to 50 % of the length: from a splash zone or a notch at the socket to half the bar.",
+            spread="logarithmic",
+        )
+        return size, places.place_along(hanger), extent
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        loss, middle_m, extent_m = values.T
+        reaches = {1: GRADUAL, 3: _STEEP}.get(variant.law, (1.0,))
+        power = 1 if variant.law == 2 else 2
+        left = (1 - loss) ** (1 / len(reaches))
+        zones = tuple(
+            Zone(
+                start_m=middle_m - reach * extent_m / 2,
+                end_m=middle_m + reach * extent_m / 2,
+                stiffness_factor=left**power,
+                mass_factor=left,
+            )
+            for reach in reaches
+        )
+        return replace(physical, zones=physical.zones + zones)
+
+
+class ShearAndRotaryInertia(Effect):
+    """The bar is not slender: it shears, and its sections have inertia against turning.
+
+    Shear stiffness kappa G A with the coefficient of a round section, kappa = 6 (1 + nu) / (7 + 6
+    nu), and rotary inertia rho I. It lowers the high orders. A share of 1 is the theory.
+    """
+
+    name = "shear_and_rotary_inertia"
+    title = "Shear and rotary inertia"
+    source = (
+        "Timoshenko (1921), On the correction for shear of the differential equation for "
+        "transverse vibrations of prismatic bars; Cowper (1966), The shear coefficient in "
+        "Timoshenko's beam theory."
+    )
+    seen_by = ("frequencies of high orders",)
+    imitated_by = ("translational_end_flexibility", "stiff_end_zones", "point_mass")
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "share",
+            "of the theory",
+            0.5,
+            1.5,
+            0.0,
+            "Half to one and a half times the theory of a round bar: a tube or a flat bar has "
+            "another shear coefficient.",
+            least=0.0,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        density_kg_m3 = hanger.mass_per_length_kg_m / hanger.area_m2
+        inertia_kg_m = density_kg_m3 * hanger.second_moment_m4
+        share = values[:, 0]
+        return replace(
+            physical,
+            shear_compliance_1_n=physical.shear_compliance_1_n + share / _shear_stiffness_n(hanger),
+            rotary_inertia_kg_m=physical.rotary_inertia_kg_m + share * inertia_kg_m,
+        )
+
+
+def _shear_stiffness_n(hanger: Hanger) -> float:
+    """Kappa G A of a round section (Cowper 1966, table 1)."""
+    ratio = hanger.poissons_ratio
+    coefficient = 6 * (1 + ratio) / (7 + 6 * ratio)
+    return coefficient * hanger.elastic_modulus_pa / (2 * (1 + ratio)) * hanger.area_m2

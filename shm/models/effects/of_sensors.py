@@ -1,0 +1,189 @@
+"""Effects of how it was measured: a wrong clock, sensors and axes that point elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places, scales
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger
+from shm.values import NAN, FloatArray, Hanger
+
+
+class Timebase(Effect):
+    """The logger's clock is off, or the file states a wrong sampling rate.
+
+    Every reported frequency is the true one times 1 + error, in all tests or in one of them.
+    """
+
+    name = "timebase"
+    title = "A wrong clock"
+    source = "IEEE Std 1057-2017, Standard for Digitizing Waveform Recorders."
+    seen_by = ("frequencies", "several tests")
+    imitated_by = (
+        "distributed_mass",
+        "bending_stiffness",
+        "effective_length",
+        "stiff_end_zones",
+        "temperature_tension",
+    )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        one = tuple(Variant(f"test {test}", test=test) for test in survey.tests)
+        return (Variant("all tests"), *one) if len(one) > 1 else (Variant("all tests"),)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "clock_error",
+            "fraction",
+            1e-6,
+            0.05,
+            0.0,
+            "One millionth to 5 %, either way: from a quartz to a nominal rate that the logger "
+            "does not keep.",
+            spread="logarithmic",
+            signed=True,
+            most=0.99,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        if variant.test and variant.test != conditions.test:
+            return physical
+        return replace(physical, clock_factor=physical.clock_factor * (1 + values[:, 0]))
+
+
+_FEWEST_DECIMALS, _MOST_DECIMALS = 2, 9
+
+
+class SensorMisalignment(Effect):
+    """A sensor is turned about the hanger's axis, so that it sees a share of the other plane.
+
+    The angle counts from the transverse to the longitudinal plane. Frequencies do not change.
+    """
+
+    name = "sensor_misalignment"
+    title = "Turned sensors"
+    source = "McConnell (1995), Vibration Testing: Theory and Practice."
+    seen_by = ("shapes of biaxial sensors",)
+    imitated_by = ("skewed_principal_axes",)
+    of_the_hanger = False
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if survey.biaxial and survey.sensor_places_m:
+            return ""
+        return "It takes mode shapes of biaxial sensors: what each sees in the other plane."
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        places_m = survey.sensor_places_m
+        decimals = _decimals(places_m)
+        each = tuple(
+            Variant(f"sensor at {place_m:.{decimals}f} m", sensor=index)
+            for index, place_m in enumerate(places_m)
+        )
+        return (Variant("all sensors"), *each) if len(places_m) > 1 else each
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "angle_deg",
+            "deg",
+            0.05,
+            60.0,
+            0.0,
+            "0.05 to 60 degrees, either way: from the play of a clamp to a sensor put on by eye.",
+            spread="logarithmic",
+            signed=True,
+            most=90.0,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        turn = physical.sensor_turn_rad.copy()
+        turned = (
+            slice(None) if variant.sensor is None else slice(variant.sensor, variant.sensor + 1)
+        )
+        turn[:, turned] += np.radians(values[:, :1])
+        return replace(physical, sensor_turn_rad=turn)
+
+
+def _decimals(places_m: tuple[float, ...]) -> int:
+    """As many as tell the places apart, two at least."""
+    for decimals in range(_FEWEST_DECIMALS, _MOST_DECIMALS):
+        if len({f"{place_m:.{decimals}f}" for place_m in places_m}) == len(places_m):
+            return decimals
+    return _MOST_DECIMALS
+
+
+class SkewedPrincipalAxes(Effect):
+    """The end turns about one axis only, and that axis lies askew to the planes of the bridge.
+
+    A pin or a plate set at an angle: the bar bends freely in the plane at this angle from the
+    transverse one and is clamped across it, so that each mode moves in both planes.
+    """
+
+    name = "skewed_principal_axes"
+    title = "Joints askew to the planes"
+    source = (
+        "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; Perkins and "
+        "Mote (1986), Comments on curve veering in eigenvalue problems."
+    )
+    seen_by = ("shapes of biaxial sensors", "both planes")
+    imitated_by = ("rotational_end_flexibility", "sensor_misalignment")
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if not hanger.supports.ends("clamped"):
+            return "No end is clamped across any axis."
+        if survey.biaxial and survey.sensor_places_m:
+            return ""
+        return (
+            "It takes mode shapes of biaxial sensors: without what each sees in the other plane it "
+            "cannot be told from plain end flexibility."
+        )
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.at_ends(places.ends(), hanger.supports.ends("clamped"))
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        angle = Parameter(
+            "angle_deg",
+            "deg",
+            -90.0,
+            90.0,
+            NAN,
+            "A pin may be set at any angle; half a turn brings it back.",
+            least=-90.0,
+            most=90.0,
+        )
+        return scales.rotational_stiffness("log10_k", hanger), angle
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        angle = np.radians(values[:, 1])
+        axis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        own = 10.0 ** -values[:, 0, None, None] * axis[:, :, None] * axis[:, None, :]
+        compliance = physical.rotational_compliance_rad_n_m.copy()
+        compliance[:, list(variant.ends)] += own[:, None]
+        return replace(physical, rotational_compliance_rad_n_m=compliance)

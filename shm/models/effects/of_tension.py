@@ -1,0 +1,233 @@
+"""Effects by which tension or joints change with temperature, amplitude or sag."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.models.conditions import Conditions
+from shm.models.effects import places, scales
+from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.levels import missing_levels
+from shm.models.hanger.physical import PhysicalHanger
+from shm.values import FloatArray, Hanger
+
+_LEAST_RANGE_K = 1.0
+_STEEL_EXPANSION_1_K = 1.2e-5
+
+
+class TemperatureTension(Effect):
+    """Warmth changes the tension: the hanger expands otherwise than the bridge that holds it.
+
+    The tension of a test is that at the mean temperature of the tests plus so much for each kelvin.
+    """
+
+    name = "temperature_tension"
+    title = "Tension that follows the temperature"
+    source = (
+        "Xia, Chen, Weng, Ni and Xu (2012), Temperature effect on vibration properties of civil "
+        "structures: a literature review and case studies."
+    )
+    seen_by = ("tests at different temperatures",)
+    imitated_by = ("timebase", "geometric_hardening")
+    follows = ("temperature",)
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.supports.ends("free"):
+            return "An end is free, so that warmth stretches nothing."
+        if survey.temperatures_c and _range(survey.temperatures_c) >= _LEAST_RANGE_K:
+            return ""
+        return "It takes tests at two known temperatures at least 1 K apart."
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        restrained = hanger.elastic_modulus_pa * hanger.area_m2 * _STEEL_EXPANSION_1_K
+        size = Parameter(
+            "tension_per_kelvin_n_k",
+            "N/K",
+            1e-5 * restrained,
+            restrained,
+            0.0,
+            "Either way, up to E A times 1.2e-5 per kelvin, a steel bar that cannot expand at all; "
+            "a hanger whose bridge warms with it has a small share of that.",
+            spread="logarithmic",
+            signed=True,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        added_n = values[:, 0] * conditions.temperature_shift_k
+        return replace(physical, tension_n=physical.tension_n + added_n)
+
+
+def _range(temperatures_c: tuple[float, ...]) -> float:
+    return max(temperatures_c) - min(temperatures_c)
+
+
+_DYING = 1.5
+
+
+class GeometricHardening(Effect):
+    """Swinging widely stretches the hanger and raises its mean tension with the amplitude squared.
+
+    All frequencies rise with the level of the hit, the low orders most.
+    """
+
+    name = "geometric_hardening"
+    title = "Tension that rises with the amplitude"
+    source = (
+        "Woinowsky-Krieger (1950), The effect of an axial force on the vibration of hinged bars; "
+        "Nayfeh and Mook (1979), Nonlinear Oscillations."
+    )
+    seen_by = ("tests at different levels",)
+    imitated_by = ("temperature_tension", "timebase")
+    other_laws = ("the swing dies away the faster the wider it is: the power of the level is 1.5",)
+    follows = ("amplitude",)
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
+            return "It takes a tension between two ends that are held."
+        return missing_levels(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "hardening",
+            "fraction",
+            1e-6,
+            0.05,
+            0.0,
+            "One millionth to 5 % of the tension at the reference level: a hammer seldom moves a "
+            "hanger by more than a few millimetres.",
+            spread="logarithmic",
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        power = _DYING if variant.law else 2.0
+        factor = 1 + values[:, 0] * conditions.amplitude**power
+        return replace(physical, tension_n=physical.tension_n * factor)
+
+
+_LOSS_AT_REFERENCE_LEVEL = 0.1
+_SLIP = 0.5
+
+
+class JointSoftening(Effect):
+    """Friction in pins and bolts slips: the end spring falls with the amplitude, and damps.
+
+    The rotational stiffness of the joint is k over the level of the hit, in both planes alike; its
+    loss factor is 0.1 times the level. Frequencies fall with the level. Damping rises too,
+    which the diagnosis does not use.
+    """
+
+    name = "joint_softening"
+    title = "Joints that soften with the amplitude"
+    source = "Gaul and Nitsche (2001), The role of friction in mechanical joints."
+    seen_by = ("tests at different levels",)
+    imitated_by = ("rotational_end_flexibility", "skewed_principal_axes")
+    other_laws = ("the compliance grows with the square root of the level",)
+    follows = ("amplitude",)
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if not hanger.supports.ends("clamped"):
+            return "No end is clamped, by a joint that could soften."
+        return missing_levels(survey)
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.at_ends(places.ends(), hanger.supports.ends("clamped"))
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        return (scales.rotational_stiffness("log10_k_at_reference_level", hanger),)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        ends = list(variant.ends)
+        power = _SLIP if variant.law else 1.0
+        own = conditions.amplitude**power * 10.0 ** -values[:, 0]
+        compliance = physical.rotational_compliance_rad_n_m.copy()
+        compliance[:, ends] += own[:, None, None, None] * np.eye(2)
+        loss = physical.joint_loss_factor.copy()
+        loss[:, ends] += (_LOSS_AT_REFERENCE_LEVEL * conditions.amplitude - loss[:, ends]) * (
+            _share(own, compliance[:, ends])
+        )
+        return replace(physical, rotational_compliance_rad_n_m=compliance, joint_loss_factor=loss)
+
+
+def _share(own: FloatArray, compliance: FloatArray) -> FloatArray:
+    """The joint's part (n, ends) of the ends' compliance (n, ends, 2, 2), mean of both planes.
+
+    Springs in series share their strain energy as they share the compliance, so that the loss
+    factor of both is the mean weighted by it.
+    """
+    whole = np.trace(compliance, axis1=-2, axis2=-1)
+    part = np.broadcast_to(2 * own[:, None], whole.shape)
+    return np.asarray(np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0))
+
+
+class Sag(Effect):
+    """An inclined or slack hanger hangs in a curve, so that swinging stretches it.
+
+    Irvine's parameter lambda squared weighs the stretch against the tension. In the plane of the
+    sag it raises the odd orders, the first one most, and leaves the even ones alone.
+    """
+
+    name = "sag"
+    title = "Sag"
+    source = "Irvine and Caughey (1974), The linear theory of free vibrations of a suspended cable."
+    seen_by = ("frequency of the first order", "the other plane")
+    imitated_by = ("intermediate_support", "support_motion")
+    other_laws = ("it sags as its bending and its ends let it, not as a string",)
+
+    def invisible(self, hanger: Hanger, survey: Survey) -> str:
+        if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
+            return "It takes a tension between two ends that are held."
+        return ""
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return places.single_planes(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "sag_parameter",
+            "lambda^2",
+            0.001,
+            20.0,
+            0.0,
+            "0.001 to 20: from a taut, nearly upright bar to a slack stay well below the first "
+            "crossing at 4 pi^2.",
+            spread="logarithmic",
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        parameter = physical.sag_parameter.copy()
+        parameter[:, list(variant.planes)] += values[:, :1]
+        as_it_bends = physical.sags_as_it_bends or variant.law == 1
+        return replace(physical, sag_parameter=parameter, sags_as_it_bends=as_it_bends)
