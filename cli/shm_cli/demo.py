@@ -1,4 +1,7 @@
-"""`shm demo`: the whole job on a bridge of 20 hangers, one of which loses tension."""
+"""`shm demo`: the whole job on a bridge of 20 hangers, one of which loses tension.
+
+The bridge of the demo and its season of hammer tests.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +12,154 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import numpy as np
 import rich_click as click
 from rich.progress import Progress
 
 from shm import report
+from shm.documents import dump
 from shm.errors import ShmError, UsageError
+from shm.modes_document import load_modes, modes_document
 from shm.pipeline import utc_now
 from shm.pipeline.reporting import hanger_report
+from shm.read import write
+from shm.read.atomic import replace_text
+from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Store, StoredAlert, Workspace
-from shm_cli import season
+from shm.values import Hanger, Posterior
+from shm_cli import thesis
 from shm_cli.common import counting_bar
+
+HANGERS = 20
+MEASURED = 3
+LOSING = 7
+LOSS = 0.08
+
+_START = datetime(2026, 3, 2, 9, tzinfo=UTC)
+_PLAN = HammerPlan(seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
+_SEED = 2026
+_TENSION_SCATTER = 0.003
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """One hammer test to come: the hanger, when, its state then, how warm it is."""
+
+    hanger: Hanger
+    time: datetime
+    state: HangerState
+    temperature_c: float
+    seed: tuple[int, int, int]
+
+    @property
+    def file_name(self) -> str:
+        suffix = "uff" if self.hanger.id % 2 else "csv"
+        return f"hanger{self.hanger.id:02d}_{self.time:%Y%m%d}.{suffix}"
+
+
+def bridge_description() -> str:
+    """`bridge.toml` of an arch bridge whose third hanger is the thesis's."""
+    lines = [
+        '[bridge]\nname = "Arch bridge of the demo"',
+        '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
+        "[settings]\nsamples = 400\nworkers = 2\n"
+        "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
+    ]
+    for number in range(1, HANGERS + 1):
+        lines.append(
+            f"[[hanger]]\nid = {number}\ndiameter_m = 0.130\n"
+            f"length_m = {_length_m(number):.2f}\nelastic_modulus_pa = 200e9\n"
+            "density_kg_m3 = 7800\nnominal_tension_n = 711e3"
+        )
+    return "\n\n".join(lines) + "\n"
+
+
+def _length_m(number: int) -> float:
+    """Along a parabolic arch, scaled so that hanger 3 has the thesis's 12 m."""
+    heights = [4 * x * (1 - x) for x in (number / (HANGERS + 1), MEASURED / (HANGERS + 1))]
+    return 12.0 * heights[0] / heights[1]
+
+
+def drop_measured_baseline(workspace: Workspace) -> None:
+    """The thesis's measured frequencies of hanger 3, as a test before the season."""
+    (test,) = load_modes(thesis.PRINTINGS["table 1.1"])
+    test = replace(test, id="thesis_table_1_1", time=_START - timedelta(weeks=1))
+    replace_text(workspace.spool / "hanger03_measured.modes.json", dump(modes_document([test])))
+
+
+def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
+    """The season: hangers 3 and 7 every three weeks, the others at its start, every third again.
+
+    Hanger 3 is simulated at the most probable parameters of its measured baseline.
+    """
+    tests = []
+    for hanger in workspace.bridge.hangers:
+        measured = store.posterior(hanger.id) if hanger.id == MEASURED else None
+        for week in _weeks(hanger.id):
+            tests.append(_planned(hanger, week, measured))
+    return sorted(tests, key=lambda test: test.time)
+
+
+def _weeks(hanger_id: int) -> Sequence[int]:
+    if hanger_id in (MEASURED, LOSING):
+        return range(0, 13, 3)
+    return (0, 10) if hanger_id % 3 == 2 else (0,)
+
+
+def _planned(hanger: Hanger, week: int, measured: Posterior | None) -> PlannedTest:
+    rng = np.random.default_rng((_SEED, hanger.id))
+    state = _random_state(hanger, rng) if measured is None else _state_of(measured, hanger)
+    scatter = np.random.default_rng((_SEED, hanger.id, week)).normal(1, _TENSION_SCATTER)
+    lost = LOSS if hanger.id == LOSING and week >= 6 else 0.0
+    return PlannedTest(
+        hanger=hanger,
+        time=_START + timedelta(weeks=week, hours=hanger.id / 4),
+        state=replace(state, tension_n=state.tension_n * float(scatter) * (1 - lost)),
+        temperature_c=8.0 + 1.2 * week,
+        seed=(_SEED, hanger.id, week + 1),
+    )
+
+
+def _random_state(hanger: Hanger, rng: np.random.Generator) -> HangerState:
+    tension = hanger.nominal_tension_n * rng.uniform(0.85, 1.15)
+    k1, k2, k3, k4 = 10 ** rng.uniform(6.8, 8.0, 4)
+    return HangerState(tension, k1, k2, k3, k4, damping_ratio=0.0015)
+
+
+def _state_of(posterior: Posterior, hanger: Hanger) -> HangerState:
+    """The most probable parameters of a posterior; a class without springs is clamped."""
+    values = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    k1, k2, k3, k4 = (10 ** float(values.get(f"log10_k{end}", np.inf)) for end in (1, 2, 3, 4))
+    return HangerState(
+        float(values["theta_F"]) * hanger.nominal_tension_n,
+        k1,
+        k2,
+        k3,
+        k4,
+        damping_ratio=0.0015,
+        length_m=float(values["theta_L"]) * hanger.length_m,
+    )
+
+
+def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[PlannedTest]:
+    """Simulates each test and drops its file into the spool."""
+    for test in tests:
+        recording = hammer_test(
+            test.hanger,
+            test.state,
+            _PLAN,
+            np.random.default_rng(test.seed),
+            time=test.time,
+            temperature_c=test.temperature_c,
+            source=test.file_name,
+        )
+        write(recording, workspace.spool / test.file_name)
+        yield test
+
 
 _MARK = ".shm-demo"
 _DAEMON_LIMIT_S = 600.0
@@ -48,17 +187,17 @@ def command(folder: Path) -> None:
     workspace = _fresh_workspace(folder)
     click.echo(f"Workspace {workspace.folder}: 20 hangers, their daemon is starting.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon, counting_bar() as bar:
-        season.drop_measured_baseline(workspace)
+        drop_measured_baseline(workspace)
         _await(1, store, daemon, bar, "hanger 3, measured: model classes compared")
-        tests = season.planned(workspace, store)
-        for _ in bar.track(season.dropped(tests, workspace), len(tests), description=_DROPPING):
+        tests = planned(workspace, store)
+        for _ in bar.track(dropped(tests, workspace), len(tests), description=_DROPPING):
             pass
         _await(1 + len(tests), store, daemon, bar, "tests through all stages")
         alerts = _await_alert(store, daemon)
     _conclude(workspace, alerts)
 
 
-_DROPPING = f"a season of hammer tests into the spool; hanger {season.LOSING} loses 8 %"
+_DROPPING = f"a season of hammer tests into the spool; hanger {LOSING} loses 8 %"
 
 
 def _fresh_workspace(folder: Path) -> Workspace:
@@ -69,7 +208,7 @@ def _fresh_workspace(folder: Path) -> Workspace:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / _MARK).touch()
     description = folder / "described.toml"
-    description.write_text(season.bridge_description(), encoding="utf-8")
+    description.write_text(bridge_description(), encoding="utf-8")
     workspace = Workspace.initialise(folder, description)
     description.unlink()
     return workspace
@@ -127,11 +266,11 @@ def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
     """Says what was found and where the reports are; raises ShmError without the alert."""
     for stored in alerts:
         click.echo(f"ALERT {stored.alert.message}")
-    if season.LOSING not in {stored.alert.hanger for stored in alerts}:
-        raise ShmError(f"hanger {season.LOSING} lost 8 % and no alert was raised.")
+    if LOSING not in {stored.alert.hanger for stored in alerts}:
+        raise ShmError(f"hanger {LOSING} lost 8 % and no alert was raised.")
     click.echo(f"Delivered to the hook: {workspace.folder / 'alerts.jsonl'}")
     with workspace.store() as store:
-        for hanger_id in (season.MEASURED, season.LOSING):
+        for hanger_id in (MEASURED, LOSING):
             content = hanger_report(workspace, store, hanger_id, utc_now())
             path = workspace.folder / f"hanger{hanger_id}.html"
             path.write_text(report.html(content), encoding="utf-8")

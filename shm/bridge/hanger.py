@@ -1,6 +1,8 @@
 """A `[[hanger]]` table: section, ends, turnbuckles, admitted model classes, thresholds, gap.
 
 What an owner says of the ends: how they are held, and what hangs from a free one.
+
+What an owner says of the gap diagnosis: ranges of effects, and how exactly the bar was made.
 """
 
 from __future__ import annotations
@@ -10,14 +12,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast, get_args
 
-from shm.bridge.effects import effect_priors_of, scatter_of
 from shm.bridge.table import Table
 from shm.values import (
     NAN,
+    EffectPrior,
     EndPlate,
     Hanger,
     Kind,
     Limits,
+    Scatter,
     Support,
     Supports,
     Thresholds,
@@ -254,3 +257,59 @@ def _support_kind(table: Table, key: str, usual: Support) -> Support:
     raise table.refusal(
         f"{key} = {value!r} is no way to hold an end", f"Known: {', '.join(_KINDS)}."
     )
+
+
+_LARGEST_SCATTER = 0.5
+
+
+def scatter_of(table: Table | None) -> Scatter:
+    """The `[hanger.scatter]` table; raises BadInput naming the key at fault."""
+    if table is None:
+        return Scatter()
+    known = {field.name: getattr(Scatter(), field.name) for field in fields(Scatter)}
+    table.refuse_unknown(known)
+    return Scatter(
+        **{key: table.fraction(key, usual, 0.0, _LARGEST_SCATTER) for key, usual in known.items()}
+    )
+
+
+def effect_priors_of(table: Table | None) -> tuple[EffectPrior, ...]:
+    """The ranges of all `[hanger.effects.NAME]` tables, in the file's order.
+
+    Whether the catalogue knows the names is for `shm.models.effects.check_effect_priors` to say.
+    Raises BadInput where something is no range.
+    """
+    if table is None:
+        return ()
+    return tuple(
+        EffectPrior(effect, parameter, *_range(inner, parameter))
+        for effect in table.values
+        for inner in (_effect(table, effect),)
+        for parameter in inner.values
+    )
+
+
+def _effect(table: Table, effect: str) -> Table:
+    values = table.values[effect]
+    if not isinstance(values, dict):
+        raise table.refusal(
+            f"{effect} is not a table",
+            "Write [hanger.effects.NAME], NAME an effect of docs/effects.md, and below it the "
+            "ranges of its parameters.",
+        )
+    return Table(values, f"{table.label}.{effect}", table.path)
+
+
+def _range(table: Table, parameter: str) -> tuple[float, float]:
+    values = table.values[parameter]
+    remedy = f"Write {parameter} = [LOWER, UPPER], two finite numbers."
+    if not isinstance(values, list) or len(values) != 2 or not all(map(_is_number, values)):
+        raise table.refusal(f"{parameter} = {values!r} is not a range", remedy)
+    lower, upper = map(float, values)
+    if lower >= upper:
+        raise table.refusal(f"{parameter} = {values!r} does not rise", remedy)
+    return lower, upper
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -2,47 +2,53 @@
 
 Read in ASCII and binary (58b), written in ASCII. Places, planes and hanger stand in the sidecar;
 our own files also say them in id lines and nodes.
+
+Time histories of a UFF file and recordings, each made from the other.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from shm.errors import UsageError
-from shm.read import universal_frf, universal_time
+from shm.errors import BadInput, UsageError
+from shm.read import assemble, universal_frf, universal_marks
 from shm.read.atomic import replace_file
 from shm.read.base import Format, Peek, PeekChannel
-from shm.read.sidecar import write_sidecar
-from shm.read.units import SI
-from shm.read.universal_sets import Content, load, recognises, save
-from shm.values import NAN, FrequencyResponse, Recording
+from shm.read.header import Header
+from shm.read.sidecar import with_sidecar, write_sidecar
+from shm.read.units import SI, unit_of
+from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
+from shm.values import NAN, FloatArray, FrequencyResponse, Quantity, Recording
 
 
 def _read(path: Path) -> Recording | FrequencyResponse:
     content = load(path, headers_only=False)
     if _holds_responses(content):
         return universal_frf.frequency_response(content, path)
-    return universal_time.recording(content, path)
+    return recording(content, path)
 
 
 def _peek(path: Path) -> Peek:
     content = load(path, headers_only=True)
     if _holds_responses(content):
         return universal_frf.peek(content, FORMAT.name, path)
-    return universal_time.peek(content, FORMAT.name, path)
+    return peek(content, FORMAT.name, path)
 
 
 def _holds_responses(content: Content) -> bool:
     """Whether frequency responses are what the file is for: time histories go first if whole."""
-    measured = {universal_time.quantity(found) for found in universal_time.time_sets(content)}
+    measured = {quantity(found) for found in time_sets(content)}
     return bool(universal_frf.response_sets(content)) and len(measured) < 2
 
 
 def _write(described: Recording | FrequencyResponse, path: Path) -> None:
     if isinstance(described, Recording):
-        sets = universal_time.sets_of(described)
+        sets = sets_of(described)
         channels = [
             PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m, NAN, c.full_scale)
             for c in described.channels
@@ -74,3 +80,135 @@ FORMAT = Format(
     needs_sidecar=True,
     may_be_gzipped=True,
 )
+
+
+_QUANTITIES: dict[int, Quantity] = {9: "force", 12: "acceleration", 13: "force"}
+_CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
+_TIME, _EVEN, _DOUBLE = 17, 1, 4
+
+
+def time_sets(content: Content) -> list[FunctionSet]:
+    """The sets that hold a force or an acceleration over time."""
+    histories = [found for found in content.functions if found.function == TIME_RESPONSE]
+    return [found for found in histories if quantity(found) is not None]
+
+
+def quantity(found: FunctionSet) -> Quantity | None:
+    """What a set measures, by its unit or else by its type; None for anything else."""
+    unit = unit_of(found.unit)
+    return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
+
+
+def recording(content: Content, path: Path) -> Recording:
+    sets = time_sets(content)
+    if not sets:
+        assemble.refuse_quantities([], path)
+    _refuse_different(sets, path)
+    values = np.array([universal_marks.sign(found.response[2]) * _real(found) for found in sets])
+    header = _header(sets, content, path)
+    return assemble.recording(header, values, path, _rate(sets))
+
+
+def peek(content: Content, file_format: str, path: Path) -> Peek:
+    sets = time_sets(content)
+    left_out = [found for found in content.functions if found not in sets]
+    named = [f"{found.title} ({found.label or 'of another kind'})" for found in left_out]
+    samples = sets[0].points if sets else 0
+    header = _header(sets, content, path)
+    return assemble.peeked(header, file_format, samples, lambda: _rate(sets), path, left_out=named)
+
+
+def sets_of(recording: Recording) -> list[dict[str, Any]]:
+    """The data sets of a recording for pyuff."""
+    places = [channel.x_m for channel in recording.channels]
+    nodes = universal_marks.number_nodes(places)
+    rate = recording.sampling_rate_hz
+    sets = universal_marks.node_set(places, nodes)
+    for channel, node in zip(recording.channels, nodes, strict=True):
+        lines = universal_marks.id_lines(recording, channel.name, {"sampling_rate_hz": rate})
+        sets.append(
+            {
+                **lines,
+                "type": 58,
+                "func_type": TIME_RESPONSE,
+                "rsp_ent_name": channel.name[:10],
+                "rsp_node": node,
+                "rsp_dir": universal_marks.direction(channel.plane),
+                "ref_node": 0,
+                "ref_dir": 0,
+                "ord_data_type": _DOUBLE,
+                "abscissa_spacing": _EVEN,
+                "abscissa_spec_data_type": _TIME,
+                "abscissa_axis_lab": "Time",
+                "abscissa_axis_units_lab": "s",
+                "ordinate_spec_data_type": _CODES[channel.quantity],
+                "ordinate_axis_lab": channel.quantity.title(),
+                "ordinate_axis_units_lab": SI[channel.quantity],
+                "orddenom_spec_data_type": 0,
+                "x": np.arange(len(channel.values)) / rate,
+                "data": channel.values.copy(),
+            }
+        )
+    return sets
+
+
+def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header:
+    if not sets:
+        return with_sidecar(Header(path, {}), path)
+    channels = {
+        name: universal_marks.channel_entries(found, *found.response[1:], content, path)
+        for name, found in zip(_names(sets, path), sets, strict=True)
+    }
+    return with_sidecar(Header(path, channels, universal_marks.entries(sets[0], path)), path)
+
+
+def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
+    """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
+    own = [found.lines[0] for found in sets if universal_marks.facts(found)]
+    if len(own) == len(sets):
+        _refuse_doubles(own, sets, path)
+        return own
+    _refuse_doubles([_sensor(found) for found in sets if found.response[1] != 0], sets, path)
+    forces, accelerations = count(2), count(1)
+    names = []
+    for found in sets:
+        if quantity(found) == "acceleration":
+            names.append(f"acc_{next(accelerations)}")
+        else:
+            names.append(f"force_{next(forces)}" if "force" in names else "force")
+    return names
+
+
+def _sensor(found: FunctionSet) -> tuple[object, ...]:
+    """What tells one sensor from another; loggers give one node to several accelerometers."""
+    title = "" if quantity(found) == "force" else found.lines[0]
+    return quantity(found), *found.response[1:], title
+
+
+def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
+    if len(set(keys)) < len(keys):
+        raise BadInput(
+            f"{len(sets)} time histories, several of one sensor.",
+            file=path,
+            remedy="Put each recording, with one or many hits, into a file of its own.",
+        )
+
+
+def _refuse_different(sets: Sequence[FunctionSet], path: Path) -> None:
+    first = sets[0]
+    for found in sets[1:]:
+        if (found.points, found.step) != (first.points, first.step):
+            raise BadInput(
+                f"{found.title} has {found.points} samples every {found.step:g} s, {first.title}"
+                f" {first.points} every {first.step:g} s.",
+                file=path,
+                remedy="Export all channels of one recording with one length and rate.",
+            )
+
+
+def _real(found: FunctionSet) -> FloatArray:
+    return np.real(np.asarray(found.data)).astype(float)
+
+
+def _rate(sets: Sequence[FunctionSet]) -> float:
+    return 1 / sets[0].step if sets and sets[0].step > 0 else NAN

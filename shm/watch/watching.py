@@ -1,17 +1,40 @@
-"""The watch of one hanger as a whole: tests read, put through the sequential test, decided on."""
+"""The watch of one hanger as a whole: tests read, put through the sequential test, decided on.
+
+When an owner is told: from what the watch says after each test to at most one alert a test.
+
+Two rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
+change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
+level which the owner asked for. A condition that stands is told once. It ends when its probability
+falls below half that level, and only then can it be told again, so that a probability which hovers
+about the level does not ring every week. A change that was called and then passes the threshold is
+told again, since the owner must now do something else.
+
+All is derived from the sequence of tests, so that the same tests give the same alerts.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from shm.values import Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.deciding import after, new_alert
+from shm.values import (
+    Alert,
+    AlertKind,
+    Change,
+    Drift,
+    Hanger,
+    ModalTest,
+    Posterior,
+    Reading,
+    WatchedTest,
+)
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
-from shm.watch.told import Told
+from shm.watch.told import Told, Way
+from shm.watch.wording import message_of, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -109,3 +132,169 @@ def _options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> W
     own = hanger.thresholds.false_call_years
     limit_years = options.limit_years if own is None else own
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
+
+
+_ENDS_BELOW = 0.5
+_LONGEST_TEST = 80
+_DIGITS = 12
+_BEYOND: AlertKind = "beyond threshold"
+
+
+@dataclass(frozen=True)
+class _News:
+    """What a test adds: shifts that are beyond their threshold by now, and whether it is a call."""
+
+    beyond: tuple[Drift, ...]
+    call: bool
+
+
+def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
+    """The alert that the newest of the tests of a hanger calls for, beyond those told before.
+
+    `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
+    rules, quantity, way and test: the same whenever it is asked for.
+    """
+    told, alert = Told(), None
+    for test in watched:
+        told, alert = after(told, test, hanger)
+    return alert
+
+
+def after(told: Told, test: WatchedTest, hanger: Hanger) -> tuple[Told, Alert | None]:
+    """What stands after one more test, and the alert that it calls for, if any."""
+    level = hanger.thresholds.alert_probability
+    standing = _still(told, test, level)
+    news = _news(standing, test, level)
+    beyond = {(drift.quantity, _way(drift.shift_mean)): test.time for drift in news.beyond}
+    call = test.time if news.call else standing.call
+    called = (*standing.called, test.change) if test.change.called else standing.called
+    change = test.change if news.call else _explaining(news.beyond, called, test.change)
+    is_further = news.call and bool(standing.called)
+    stands = Told({**standing.beyond, **beyond}, call, called)
+    return stands, _alert(news, change, test, hanger, is_further=is_further)
+
+
+def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
+    """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
+    told, alerts = Told(), []
+    for test in watched:
+        told, alert = after(told, test, hanger)
+        alerts += [alert] if alert else []
+    return tuple(alerts)
+
+
+def _still(told: Told, test: WatchedTest, level: float) -> Told:
+    """What still stands at a test: unknown probabilities end nothing."""
+    ended = {
+        (drift.quantity, way)
+        for drift in test.drifts
+        for way in ("up", "down")
+        if _probability(drift, way) < _ENDS_BELOW * level
+    }
+    beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
+    if test.change.probability < _ENDS_BELOW * level:
+        return Told(beyond)
+    return replace(told, beyond=beyond)
+
+
+def _probability(drift: Drift, way: Way) -> float:
+    """That the shift is beyond its threshold in one way; nearly none is where it went the other."""
+    return drift.probability * (_way(drift.shift_mean) == way)
+
+
+def _news(standing: Told, test: WatchedTest, level: float) -> _News:
+    beyond = tuple(
+        drift
+        for drift in test.drifts
+        if drift.probability >= level
+        and (drift.quantity, _way(drift.shift_mean)) not in standing.beyond
+    )
+    return _News(beyond, test.change.called and not _is_known(standing, test.change))
+
+
+def _is_known(standing: Told, change: Change) -> bool:
+    """Whether a called change began before an alert that stands, and so is what that one told."""
+    told = [] if standing.call is None else [standing.call]
+    named = _suspects(change)
+    told += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
+    return any(change.began_by <= at for at in told)
+
+
+def _suspects(change: Change) -> tuple[str, ...]:
+    """What may have changed: the likeliest quantity, those with it, then those like it."""
+    return tuple(each.quantity for each in suspects(change))
+
+
+def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) -> Change | None:
+    """The last called change of the same way as a shift; None where none is known to explain it."""
+    if not called:
+        return now if now.probability > 0.5 else None
+    shifts = {(drift.quantity, _way(drift.shift_mean)) for drift in beyond}
+    for change in reversed(called):
+        suspects = {
+            (moved.quantity, _way(moved.shift_mean))
+            for moved in change.moved
+            if moved.quantity in _suspects(change)
+        }
+        if shifts & suspects:
+            chances = now.probability, now.outlier_probability
+            return replace(change, probability=chances[0], outlier_probability=chances[1])
+    return None
+
+
+def _alert(
+    news: _News, change: Change | None, test: WatchedTest, hanger: Hanger, *, is_further: bool
+) -> Alert | None:
+    kinds: tuple[AlertKind, ...] = ((_BEYOND,) if news.beyond else ()) + (
+        (_kind(test.change),) if news.call else ()
+    )
+    if not kinds:
+        return None
+    return Alert(
+        key=_key(kinds, news, test, hanger),
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message_of(
+            test, hanger, change, news.beyond, is_call=news.call, is_further=is_further
+        ),
+        drifts=news.beyond or _suspected(test),
+        kinds=kinds,
+        change=change,
+    )
+
+
+def _kind(change: Change) -> AlertKind:
+    return "sudden change" if change.sudden >= 0.5 else "slow drift"
+
+
+def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
+    """The shifts of what may have changed."""
+    by_name = {drift.quantity: drift for drift in test.drifts}
+    return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
+
+
+def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Hanger) -> str:
+    rules = "+".join(kind.replace(" ", "-") for kind in kinds)
+    return f"hanger-{hanger.id}:{rules}:{_first_moved(news, test)}:{_short(test.test)}"
+
+
+def _first_moved(news: _News, test: WatchedTest) -> str:
+    """The quantity that is told first, and its way."""
+    if news.beyond:
+        return f"{news.beyond[0].quantity}-{_way(news.beyond[0].shift_mean)}"
+    if test.change.moved:
+        first = test.change.moved[0]
+        return f"{first.quantity}-{_way(first.shift_mean)}"
+    return "unknown"
+
+
+def _way(shift: float) -> Way:
+    return "down" if shift < 0 else "up"
+
+
+def _short(name: str) -> str:
+    """A test's name as far as a key has room for it; names that begin alike stay apart."""
+    if len(name) <= _LONGEST_TEST:
+        return name
+    return f"{name[:_LONGEST_TEST]}-{hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]}"

@@ -19,8 +19,8 @@ from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view
 from shm_daemon.web.address import Address
-from shm_daemon.web.bridge_drawing import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.bridge_view import HangerGlance
+from shm_daemon.web.pages.bridge import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served

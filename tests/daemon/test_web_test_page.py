@@ -23,10 +23,10 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm_daemon.web.test_address import name_in
-from shm_daemon.web.test_address import test_json as document_of
-from shm_daemon.web.test_address import test_page as page_of
-from shm_daemon.web.test_figures.registry import FIGURES, FROM_RECORDS
+from shm_daemon.web.address_of_test import name_in
+from shm_daemon.web.address_of_test import test_json as document_of
+from shm_daemon.web.address_of_test import test_page as page_of
+from shm_daemon.web.figures_of_test.registry import FIGURES, FROM_RECORDS
 from shm_daemon.web.working_out import Workshop
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served

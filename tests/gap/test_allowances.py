@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shm.gap import GapOptions, diagnose
-from shm.gap.allowances import allowances, exactly
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
+from shm.gap.laws import allowances, exactly
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS

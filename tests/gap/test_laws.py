@@ -8,10 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.allowances import EXACT
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import ByLaws, by_its_laws
+from shm.gap.laws import EXACT, ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem

@@ -9,8 +9,7 @@ import pytest
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.fit import fitted
-from shm.gap.foresight import Errors, Foresight, divergence, foreseen
-from shm.gap.next_measurement import NO_GAP, ranked
+from shm.gap.next_measurement import NO_GAP, Errors, Foresight, divergence, foreseen, ranked
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.proposals import like_the_present, measured_already, proposals, with_sensors

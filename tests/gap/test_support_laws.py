@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.gap.allowances import EXACT
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import ByLaws, by_its_laws
+from shm.gap.laws import EXACT, ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS

@@ -22,7 +22,7 @@ from nptdms import ChannelObject, TdmsWriter
 from shm.errors import BadInput
 from shm.read import peek, read
 from shm.read.limits import Limits, limited
-from shm.read.matlab_elements import elements_of
+from shm.read.matlab_file import elements_of
 
 SERIES = np.random.default_rng(8).standard_normal(200)
 HUGE = 400_000_000  # values: 3 GB

@@ -10,8 +10,8 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
-from shm.watch.deciding import after, alerts_of, new_alert
 from shm.watch.told import Told
+from shm.watch.watching import after, alerts_of, new_alert
 from shm.watch.wording import shift_words
 from tests.helpers.hangers import HANGER_3
 

@@ -20,7 +20,7 @@ from shm.watch import (
     watch_hanger,
     watch_newest,
 )
-from shm.watch.deciding import alerts_of
+from shm.watch.watching import alerts_of
 from tests.helpers.hangers import HANGER_3
 
 BEGIN = datetime(2026, 1, 5, tzinfo=UTC)

@@ -18,9 +18,9 @@ from shm.store.archive import refuse_oversize
 from shm_daemon.landing import Incoming, Landed, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import UPLOADS
+from shm_daemon.web.address_of_test import test_page
 from shm_daemon.web.faults import Refused, answers
 from shm_daemon.web.models import Recordings, RecordingStatus, Uploaded
-from shm_daemon.web.test_address import test_page
 
 _PIECE_BYTES = 1 << 20
 _SILENCE_S = 60.0

@@ -1,4 +1,10 @@
-"""Every question put to the cases: all of them, by richness, by way, by effect."""
+"""Every question put to the cases: all of them, by richness, by way, by effect.
+
+The scores of a trial, in the order in which they are told, and the marks among them.
+
+Marks are what was promised before the trial was run: bounds on the scores of large effects, of
+cases without effect, and at some or all richnesses of data. All else is told without a bound.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +15,34 @@ from typing import get_args
 
 import numpy as np
 
-from shm.blind.scoring.asked import BY_EFFECT, LARGE, QUESTIONS
-from shm.blind.scoring.estimates import Estimate, difference
-from shm.blind.scoring.questions import Bounds, Question
+from shm.blind.scoring import calibration
+from shm.blind.scoring.cases import SURE
+from shm.blind.scoring.estimates import (
+    Estimate,
+    difference,
+    median,
+    ratio_of_medians,
+    share,
+    weighed_mean,
+)
+from shm.blind.scoring.questions import (
+    Bounds,
+    Question,
+    after_percent,
+    at_least,
+    at_most,
+    before_percent,
+    every,
+    everything,
+    figures,
+    held_out,
+    known,
+    leading,
+    log_score,
+    mixed,
+    of_kind,
+    planted,
+)
 from shm.values import CaseScore, Mark, Richness, Score
 
 FEWEST = 10
@@ -91,3 +122,128 @@ def _by_effect(
         score = _estimate(question, own, rng).score
         found.append(replace(_mark(question, score, Bounds()), effect=effect))
     return found
+
+
+LARGE = 4.0
+"""Sizes above this are what a diagnosis is held to."""
+VERY_LARGE = 8.0
+
+_ONE, _TWO, _UNKNOWN = of_kind("one"), of_kind("two"), of_kind("unknown")
+_RIGHT = figures(lambda case: case.right)
+_MISLED = figures(lambda case: bool(case.failure) or case.misattributed)
+_LEADING = figures(leading, lambda case: case.right)
+
+_NAMED = (
+    Question(
+        "detected", planted, figures(lambda case: case.detected), share,
+        overall=at_least(0.95), better=1, above=LARGE,
+    ),
+    Question(
+        "false alarms", of_kind("none"), figures(lambda case: not case.right), share,
+        overall=at_most(0.03), each=every(at_most(0.03)), better=-1,
+    ),
+    Question(
+        "named first", _ONE, figures(lambda case: case.first), share,
+        each={
+            "two planes": at_least(0.78), "shapes": at_least(0.93), "everything": at_least(0.95)
+        },
+        better=1, above=LARGE,
+    ),
+    Question(
+        "among the first two", _ONE, figures(lambda case: case.first_two), share, above=LARGE
+    ),
+    Question(
+        "in its group", _ONE, figures(lambda case: case.in_group), share,
+        overall=at_least(0.97), each=every(at_least(0.97)), better=1, above=LARGE,
+    ),
+    Question(
+        "two effects told", _TWO, figures(lambda case: bool(case.pair_told)), share,
+        each={"everything": at_least(0.7)}, better=1, above=LARGE,
+    ),
+    Question(
+        "right where sure", lambda case: leading(case) > SURE, _RIGHT, share, above=LARGE
+    ),
+)  # fmt: skip
+
+_UNKNOWN_CAUSE = (
+    Question("unknown called unexplained", _UNKNOWN, _RIGHT, share, above=LARGE),
+    Question("unknown misattributed", _UNKNOWN, _MISLED, share, above=LARGE),
+    Question(
+        "left out misattributed", known, _MISLED, share,
+        overall=at_most(0.05), better=-1, above=LARGE, round="left out",
+    ),
+    Question(
+        "left out called unexplained", known, _RIGHT, share,
+        each={"everything": at_least(0.8)}, better=1, above=LARGE, round="left out",
+    ),
+)  # fmt: skip
+
+_MISCALIBRATED = 0.06
+
+_CALIBRATED = (
+    Question(
+        "calibration error", everything, _LEADING, calibration.corrected,
+        overall=at_most(_MISCALIBRATED), each=every(at_most(_MISCALIBRATED)), better=-1,
+    ),
+    Question("calibration error as counted", everything, _LEADING, calibration.counted),
+    Question("calibration error by chance", everything, _LEADING, calibration.by_chance),
+    Question(
+        "calibration missed if perfect", everything, _LEADING,
+        calibration.missed_if_perfect(_MISCALIBRATED),
+    ),
+    Question(
+        "calibration error above size four", everything, _LEADING, calibration.corrected,
+        above=LARGE,
+    ),
+    Question(
+        "log score", everything, mixed(log_score), weighed_mean,
+        each={"two planes": at_most(1.34), "shapes": at_most(1.35), "everything": at_most(1.10)},
+        above=LARGE,
+    ),
+    Question("Brier score", everything, mixed(lambda case: case.brier), weighed_mean, above=LARGE),
+)  # fmt: skip
+
+_SHRUNK = (
+    Question(
+        "tension error of sound hangers, %", of_kind("none"), figures(after_percent), median
+    ),
+    Question("tension error before, %", known, figures(before_percent), median, above=LARGE),
+    Question("tension error after, %", known, figures(after_percent), median, above=LARGE),
+    Question(
+        "tension error after over before", known, figures(after_percent, before_percent),
+        ratio_of_medians, overall=at_most(0.2), better=-1, above=LARGE,
+    ),
+    Question(
+        "tension covered", everything, figures(lambda case: bool(case.tension_covered)), share,
+        overall=Bounds(0.90, 0.98), better=1,
+    ),
+    Question(
+        "size covered", lambda case: case.covered is not None,
+        figures(lambda case: bool(case.covered)), share, above=LARGE,
+    ),
+    Question(
+        "held-out misfit after over before",
+        lambda case: known(case) and math.isfinite(held_out(case)), figures(held_out), median,
+        overall=at_most(0.5), better=-1, above=VERY_LARGE,
+    ),
+    Question(
+        "held-out misfit worse",
+        lambda case: planted(case) and math.isfinite(held_out(case)),
+        figures(lambda case: held_out(case) > 1), share,
+        overall=at_most(0.05), better=-1, above=VERY_LARGE,
+    ),
+    Question("failed", everything, figures(lambda case: bool(case.failure)), share),
+)  # fmt: skip
+
+
+def any_size(question: Question) -> Question:
+    """The same of every planted size, down to what nobody could see; nothing is promised of it."""
+    return replace(question, overall=Bounds(), each={}, better=0, above=0.0)
+
+
+_PROMISED = (*_NAMED, *_UNKNOWN_CAUSE, *_CALIBRATED, *_SHRUNK)
+QUESTIONS: tuple[Question, ...] = (
+    *_PROMISED,
+    *(any_size(question) for question in _PROMISED if question.above),
+)
+BY_EFFECT = ("named first", "among the first two", "in its group")

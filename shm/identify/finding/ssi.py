@@ -10,17 +10,28 @@ Subspace identification with the hammer's force as input, Hankel matrices summed
 Where the free decay is what follows the pulse, this one looks at each hit from before the hammer
 strikes. What the measured force explains is projected out of the future responses, so a second
 blow, or a force that does not end, does no harm; the pulse needs no end.
+
+Modes from Hankel matrices, one a hit, whose sum has the modes of all hits in its column space.
+
+State-space models of rising order are cut from the sum. Leaving out a hit need not cost a new
+decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
+one, spans the same columns but for terms of second order.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
-from shm.identify.finding.state_space import block_rows, modes_of_hankel, references
-from shm.identify.finding.subspace import hankel, hankel_with_input
+from shm.identify.finding.poles import PoleSet, poles_of
+from shm.identify.finding.stabilise import final_orders, nothing_moves, stabilised
+from shm.identify.finding.subspace import hankel, hankel_with_input, realise
 from shm.identify.options import IdentifyOptions
+from shm.values import FloatArray
 
 _NOBODY_HIT = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
@@ -55,3 +66,99 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
         for driven in measurement.driven
     ]
     return modes_of_hankel(matrices, rows, measurement, options)
+
+
+_ROWS = 240
+_BLOCK_ROWS = (60, 120)
+_BLOCK_ROWS_ALONE = 320
+"""A single channel tells close modes apart by time alone: it needs more lags."""
+_MOST_ROWS = 640
+_REFERENCES = 4
+_MAX_ORDER = 120
+_COARSE_FROM = 60
+_LEAST_ORDER = 2
+_RANK_TOLERANCE = 1e-17
+"""Singular values below this share of the first are zero but for rounding."""
+
+
+@dataclass(frozen=True)
+class _Size:
+    """Size of the models, and the model orders that are looked at."""
+
+    block_rows: int
+    max_order: int
+    sampling_rate_hz: float
+
+    @property
+    def orders(self) -> list[int]:
+        step = 2 if self.max_order < _COARSE_FROM else 4
+        return list(range(self.max_order, 0, -step))[::-1]
+
+
+def references(responses: Sequence[FloatArray]) -> FloatArray:
+    """Rows (references, channels) that mix the channels into the few that carry most energy."""
+    channels = len(responses[0])
+    if channels <= _REFERENCES:
+        return np.eye(channels)
+    covariance = np.sum([response @ response.T for response in responses], axis=0)
+    _, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors[:, -_REFERENCES:].T)
+
+
+def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
+    """How many time lags the Hankel matrices hold."""
+    shortest = min(decay.shape[1] for decay in measurement.decays)
+    channels = len(measurement.points)
+    shared = min(int(np.clip(_ROWS // channels, *_BLOCK_ROWS)), _MOST_ROWS // channels)
+    wanted = _BLOCK_ROWS_ALONE if channels == 1 else shared
+    return int(min(options.block_rows or wanted, shortest // 3))
+
+
+def modes_of_hankel(
+    matrices: Sequence[FloatArray], rows: int, measurement: Measurement, options: IdentifyOptions
+) -> Finding:
+    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows."""
+    total = np.sum(matrices, axis=0)
+    max_order = _max_order(total, rows, options)
+    if max_order < _LEAST_ORDER:
+        return nothing_moves(len(matrices))
+    size = _Size(rows, max_order, measurement.sampling_rate_hz)
+    observability, sets = _models(total, size, size.orders)
+    without_each = _models_without_each_hit(matrices, _right_basis(total, observability), size)
+    seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
+    return stabilised(sets, without_each, seconds, options)
+
+
+def _max_order(matrix: FloatArray, rows: int, options: IdentifyOptions) -> int:
+    """The highest even order that the matrix has the size and the numerical rank for."""
+    values = np.linalg.svd(matrix, compute_uv=False)
+    rank = int(np.sum(values > _RANK_TOLERANCE * values[0]))
+    shifted_rows = matrix.shape[0] // rows * (rows - 1)
+    largest = min(options.max_order or _MAX_ORDER, rank, shifted_rows // 2, matrix.shape[1])
+    return int(largest // 2 * 2)
+
+
+def _models(
+    matrix: FloatArray, size: _Size, orders: Sequence[int]
+) -> tuple[FloatArray, list[PoleSet]]:
+    """Observability matrix, and the poles of each of `orders`."""
+    observability, states, outputs = realise(matrix, size.block_rows, size.max_order)
+    rate = size.sampling_rate_hz
+    return observability, [poles_of(states[n // 2], outputs[n // 2], rate) for n in orders]
+
+
+def _right_basis(matrix: FloatArray, observability: FloatArray) -> FloatArray:
+    """Leading right singular vectors, (columns, order); the observability matrix is U sqrt(S)."""
+    values = np.sum(observability**2, axis=0)
+    return np.asarray(matrix.T @ observability / values**1.5)
+
+
+def _models_without_each_hit(
+    matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
+) -> list[list[PoleSet]]:
+    if len(matrices) < 2:
+        return []
+    projected = [matrix @ basis for matrix in matrices]
+    total = np.sum(projected, axis=0)
+    orders = final_orders(size.orders)
+    return [_models(total - part, size, orders)[1] for part in projected]

@@ -1,4 +1,4 @@
-"""Effects of the ends: springs that turn or give way, lengths, stiff zones, a support that swings."""
+"""Effects of the ends: springs, lengths, stiff zones, a support that swings."""
 
 from __future__ import annotations
 

@@ -11,9 +11,9 @@ from shm.report.figures.style import PLANE_COLOURS
 from shm.report.sheet.figures.damping import FIGURE as PRINTED
 from shm.report.sheet.spectra import shown_range
 from shm.values import PLANES, Mode, Plane
-from shm_daemon.web.test_figures.contract import Shown, TestFigure
-from shm_daemon.web.test_figures.marks import SYMBOLS
-from shm_daemon.web.test_figures.panels import Panel, drawn, log_axis, numbers, stacked
+from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
+from shm_daemon.web.figures_of_test.marks import SYMBOLS
+from shm_daemon.web.figures_of_test.panels import Panel, drawn, log_axis, numbers, stacked
 
 _LEAST_SPAN = 30.0
 """Of the axis of intervals: equal ones shall look equal."""

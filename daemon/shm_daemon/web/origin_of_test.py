@@ -7,7 +7,7 @@ from datetime import datetime
 from shm.report import words
 from shm.report.table import Table
 from shm.store import FormerTest, Lineage, Step
-from shm_daemon.web.test_view import TestView
+from shm_daemon.web.view_of_test import TestView
 
 _AT_ONCE_S = 0.05
 

@@ -20,8 +20,8 @@ from shm.report.sheet.spectra import searched_range
 from shm.report.sheet.thinning import envelope_places
 from shm.values import FloatArray
 from shm_daemon.web import plotting
-from shm_daemon.web.test_figures.contract import Shown, TestFigure
-from shm_daemon.web.test_figures.panels import Panel, apart, drawn, escaped, log_axis, numbers
+from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
+from shm_daemon.web.figures_of_test.panels import Panel, apart, drawn, escaped, log_axis, numbers
 
 _COLOURS = ("blue", "orange", "green", "purple")
 _DASHES = ("solid", "dash", "dot")

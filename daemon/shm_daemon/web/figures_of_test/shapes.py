@@ -20,9 +20,9 @@ from shm.report.sheet.shapes import (
 )
 from shm.values import PLANES, Mode
 from shm_daemon.web import plotting
-from shm_daemon.web.test_figures.contract import Shown, TestFigure
-from shm_daemon.web.test_figures.marks import SYMBOLS
-from shm_daemon.web.test_figures.panels import axis, drawn, named_axis, numbers
+from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
+from shm_daemon.web.figures_of_test.marks import SYMBOLS
+from shm_daemon.web.figures_of_test.panels import axis, drawn, named_axis, numbers
 
 _MOST_COLUMNS = 4
 _ROW_PX, _REST_PX = 118, 90

@@ -22,8 +22,8 @@ from shm.report.sheet.timeline import (
 )
 from shm.values import FloatArray
 from shm_daemon.web import plotting
-from shm_daemon.web.test_figures.contract import Shown, TestFigure
-from shm_daemon.web.test_figures.panels import Panel, axis, drawn, escaped, numbers, stacked
+from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
+from shm_daemon.web.figures_of_test.panels import Panel, axis, drawn, escaped, numbers, stacked
 
 _MOST_CHANNELS = 4
 _MOST_NUMBERS = 40

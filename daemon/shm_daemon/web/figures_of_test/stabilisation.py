@@ -11,9 +11,9 @@ from shm.report.sheet.spectra import Spectrum, shown_range
 from shm.report.sheet.thinning import envelope_places
 from shm.values import BoolArray
 from shm_daemon.web import plotting
-from shm_daemon.web.test_figures.contract import Shown, TestFigure
-from shm_daemon.web.test_figures.marks import marks, marks_axis, with_headroom
-from shm_daemon.web.test_figures.panels import Panel, drawn, numbers, stacked
+from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
+from shm_daemon.web.figures_of_test.marks import marks, marks_axis, with_headroom
+from shm_daemon.web.figures_of_test.panels import Panel, drawn, numbers, stacked
 
 _BINS = 550
 _LEAST_SPAN = 2.0

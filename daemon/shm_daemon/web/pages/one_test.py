@@ -19,13 +19,13 @@ from shm.report.verdicts import overall
 from shm.values import ResponsePoint, Verdict
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
+from shm_daemon.web.address_of_test import test_json, test_page
+from shm_daemon.web.figures_of_test.contract import TestFigure
+from shm_daemon.web.figures_of_test.response import point_name
 from shm_daemon.web.frame import page
-from shm_daemon.web.test_address import test_json, test_page
-from shm_daemon.web.test_figures.contract import TestFigure
-from shm_daemon.web.test_figures.response import point_name
-from shm_daemon.web.test_origin import origin, steps, superseded
-from shm_daemon.web.test_view import AT_WORK, TestView
+from shm_daemon.web.origin_of_test import origin, steps, superseded
 from shm_daemon.web.tests import RETRY_AFTER, View
+from shm_daemon.web.view_of_test import AT_WORK, TestView
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]

@@ -10,7 +10,7 @@ from shm.report.figures.style import PLANE_COLOURS
 from shm.report.sheet.figures.marks import HEADROOM
 from shm.values import PLANES
 from shm_daemon.web import plotting
-from shm_daemon.web.test_figures.panels import escaped, numbers
+from shm_daemon.web.figures_of_test.panels import escaped, numbers
 
 SYMBOLS = {"transverse": "circle", "longitudinal": "square"}
 _ROWS = {"transverse": 0.94, "longitudinal": 0.84}
