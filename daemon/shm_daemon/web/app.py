@@ -22,7 +22,7 @@ from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import alerts as alerts_page
-from shm_daemon.web.pages import bridge, hanger, health, static, upload
+from shm_daemon.web.pages import bridge, hanger, health, one_test, static, upload
 from shm_daemon.web.site import Site
 from shm_daemon.web.working_out import Workshop
 
