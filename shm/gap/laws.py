@@ -6,7 +6,7 @@ unknown would take the blame. So the data may err about a prediction in two ways
 multiple, about 1 in size, of what each other law of the effect would change; and by a fraction of
 what the effect does beyond what the baseline can follow, the same in all tests of a mode: of what
 it does to that very mode or, where a law shifts its action from mode to mode, to the modes of a
-test and plane on the whole. The fraction is unknown (`shm.gap.allowances`).
+test and plane on the whole. The fraction is unknown.
 
 How far the laws of a hypothesis' effects may be off, and how likely that is.
 """

@@ -138,7 +138,7 @@ def _components(index: int, mode: Mode) -> list[_Component]:
 
 
 def _as_turned(shape: list[_Component], least: float) -> list[_Component]:
-    """A shape of two-axis sensors whose direction may be uncertain (see `shm.gap.turns`)."""
+    """A shape of two-axis sensors whose direction may be uncertain."""
     pairs = list(zip(shape[::2], shape[1::2], strict=False))
     if len(shape) % 2 or any(one.x_m != other.x_m for one, other in pairs):
         return shape
