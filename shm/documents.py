@@ -103,6 +103,9 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "misfit_percent": posterior.misfit_percent,
         "log_occam": posterior.log_occam,
         "tension_of_other_ends_n": posterior.tension_of_other_ends_n,
+        "tension_of_other_orders_n": posterior.tension_of_other_orders_n,
+        "description_off_sd": posterior.description_off_sd,
+        "reading_off_sd": posterior.reading_off_sd,
         "caveats": list(posterior.caveats),
     }
 

@@ -56,9 +56,9 @@ def calibrated(
         progress(f"{label} (calibrating)", fraction)
 
     posterior = select(tests, models, options, tell).selected
-    if posterior.caveats:
+    if posterior.faults:
         raise BadInput(
-            f"the tension read does not fit the frequencies. {posterior.caveats[0]}",
+            f"the tension read does not fit the frequencies. {posterior.faults[0]}",
             file=path,
             remedy="Check the reading (in N), the orders and the description.",
         )

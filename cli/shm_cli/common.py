@@ -255,8 +255,6 @@ def tests_and_hanger(
             hanger_id = tests[0].hanger
         hanger = one_hanger(ctx, hanger_file, hanger_id)
         _say_if_another(tests[0], hanger)
-        for test in tests:
-            tell_doubt(test, hanger)
         return tests, hanger
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
@@ -268,11 +266,18 @@ def tests_and_hanger(
     return (stored[-1].test,), hanger
 
 
-def tell_doubt(test: ModalTest, hanger: Hanger) -> None:
-    """Says on stderr, before any result, that a test is probably not of the described hanger."""
-    doubt = doubt_of(test, Known(hanger), [])
-    if doubt is not None:
-        click.echo(f"Doubtful: test {test.id}. {doubt.text}", err=True)
+def told_doubts(
+    tests: Sequence[ModalTest], hanger: Hanger, *, apart: bool = True
+) -> tuple[str, ...]:
+    """Says, before any result, which tests are probably not of the described hanger.
+
+    On stderr, or with the answer where they do not stand `apart` from it.
+    """
+    doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
+    said = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
+    for each in said:
+        click.echo(each if apart else paragraph(each), err=apart)
+    return said
 
 
 def _say_if_another(test: ModalTest, hanger: Hanger) -> None:

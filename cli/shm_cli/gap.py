@@ -36,6 +36,7 @@ from shm_cli.common import (
     seed_option,
     show,
     tests_and_hanger,
+    told_doubts,
 )
 from shm_cli.update import modes_argument
 from shm_cli.writable import NewFile
@@ -130,6 +131,7 @@ def diagnose(
         sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
     else:
         tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+        told_doubts(tests, hanger)
         sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
     if html is not None or figures is not None:
         with drawing():

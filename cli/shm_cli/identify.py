@@ -28,7 +28,7 @@ from shm_cli.common import (
     one_hanger,
     readable_width,
     show,
-    tell_doubt,
+    told_doubts,
 )
 from shm_cli.writable import NewFile
 
@@ -211,7 +211,7 @@ def _identified(
             remedy="Give the description of its hanger, or correct the file.",
         )
     if hanger is not None:
-        tell_doubt(found.test, hanger)
+        told_doubts([found.test], hanger)
     return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 

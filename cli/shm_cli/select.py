@@ -30,6 +30,7 @@ from shm_cli.common import (
     show_table,
     table,
     tests_and_hanger,
+    told_doubts,
     update_options,
 )
 from shm_cli.update import modes_argument, show_stated, tell_irregular, tell_poor_fit
@@ -81,6 +82,7 @@ def command(
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
+    doubts = told_doubts(tests, hanger, apart=as_json)
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         options = calibrated(options, calibrated_by, hanger, chosen, progress)
@@ -88,7 +90,7 @@ def command(
     tell_poor_fit(selection.selected)
     if as_json:
         document = selection_document(selection, hanger.limits)
-        show({**document, "not_applicable": not_applicable})
+        show({**document, "not_applicable": not_applicable, "doubts": doubts})
         return
     show_selection(selection, hanger.limits)
     for name, reason in not_applicable.items():

@@ -31,6 +31,7 @@ from shm_cli.common import (
     show_table,
     table,
     tests_and_hanger,
+    told_doubts,
     update_options,
 )
 
@@ -87,6 +88,7 @@ def command(
     """
     options = update_options(samples, seed, repeat, method, priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    doubts = told_doubts(tests, hanger, apart=as_json)
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
@@ -94,7 +96,7 @@ def command(
         posterior = update(tests, chosen, options, progress)
     tell_poor_fit(posterior)
     if as_json:
-        show(posterior_document(posterior))
+        show({**posterior_document(posterior), "doubts": doubts})
         return
     show_posterior(posterior, hanger.limits)
 

@@ -25,6 +25,7 @@ from shm.errors import UsageError
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import Progress, UpdateOptions, silent
 from shm.inference.outcome import posterior_of
+from shm.inference.priors import reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, carried, search
 from shm.inference.updating import update
@@ -69,6 +70,8 @@ def refresh(
     """
     options = options or UpdateOptions()
     _refuse_stranger(model, known)
+    if reading_of(tests) is not None:  # rare, and to be held against what frequencies alone say
+        return update(tests, model, options, progress)
     problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)

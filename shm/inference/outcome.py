@@ -1,14 +1,10 @@
-"""What a sampler found, made into the posterior that others see.
-
-From a place of the sampler's space to the best fit near it, for a bar as made.
-"""
+"""What a sampler found, made into the posterior that others see."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -18,6 +14,13 @@ from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Weighted
 from shm.inference.mixture import Normal
 from shm.inference.options import UpdateOptions
+from shm.inference.other_answers import (
+    Outcome,
+    climbed,
+    description_off_sd,
+    tension_of_other_ends_n,
+    tension_of_other_orders_n,
+)
 from shm.inference.problem import Problem
 from shm.inference.tmcmc import Mover
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
@@ -29,34 +32,6 @@ _DIFFERENCE = 1e-6
 _EDGE, _MANY = 0.02, 5.0
 """A parameter is at its bound where the outermost 2 % of its range hold five times the draws that
 a posterior as flat as the prior puts there."""
-
-
-_ALIKE = 10.0 ** np.append(np.arange(-1.0, 1.6, 0.25), (2.0, 3.0))
-"""k L/EI of ends that are all alike, from nearly pins to nearly clamped."""
-
-_AS_WELL = 1.0
-"""A fit that is worse by less in its log likelihood is as good. The 90 % interval of a normal
-posterior reaches to 1.35: as good a fit beyond it is not its tail but another answer, which the
-prior of the ends has ruled out, not the data."""
-
-_MATERIAL = 0.1
-"""Of the width of the interval, what lies farther beyond it is another answer."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """Equal draws with sigma, `samples` (n, d + 1), what they predict (n, measurements), evidence.
-
-    `method` is the way they were sampled.
-    """
-
-    samples: FloatArray
-    predicted: FloatArray
-    log_evidence: float
-    log_evidence_sd: float
-    effective_sample_size: float
-    r_hat: float
-    method: str
 
 
 def posterior_of(
@@ -121,7 +96,9 @@ def assembled(
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
         misfit_percent=_misfit_percent(problem, outcome.predicted),
-        tension_of_other_ends_n=_tension_of_other_ends_n(problem, outcome),
+        tension_of_other_ends_n=tension_of_other_ends_n(problem, outcome),
+        tension_of_other_orders_n=tension_of_other_orders_n(problem, outcome, tests),
+        description_off_sd=description_off_sd(problem, outcome),
         log_occam=log_occam,
     )
 
@@ -201,38 +178,6 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
     return tuple(n for n, share in zip(names, outermost, strict=True) if share > _MANY * _EDGE)
 
 
-def _tension_of_other_ends_n(problem: Problem, outcome: Outcome) -> float:
-    """The tension with ends all alike that fit as well as any, farthest beyond the interval.
-
-    NaN where there is none. Frequencies tell springs from tension worst where all ends turn softly
-    and alike, which are few among all pairs of ends.
-    """
-    coordinates, likelihood = problem.coordinates, problem.likelihood
-    if not isinstance(coordinates, DescribedCoordinates) or not coordinates.felt_springs:
-        return math.nan
-    theta, sigma = outcome.samples[:, :-1], outcome.samples[:, -1]
-    places = coordinates.places(theta)
-    _, seen = coordinates.smooth(places)
-    fit = likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
-    best = int(fit.argmax())
-    climbs, squares = [], []
-    for alike in _ALIKE:
-        springs = coordinates.springs_alike(alike)
-        climb, square = climbed(problem, coordinates, places[best], sigma[best], springs)
-        climbs.append(climb)
-        squares.append(square)
-    others = np.array(climbs)
-    fit_of_others = likelihood.marginal(problem.run(others)) - 0.5 * np.array(squares)
-    as_well = fit_of_others > max(fit[best], fit_of_others.max()) - _AS_WELL
-    nominal_n = problem.model.hanger.nominal_tension_n
-    low, high = np.quantile(theta[:, 0] * nominal_n, [0.05, 0.95])
-    tension_n = others[as_well, 0] * nominal_n
-    away = np.maximum(low - tension_n, tension_n - high)
-    if not (away > _MATERIAL * (high - low)).any():
-        return math.nan
-    return float(tension_n[away.argmax()])
-
-
 def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
     """Root mean square of mean predictions over measured frequencies less 1, in per cent."""
     count = getattr(problem.likelihood, "frequencies", predicted.shape[1])
@@ -288,52 +233,3 @@ def _predicted(problem: Problem, predicted: FloatArray) -> tuple[PredictedFreque
         )
         for mode, samples in zip(likelihood.modes, likelihood.by_mode(predicted).T, strict=True)
     )
-
-
-_MOST_ROUNDS = 30
-
-
-def climbed(
-    problem: Problem,
-    coordinates: DescribedCoordinates,
-    place: FloatArray,
-    sigma: float,
-    fixed: Mapping[str, float] | None = None,
-) -> tuple[FloatArray, float]:
-    """The parameters (parameters,) that fit best near `place` (d,), and the square of the deviates
-    of the bar that they ask for.
-
-    Flat priors say nothing and normal ones add the squares of the deviates seen, so that the climb
-    is a bounded least-squares fit with errors of `sigma` beyond those that are known. `fixed` holds
-    parameters of the box where they are given.
-    """
-    shares, seen = (row[0] for row in coordinates.smooth(place[None]))
-    box, held = coordinates.box, dict(fixed or {})
-    for name, value in held.items():
-        column = box.names.index(name)
-        shares[column] = (value - box.lower[column]) / (box.upper[column] - box.lower[column])
-    whole = np.append(shares.clip(0, 1), seen)
-    count = len(shares)
-    free = np.array([name not in held for name in box.names] + [True] * len(seen))
-    noise = np.hypot(sigma, problem.likelihood.fit_error)
-
-    def scaled(points: FloatArray) -> FloatArray:
-        full = np.repeat(whole[None], len(points), axis=0)
-        full[:, free] = points
-        theta = coordinates.of_smooth(full[:, :count], full[:, count:])
-        return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, full[:, count:]])
-
-    def one(point: FloatArray) -> FloatArray:
-        return np.asarray(scaled(point[None])[0])
-
-    def slopes(point: FloatArray) -> FloatArray:
-        steps = np.where(point < 0.5, _DIFFERENCE, -_DIFFERENCE)
-        found = scaled(np.vstack([point, point + np.diag(steps)]))
-        return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
-
-    lower = np.append(np.zeros(count), np.full(len(seen), -np.inf))[free]
-    upper = np.append(np.ones(count), np.full(len(seen), np.inf))[free]
-    fit = least_squares(one, whole[free], slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS)
-    whole[free] = fit.x
-    theta = coordinates.of_smooth(whole[None, :count], whole[None, count:])[0]
-    return np.asarray(theta), float((whole[count:] ** 2).sum())

@@ -58,7 +58,7 @@ class Problem:
         calibration: Calibration | None = None,
     ):
         self.model = model
-        self.likelihood = likelihood
+        self.likelihood, self.calibration = likelihood, calibration
         self.evaluations = 0
         self._settled = False
         middle = (1 + likelihood.highest_order) / 2

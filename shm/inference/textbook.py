@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.inference.importance import Weighted
-from shm.inference.outcome import Outcome
+from shm.inference.other_answers import Outcome
 from shm.inference.problem import Points, Problem
 from shm.inference.tmcmc import normalised
 from shm.values import BoolArray, FloatArray, IntArray

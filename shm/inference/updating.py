@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,19 +12,22 @@ from shm.errors import UsageError
 from shm.inference.hint import Hint, hinted
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
+from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
+from shm.inference.priors import reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import RESTRAINT
-from shm.values import ENOUGH_EFFECTIVE, ModalTest, Posterior, Selection
+from shm.values import ENOUGH_EFFECTIVE, NAN, ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]
 
 _SAMPLES_A_PARTICLE = 5
 _FEWEST_PARTICLES = 200
+_DRAWS_WITHOUT_READING = 1000  # for the quartiles
 _ENOUGH = 0.5
 _AGAIN = (3, 9)
 """Times as many particles in a second and a third attempt, where the draws were too few."""
@@ -62,7 +66,22 @@ def update(
         return assembled(problem, outcome, tests, options, started)
     weighted = infer(problem, options.samples, rng, progress, hint)
     progress(model.name, 1.0)
-    return posterior_of(problem, weighted, tests, options, rng, started)
+    found = posterior_of(problem, weighted, tests, options, rng, started)
+    return replace(found, reading_off_sd=_off_the_reading(tests, model, options, rng))
+
+
+def _off_the_reading(
+    tests: Sequence[ModalTest], model: Model, options: UpdateOptions, rng: np.random.Generator
+) -> float:
+    """How far a tension that was read is off what the frequencies alone say; NaN without one."""
+    reading = reading_of(tests)
+    if reading is None or model.priors == THESIS:
+        return NAN
+    unread = [replace(each, tension_read_n=NAN, tension_read_sd_n=NAN) for each in tests]
+    problem = Problem.of(unread, model, 1, silent, options.calibration)
+    drawn = infer(problem, _DRAWS_WITHOUT_READING, rng).resampled(_DRAWS_WITHOUT_READING, rng)
+    theta = problem.coordinates.finished(drawn.z, rng)
+    return reading_off_sd(np.log(theta[:, 0]), reading, model.hanger.nominal_tension_n)
 
 
 def infer(

@@ -37,8 +37,8 @@ def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
 
 
 def is_teacher(posterior: Posterior) -> bool:
-    """Whether the bar as made is among its parameters, and nothing is said against it."""
-    return posterior.priors == DESCRIPTION and SECTION in posterior.names and not posterior.caveats
+    """Whether the bar as made is among its parameters, and nothing is wrong with it."""
+    return posterior.priors == DESCRIPTION and SECTION in posterior.names and not posterior.faults
 
 
 def of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:

@@ -134,7 +134,15 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
 def _since_described(document: Mapping[str, Any]) -> dict[str, Any]:
     """What documents of before there were priors of a description lack: these were the thesis's."""
-    numbers = ("repeatability_sd_n", "misfit_percent", "log_occam", "tension_of_other_ends_n")
+    numbers = (
+        "repeatability_sd_n",
+        "misfit_percent",
+        "log_occam",
+        "tension_of_other_ends_n",
+        "tension_of_other_orders_n",
+        "description_off_sd",
+        "reading_off_sd",
+    )
     return {
         "priors": document.get("priors", "thesis"),
         "at_bounds": tuple(document.get("at_bounds", ())),

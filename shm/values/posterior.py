@@ -19,7 +19,19 @@ ENOUGH_EFFECTIVE = 200
 MOST_MISFIT_PERCENT = 1.0
 """Beyond it, predictions are off by more than tolerances of manufacture move any frequency."""
 
-_ENDS_DECIDE = "The ends decide"
+NO_TENSION_PERCENT = 10.0
+"""Beyond it no bar of such a description has these modes, whatever holds its ends."""
+
+CONTRADICTS_FROM_SD = 3.0
+"""Of sound hangers one in some hundred comes so far off."""
+
+_ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
+_SAID_ONCE = (
+    _ENDS_DECIDE,
+    _ORDERS_DECIDE,
+    "The description does not fit",
+    "The tension that was read contradicts the frequencies",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +87,10 @@ class Posterior:
     is the root mean square of predicted over measured frequencies less 1; `log_occam` the log
     evidence less the largest log likelihood, never above 0 where the sampler did its work.
     `tension_of_other_ends_n` is the tension with ends of another kind, far off, where the data do
-    not speak against these; NaN where there is none.
+    not speak against these; NaN where there is none. `tension_of_other_orders_n` is the same of
+    modes that are all numbered one higher or one lower, nearer to the nominal tension.
+    `description_off_sd` is by how many of its standard deviations the description would be off,
+    `reading_off_sd` by how many a tension that was read is off what the frequencies say.
     """
 
     model: str
@@ -101,10 +116,18 @@ class Posterior:
     misfit_percent: float = NAN
     log_occam: float = NAN
     tension_of_other_ends_n: float = NAN
+    tension_of_other_orders_n: float = NAN
+    description_off_sd: float = NAN
+    reading_off_sd: float = NAN
 
     @property
     def caveats(self) -> tuple[str, ...]:
         """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
+        return (*self.faults, *self._other_ends)
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What says that something is wrong, not only that the data leave more open."""
         found = []
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
@@ -120,20 +143,46 @@ class Posterior:
         cut_off = [name for name in self.at_bounds if not name.startswith("log10_k")]
         if cut_off:
             names = ", ".join(cut_off)
-            found.append(f"At the bound of its prior: {names}. The interval is cut off there.")
+            found.append(
+                f"At the bound of its prior: {names}. The interval is cut off there. Check the "
+                "description, its units and the orders of the modes."
+            )
         if self.misfit_percent > MOST_MISFIT_PERCENT:
             found.append(
                 f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
                 "(root mean square): the description or the model class does not fit this hanger."
+                + (" Do not use this tension." if self.misfit_percent > NO_TENSION_PERCENT else "")
             )
-        if math.isfinite(self.tension_of_other_ends_n):
-            other = force_unit(self.tension_of_other_ends_n)
+        if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
-                f"{_ENDS_DECIDE}: ends of another stiffness fit about as well, with a tension of "
-                f"{other.of(self.tension_of_other_ends_n):.3g} {other.name}. A test with a known "
-                "mass, or a mode shape, tells which."
+                "The tension that was read contradicts the frequencies, by "
+                f"{self.reading_off_sd:.0f} standard deviations: this answer lies between the two. "
+                "Check the reading, its unit, and the description."
+            )
+        if self.description_off_sd > CONTRADICTS_FROM_SD:
+            found.append(
+                "The description does not fit: its section, density, modulus and length would be "
+                f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
+                "diameter, length and material."
+            )
+        if math.isfinite(self.tension_of_other_orders_n):
+            found.append(
+                f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
+                f"tension of {_told(self.tension_of_other_orders_n)}, nearer to the nominal one. "
+                "Find the first mode of each plane."
             )
         return tuple(found)
+
+    @property
+    def _other_ends(self) -> tuple[str, ...]:
+        other_n = self.tension_of_other_ends_n
+        if not math.isfinite(other_n):
+            return ()
+        way = "down" if other_n < float(np.median(self.tension_n)) else "up"
+        return (
+            f"{_ENDS_DECIDE}: with ends of another stiffness all {way} to {_told(other_n)} fits as "
+            "well. A test with a known mass, or a mode shape, tells which.",
+        )
 
     def parameter(self, name: str) -> FloatArray:
         """Samples of one parameter, shape (samples,)."""
@@ -200,7 +249,14 @@ class Selection:
 
 
 def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
-    """Each once, in order; of the ends every class says the same with a tension of its own."""
-    found = dict.fromkeys(caveats)
-    of_ends = [each for each in found if each.startswith(_ENDS_DECIDE)]
-    return tuple(each for each in found if each not in of_ends[1:])
+    """Each once, in order; of these every class says the same with a number of its own."""
+    found: dict[str, str] = {}
+    for each in caveats:
+        head = each.partition(":")[0].partition(", by ")[0]
+        found.setdefault(head if head in _SAID_ONCE else each, each)
+    return tuple(found.values())
+
+
+def _told(tension_n: float) -> str:
+    unit = force_unit(tension_n)
+    return f"{unit.of(tension_n):.3g} {unit.name}"

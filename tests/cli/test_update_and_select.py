@@ -227,10 +227,14 @@ def test_modes_that_no_such_hanger_can_have_are_doubted_before_any_result(
     shorter.write_text(hanger_file.read_text().replace("length_m = 12.0", "length_m = 9.0"))
     ended = shm("update", modes_file, "--hanger-file", shorter, "--model", "beam1", *QUICK)
     assert ended.code == 0
-    assert ended.err.startswith("Doubtful: test t9. No tension and no ends of hanger 3")
-    assert "right hanger, right description?" in ended.err
+    assert ended.out.startswith("Doubtful: test t9. No tension and no ends of hanger 3")
+    assert "right hanger, right description?" in " ".join(ended.out.split())
+    (doubt,) = shm(
+        "update", modes_file, "--hanger-file", shorter, "--model", "beam1", *QUICK, "--json"
+    ).document["doubts"]
+    assert doubt.startswith("Doubtful: test t9.")
     own = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
-    assert "Doubtful" not in own.err
+    assert "Doubtful" not in own.out + own.err
 
 
 def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:

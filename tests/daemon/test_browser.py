@@ -147,7 +147,7 @@ def test_an_uploaded_file_becomes_a_test(signed_in: Browser, site: Site, tmp_pat
     page = signed_in.open(f"{site.url}/upload")
     page.get_by_label("Recordings of hammer tests").set_input_files(path)
     card = page.locator("#list li")
-    expect(card).to_contain_text("Done.")
+    expect(card).to_contain_text("Done.", timeout=60_000)
     card.get_by_role("link", name="Test sent by hand").click()
     expect(page.get_by_role("heading", level=1)).to_contain_text("sent by hand")
 

@@ -1,0 +1,70 @@
+"""What a posterior alone does not show: other orders, a wrong reading, a wrong description."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shm
+from shm.inference import UpdateOptions, update
+from shm.models import THESIS, build
+from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
+
+STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0, "nominal_tension_n": 180e3}
+BAR = shm.round_bar(3, diameter_m=0.05, length_m=9.0, **STEEL)
+TENSION_N = 171e3
+OPTIONS = UpdateOptions(samples=1000)
+
+
+def a_test(orders: range, hanger: Hanger = BAR, **about: float) -> ModalTest:
+    """Exact modes of both planes at `TENSION_N`, ends of k L/EI = 30."""
+    model = build("beam3", hanger, THESIS)
+    spring = np.log10(30 * hanger.bending_stiffness_n_m2 / hanger.length_m)
+    truth = {"theta_F": TENSION_N / hanger.nominal_tension_n, "theta_L": 1.0}
+    theta = np.array([[truth.get(name, spring) for name in model.parameter_names]])
+    found = model.frequencies_hz(theta, max(orders))[0]
+    modes = tuple(
+        Mode(plane, order, float(row[order - 1]), frequency_sd_hz=1e-4 * float(row[order - 1]))
+        for plane, row in zip(PLANES, found, strict=True)
+        for order in orders
+    )
+    return ModalTest("t", modes, hanger=3, **about)
+
+
+def numbered_lower(test: ModalTest) -> ModalTest:
+    return replace(test, modes=tuple(replace(m, order=m.order - 1) for m in test.modes))
+
+
+def posterior(test: ModalTest, hanger: Hanger = BAR) -> Posterior:
+    return update([test], build("beam3", hanger), OPTIONS)
+
+
+def test_higher_modes_that_are_numbered_one_too_low_are_told() -> None:
+    found = posterior(numbered_lower(a_test(range(4, 7))))
+    assert found.tension_of_other_orders_n == pytest.approx(TENSION_N, rel=0.1)
+    assert any(each.startswith("The orders decide") for each in found.faults)
+
+
+@pytest.mark.parametrize("orders", [range(1, 6), range(4, 7)])
+def test_right_orders_are_left_alone(orders: range) -> None:
+    found = posterior(a_test(orders))
+    assert np.isnan(found.tension_of_other_orders_n)
+    assert found.description_off_sd < 3
+    assert found.faults == ()
+
+
+@pytest.mark.parametrize(("read", "says"), [(1.0, False), (1.3, True), (0.8, True)])
+def test_a_reading_is_held_against_the_frequencies(read: float, says: bool) -> None:
+    test = a_test(range(1, 6), tension_read_n=read * TENSION_N, tension_read_sd_n=0.01 * TENSION_N)
+    found = posterior(test)
+    assert (found.reading_off_sd > 3) is says
+    assert any("contradicts the frequencies" in each for each in found.faults) is says
+
+
+def test_a_length_that_is_wrong_by_more_than_the_tape_is_told() -> None:
+    longer = shm.round_bar(3, diameter_m=0.05, length_m=0.96 * 9.0, **STEEL)
+    found = posterior(a_test(range(1, 8)), longer)
+    assert found.description_off_sd > 3
+    assert any(each.startswith("The description does not fit") for each in found.faults)
