@@ -14,15 +14,17 @@ def notice_of(
     """The message of one held test; `others` are shifts of tension that other held tests imply.
 
     Where its modes themselves are not in doubt, what they imply leads: a wrong clock must not hide
-    a loss.
+    a loss. Nor must the likeness to another hanger: there it is said of the case that it is wrong.
     """
     loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others)
+    if_own = "" if loss or any(doubt.check == "copy" for doubt in doubts) else _if_own(candidate)
     states = "; ".join(doubt.state for doubt in doubts)
     end = "" if states.endswith("?") else "."
     held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}{end}"
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
     why = " ".join(doubt.why for doubt in doubts)
-    return f"{lead} {_what_to_do(doubts, recording_id)} {why} Until then it counts in nothing."
+    to_do = _what_to_do(doubts, recording_id)
+    return f"{lead} {to_do} {why} {if_own}Until then it counts in nothing."
 
 
 def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
@@ -35,6 +37,19 @@ def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
 
 def _is_of_others(doubt: Doubt) -> bool:
     return doubt.check.startswith(("copy", "right"))
+
+
+def _if_own(candidate: Candidate) -> str:
+    """What the modes would mean if they are the hanger's own after all."""
+    hanger = candidate.hanger
+    shift = implied_shift(candidate.test, candidate.reference, hanger)
+    if not abs(shift) >= hanger.thresholds.tension_shift_fraction:
+        return ""
+    moved = "lost" if shift < 0 else "gained"
+    return (
+        f"If it is right as it was sent, hanger {hanger.id} has {moved} {100 * abs(shift):.0f} % "
+        "of its tension: repeat the test today. "
+    )
 
 
 def _loss(candidate: Candidate, others: Sequence[float]) -> str:

@@ -50,6 +50,10 @@ DOUBTED = {
 }
 
 
+SHIFTED = ("clock before the baseline", "right time base")
+"""Where the modes are those of another tension, if they are the hanger's own."""
+
+
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_a_check_has_no_doubt_of_a_plain_test_nor_where_nothing_is_known(check: Check) -> None:
     assert check(PLAIN) is None
@@ -73,6 +77,7 @@ def test_a_doubt_says_what_is_the_matter_what_to_do_and_why(check: str) -> None:
     message = notice_of(candidate, doubts, 12, [])
     for part in (doubt.state, doubt.action, doubt.why, "--confirm 12", "--discard 12"):
         assert part in message
+    assert ("repeat the test today" in message.lower()) is (check in SHIFTED)
     assert len(re.split(r"[.?] ", message, maxsplit=1)[0].split()) <= 25
 
 
