@@ -137,7 +137,11 @@ def _by_documents(connection: Connection) -> Iterator[MissingRow]:
         ("watches", ("test_id", "baseline_id", "superseded_at"), _said_of),
         ("alerts", ("key",), _told_to),
     ):
-        yield from told(connection, _documents(connection, name, columns))
+        try:
+            yield from told(connection, _documents(connection, name, columns))
+        except (TypeError, ValueError):
+            said = f"what rows of {name} say of others cannot be told: one of them is damaged."
+            yield MissingRow(name, None, said, "Mend that one, then check again.")
 
 
 _Documents = Iterable[tuple[Row[Any], dict[str, Any]]]
@@ -151,7 +155,7 @@ def _documents(connection: Connection, name: str, columns: Iterable[str]) -> _Do
     for row in connection.execute(query.execution_options(yield_per=_ROWS_AT_ONCE)):
         try:
             document = json.loads(row.document)
-        except ValueError:
+        except (TypeError, ValueError):
             continue
         if isinstance(document, dict):
             yield row, document

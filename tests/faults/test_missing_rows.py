@@ -199,3 +199,26 @@ def test_what_no_backup_has_is_accepted_and_no_more_than_that(
     with bridge.store() as store:
         accepted = {event.file_name: event.message for event in store.events("accepted")}
     assert accepted["tokens/1"].endswith(": taken out by hand")
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "value"),
+    [
+        ("holds", "document", '{"tests": 5}'),
+        ("holds", "document", b"\xff"),
+        ("posteriors", "document", "[]"),
+        ("watches", "test_id", "x"),
+        ("watches", "document", '{"shifts": 1}'),
+        ("alerts", "document", '{"hooks": 3}'),
+    ],
+)
+def test_a_damaged_row_is_told_and_does_not_end_the_check(
+    bridge: Workspace, table: str, column: str, value: str | bytes
+) -> None:
+    with unguarded(bridge.database) as connection:
+        change = f"UPDATE {table} SET {column} = ? WHERE id = 1"
+        connection.exec_driver_sql(change, (value,))
+        connection.commit()
+    with bridge.store() as store:
+        checked = check_store(store, quiet)
+    assert [row.table for row in checked.damaged] == [table]
