@@ -91,7 +91,7 @@ def decided_words(hold: Hold, stage: Stage) -> str:
         time = f" Its time is {hold.time:%Y-%m-%d %H:%M}."
     elif hold.time_unknown:
         time = " Its time is not known: that of its receipt counts."
-    return f"{what} and counts from now on, for good; it is {stage}.{time}"
+    return f"{what} and counts from now on; it is {stage}.{time}"
 
 
 def told(hold: Hold) -> str:

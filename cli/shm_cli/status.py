@@ -120,10 +120,9 @@ def _told_of_held(held: Sequence[Mapping[str, Any]]) -> list[str]:
     told = []
     for hanger, own in sorted(of_hangers.items()):
         leading = max(own, key=_shift)
-        many = f"{len(own)} recordings, of which " if len(own) > 1 else "recording "
-        told.append(
-            f"held, hanger {hanger}: {many}{leading['recording']}: {paragraph(leading['message'])}"
-        )
+        many = f"{len(own)} recordings (`shm ingest --held`); " if len(own) > 1 else ""
+        of_one = f"recording {leading['recording']}: {leading['message']}"
+        told.append(paragraph(f"held, hanger {hanger}: {many}{of_one}"))
     return told
 
 

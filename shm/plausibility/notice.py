@@ -29,10 +29,12 @@ def notice_of(
 
 def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
     time = " --time TIME" if any(doubt.check.startswith("clock") for doubt in doubts) else ""
-    ways = [f"--confirm {recording_id}{time}", f"--discard {recording_id}"]
-    if any(map(_is_of_others, doubts)):
+    why = " --why TEXT" if any(doubt.check == "copy" for doubt in doubts) else ""
+    ways = [f"--confirm {recording_id}{time}{why}", f"--discard {recording_id}"]
+    leading = next((doubt for doubt in doubts if _is_of_others(doubt)), doubts[0])
+    if _is_of_others(leading):
         ways.reverse()  # most of these are what they seem
-    return f"{doubts[0].action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
+    return f"{leading.action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
 
 
 def _is_of_others(doubt: Doubt) -> bool:

@@ -9,8 +9,8 @@ from pathlib import Path
 from shm import modes_document
 from shm.errors import BadInput
 from shm.read.bundles import entries_of_test
-from shm.read.header import Header
-from shm.read.sidecar import sidecar_path
+from shm.read.header import CHANNEL_KEYS, Header
+from shm.read.sidecar import document_beside, sidecar_path
 from shm.values import ModalTest
 
 
@@ -19,7 +19,9 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
 
     Hanger, time, temperature and the known mass of a sidecar are those of its tests.
     """
-    tests, said = modes_document.load_modes(path), entries_of_test(path)
+    tests = modes_document.load_modes(path)
+    _refuse_channels(path)
+    said = entries_of_test(path)
     _refuse_what_samples_have(said, tests, path)
     return tuple(_as_said(test, said) for test in tests)
 
@@ -32,6 +34,15 @@ def _as_said(test: ModalTest, said: Header) -> ModalTest:
         temperature_c=test.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
         added_mass=said.added_mass or test.added_mass,
     )
+
+
+def _refuse_channels(path: Path) -> None:
+    for key in document_beside(path).keys() & {"channel", *CHANNEL_KEYS}:
+        raise BadInput(
+            f"{key!r} is said of modes, which have no channels.",
+            file=sidecar_path(path),
+            remedy=f"Say hanger, time and temperature_c here, all else in {path.name}.",
+        )
 
 
 def _refuse_what_samples_have(said: Header, tests: tuple[ModalTest, ...], path: Path) -> None:

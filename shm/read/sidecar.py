@@ -23,6 +23,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from datetime import datetime
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spr
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
+_ALIKE = 0.75
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
 
 
@@ -53,6 +55,7 @@ def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Head
     document = document_beside(path)
     if not document:
         return header
+    _refuse_misspelt(document, sidecar)
     names = list(header.channels)
     entries = {key: Entry(document[key], sidecar) for key in KEYS if key in document}
     channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
@@ -65,6 +68,17 @@ def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Head
     for name in [name for name in names if name in tables]:
         channels[name].update(_entries(tables[name], sidecar))
     return header.overridden_by(Header(sidecar, channels, entries))
+
+
+def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
+    """Keys of others are left alone, but not those that somebody may think are read."""
+    known = (*KEYS, *CHANNEL_KEYS, "channel")
+    for key in document:
+        meant = get_close_matches(key, known, n=1, cutoff=_ALIKE)
+        if key not in known and meant:
+            raise BadInput(
+                f"unknown key {key}.", file=sidecar, remedy=f"Write {meant[0]}, or leave it out."
+            )
 
 
 def channels_described(path: Path) -> dict[str, dict[str, Entry]]:

@@ -241,8 +241,8 @@ RULES = (
         SELECT r.id AS recording FROM recordings r
         WHERE r.modified_at IS NOT NULL
             AND NOT EXISTS (SELECT 1 FROM fingerprints f WHERE f.recording_id = r.id)
+            AND lower(r.file_name) NOT LIKE '%.modes.json'
             AND EXISTS (SELECT 1 FROM tests t WHERE t.recording_id = r.id
-                AND t.frequency_response IS NOT NULL
                 AND NOT EXISTS (SELECT 1 FROM events e WHERE e.recording_id = r.id
                     AND e.kind IN ('reopened', 'redescribed') AND e.at >= t.identified_at))
         """,

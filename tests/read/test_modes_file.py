@@ -51,4 +51,13 @@ def test_what_only_samples_have_is_refused(modes: Path, said: str) -> None:
     sidecar.write_text(said)
     with pytest.raises(BadInput) as refused:
         shm.load_modes(modes)
-    assert refused.value.file == str(sidecar) or refused.value.file == sidecar
+    assert str(refused.value.file) == str(sidecar)
+
+
+def test_a_misspelt_key_is_refused_and_those_of_others_are_left_alone(modes: Path) -> None:
+    modes.with_suffix(".toml").write_text("temprature_c = 12.0\n")
+    with pytest.raises(BadInput, match="unknown key temprature_c") as refused:
+        shm.load_modes(modes)
+    assert "Write temperature_c" in refused.value.remedy
+    modes.with_suffix(".toml").write_text('operator = "Ann"\n')
+    assert len(shm.load_modes(modes)) == 2
