@@ -28,7 +28,7 @@ from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
-from shm.store import Death, Deaths, Delivery, Receipt, Store, StoredAlert, Workspace
+from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
 from shm.values import Alert
 
@@ -40,6 +40,10 @@ _LONGEST_S = 86400.0
 _AGAIN_S = 60.0
 _OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENFILE)
 """What a step meets that is no fault of its recording, and passes when somebody sees to it."""
+
+_NO_MORE = (
+    " What it gave with its former sidecar counts no more: correct the sidecar and drop both again."
+)
 
 log = logging.getLogger(__name__)
 
@@ -287,6 +291,8 @@ class Flow:
                 continue
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
+            if any(e.recording_id == recording_id for e in self.store.events(Outcome.REDESCRIBED)):
+                reason["remedy"] += _NO_MORE
             name, archive = recording.file.file_name, self.workspace.archive
             try:
                 with archive.opened(recording.file) as path:

@@ -18,7 +18,7 @@ from shm.values import ModalTest, Recording
 from tests.helpers.any_bar import take_any_bar
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.workspaces import START, modelled_test, put
+from tests.helpers.workspaces import START, modelled_test, put, write_test
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
 
@@ -347,6 +347,18 @@ def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace
         former, _ = flow.store.former_tests(1)
         assert former.superseded_at is not None
         assert list(workspace.spool.iterdir()) == []
+
+
+def test_a_broken_sidecar_says_that_the_test_counts_no_more(workspace: Workspace) -> None:
+    write_test(workspace.spool / "a.modes.json", workspace)
+    ingest(workspace)
+    put(workspace.spool / "a.modes.toml", 'hanger = "two"')
+    write_test(workspace.spool / "a.modes.json", workspace)
+    ingest(workspace)
+    with workspace.store() as store:
+        recording = store.recording(1)
+        assert (recording.stage, store.tests(3)) == (Stage.REFUSED, ())
+        assert "counts no more" in recording.reason["remedy"]
 
 
 def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
