@@ -49,7 +49,7 @@ def test_a_workspace_can_be_made_and_asked_from_the_wheel(unpacked: Path) -> Non
 
 def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     code = (
-        "from shm_cli import thesis, season; import shm.report.page; from shm import resources\n"
+        "from shm_cli import thesis, demo; import shm.report.page; from shm import resources\n"
         "from shm.bridge import load_hanger\n"
         "assert all(path.is_file() for path in thesis.PRINTINGS.values())\n"
         "assert load_hanger(thesis.HANGER_FILE).id == 3\n"
