@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,19 @@ def parse_time(text: str) -> datetime:
 
 
 # ---------------------------------------------------------------- posteriors
+
+
+_ALIKE = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
+
+
+def key_meant(key: str, known: Sequence[str]) -> str | None:
+    """The key that a misspelt one stands for; None where it is known itself, or like none.
+
+    Keys of others are left alone, but not those that somebody may think are read.
+    """
+    if key in known:
+        return None
+    return next(iter(get_close_matches(key, known, n=1, cutoff=_ALIKE)), None)
 
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:

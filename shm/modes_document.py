@@ -11,11 +11,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from datetime import datetime
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from shm.documents import parse_time
+from shm.documents import key_meant, parse_time
 from shm.errors import BadInput
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode, ShapePoint
 
@@ -28,7 +27,6 @@ _TEST_KEYS = (
     "tension_read_sd_n", "modes",
 )  # fmt: skip
 _MODE_KEYS = tuple(field.name for field in fields(Mode))
-_ALIKE = 0.75
 _SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
 _LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold when read
 
@@ -161,14 +159,13 @@ def _tension_read(test: Mapping[str, Any], label: str, file: str | Path) -> dict
 def _refuse_misspelt(
     table: Mapping[str, Any], known: Sequence[str], label: str, file: str | Path
 ) -> None:
-    """Keys of others are left alone, but not those that somebody may think are read."""
-    for key in table.keys() - set(known):
-        meant = get_close_matches(str(key), known, n=1, cutoff=_ALIKE)
+    for key in table:
+        meant = key_meant(str(key), known)
         if meant:
             raise BadInput(
                 f"{label}: unknown key {key}.",
                 file=file,
-                remedy=_SPELT.get(meant[0], f"Write {meant[0]}, or leave it out."),
+                remedy=_SPELT.get(meant, f"Write {meant}, or leave it out."),
             )
 
 

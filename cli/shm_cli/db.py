@@ -98,12 +98,10 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
     """
     workspace = open_workspace(ctx)
     with workspace.store() as store, progress_bar("checking") as tell:
-        checked, location = check_store(store, tell), store.location
         if accepted is not None:
-            gone = [row for row in checked.missing if row.only_in_backup]
-            store.accept_missing(gone, getpass.getuser(), accepted, datetime.now(UTC))
-            click.echo(f"Accepted as gone for good: {len(gone)} rows.", err=True)
-            checked = check_store(store, tell)
+            count = store.accept_missing(getpass.getuser(), accepted, datetime.now(UTC))
+            click.echo(f"Accepted as gone for good: {count} rows.", err=True)
+        checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
     troubles = (*checked.troubles, *(archive.troubles if archive else ()))
     if as_json:

@@ -8,7 +8,7 @@ contradict: none of these widens it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,9 +16,10 @@ from scipy import stats
 from scipy.optimize import least_squares
 
 from shm.inference.described import DescribedCoordinates
+from shm.inference.options import silent
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
-from shm.values import FloatArray, ModalTest
+from shm.values import NAN, FloatArray, ModalTest
 
 _DIFFERENCE, _MOST_ROUNDS = 1e-6, 30
 
@@ -54,53 +55,95 @@ class Outcome:
     method: str
 
 
-def tension_of_other_ends_n(problem: Problem, outcome: Outcome) -> float:
-    """The tension with ends all alike that fit as well as any, farthest beyond the interval.
+@dataclass(frozen=True)
+class OtherAnswers:
+    """Fields of a `Posterior` that its own draws do not show; NaN where there is nothing."""
+
+    tension_of_other_ends_n: float = NAN
+    tension_of_other_orders_n: float = NAN
+    description_off_sd: float = NAN
+
+
+@dataclass(frozen=True, eq=False)
+class _Best:
+    """The draw that fits best: its place (d,), its sigma, and its log likelihood less half of the
+    square of its deviates, `fit`."""
+
+    place: FloatArray
+    sigma: float
+    fit: float
+
+
+def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> OtherAnswers:
+    """Of a bar as made; nothing of one with the priors of the thesis.
+
+    The description is off by the norm of the mean deviates, as far as frequencies see it.
+    """
+    coordinates = problem.coordinates
+    if not isinstance(coordinates, DescribedCoordinates):
+        return OtherAnswers()
+    places = coordinates.places(outcome.samples[:, :-1])
+    _, seen = coordinates.smooth(places)
+    off_sd = float(np.linalg.norm(seen.mean(axis=0)))
+    if not coordinates.felt_springs:
+        return OtherAnswers(description_off_sd=off_sd)
+    fit = problem.likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
+    at = int(fit.argmax())
+    best = _Best(places[at], float(outcome.samples[at, -1]), float(fit[at]))
+    ratio = outcome.samples[:, 0]
+    return OtherAnswers(
+        _tension_of_other_ends_n(problem, coordinates, best, ratio),
+        _tension_of_other_orders_n(problem, coordinates, best, ratio, tests),
+        off_sd,
+    )
+
+
+def _tension_of_other_ends_n(
+    problem: Problem, coordinates: DescribedCoordinates, best: _Best, ratio: FloatArray
+) -> float:
+    """The tension with ends all alike that fit as well as any, farthest beyond the interval of
+    `ratio` (draws,), theta_F.
 
     NaN where there is none. Frequencies tell springs from tension worst where all ends turn softly
     and alike, which are few among all pairs of ends.
     """
-    coordinates = problem.coordinates
-    if not isinstance(coordinates, DescribedCoordinates) or not coordinates.felt_springs:
-        return math.nan
-    place, sigma, fit = _best(problem, coordinates, outcome)
     found = [
-        climbed(problem, coordinates, place, sigma, coordinates.springs_alike(alike))
+        climbed(problem, coordinates, best.place, best.sigma, coordinates.springs_alike(alike))
         for alike in _ALIKE
     ]
     others = np.array([theta for theta, _ in found])
     fits = _fits(problem, found)
-    as_well = fits > max(fit, fits.max()) - _AS_WELL
+    as_well = fits > max(best.fit, fits.max()) - _AS_WELL
     nominal_n = problem.model.hanger.nominal_tension_n
-    low, high = np.quantile(outcome.samples[:, 0] * nominal_n, [0.05, 0.95])
+    low, high = np.quantile(ratio * nominal_n, [0.05, 0.95])
     tension_n = others[as_well, 0] * nominal_n
     away = np.maximum(low - tension_n, tension_n - high)
     if not (away > _MATERIAL * (high - low)).any():
-        return math.nan
+        return NAN
     return float(tension_n[away.argmax()])
 
 
-def tension_of_other_orders_n(
-    problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]
+def _tension_of_other_orders_n(
+    problem: Problem,
+    coordinates: DescribedCoordinates,
+    best: _Best,
+    ratio: FloatArray,
+    tests: Sequence[ModalTest],
 ) -> float:
     """The tension if all orders were one higher, or one lower, where that fits as well and lies
-    nearer to the nominal tension; NaN where it does not.
+    nearer to the nominal tension than `ratio` (draws,), theta_F; NaN where it does not.
 
     A series that begins with the first order has no such twin unless it is short; one of a few
     higher orders nearly always has, and then only the nominal tension tells which is right.
     """
-    coordinates = problem.coordinates
-    if not isinstance(coordinates, DescribedCoordinates) or not coordinates.felt_springs:
-        return math.nan
-    place, sigma, fit = _best(problem, coordinates, outcome)
-    theta = coordinates.theta(place[None])[0]
-    nearest, found = abs(math.log(float(np.median(outcome.samples[:, 0])))), math.nan
+    theta = coordinates.theta(best.place[None])[0]
+    middle = float(np.mean([mode.order for test in tests for mode in test.regular_modes]))
+    nearest, found = abs(math.log(float(np.median(ratio)))), NAN
     for by in (1, -1):
         renumbered = _renumbered(tests, by)
         if renumbered is None:
             continue
-        other = Problem.of(renumbered, problem.model, 1, lambda *_: None, problem.calibration)
-        middle = float(np.mean([mode.order for test in tests for mode in test.regular_modes]))
+        other = Problem.of(renumbered, problem.model, 1, silent, problem.calibration)
         start = theta.copy()
         start[0] *= (middle / (middle + by)) ** 2
         climbs = []
@@ -108,25 +151,17 @@ def tension_of_other_orders_n(
             for name, value in coordinates.springs_alike(restraint).items():
                 start[coordinates.names.index(name)] = value
             begin = coordinates.places(start[None])[0]
-            climbs.append(climbed(other, coordinates, begin, sigma))
+            climbs.append(climbed(other, coordinates, begin, best.sigma))
         likeliest = climbs[int(_fits(other, climbs).argmax())][0]
         other.settle(coordinates.places(likeliest[None])[0])
         fits = _fits(other, climbs)
-        ratio = float(climbs[int(fits.argmax())][0][0])
-        if fits.max() > fit - _AS_WELL and abs(math.log(ratio)) < nearest:
-            nearest, found = abs(math.log(ratio)), ratio * problem.model.hanger.nominal_tension_n
+        theta_f = float(climbs[int(fits.argmax())][0][0])
+        if fits.max() > best.fit - _AS_WELL and abs(math.log(theta_f)) < nearest:
+            nearest, found = (
+                abs(math.log(theta_f)),
+                theta_f * problem.model.hanger.nominal_tension_n,
+            )
     return found
-
-
-def description_off_sd(problem: Problem, outcome: Outcome) -> float:
-    """By how many of its standard deviations the description is off, as far as frequencies see it:
-    the norm of the mean deviates. NaN with the priors of the thesis.
-    """
-    coordinates = problem.coordinates
-    if not isinstance(coordinates, DescribedCoordinates):
-        return math.nan
-    _, seen = coordinates.smooth(coordinates.places(outcome.samples[:, :-1]))
-    return float(np.linalg.norm(seen.mean(axis=0)))
 
 
 def reading_off_sd(log_tension: FloatArray, reading: TensionReading, nominal_n: float) -> float:
@@ -140,20 +175,8 @@ def reading_off_sd(log_tension: FloatArray, reading: TensionReading, nominal_n: 
     return float(abs(math.log(reading.tension_n / nominal_n) - middle) / math.hypot(sd, reading.sd))
 
 
-def _best(
-    problem: Problem, coordinates: DescribedCoordinates, outcome: Outcome
-) -> tuple[FloatArray, float, float]:
-    """The place (d,) of the draw that fits best, its sigma, and its log likelihood less half of the
-    square of its deviates."""
-    places = coordinates.places(outcome.samples[:, :-1])
-    _, seen = coordinates.smooth(places)
-    fit = problem.likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
-    best = int(fit.argmax())
-    return places[best], float(outcome.samples[best, -1]), float(fit[best])
-
-
 def _fits(problem: Problem, climbs: Sequence[tuple[FloatArray, float]]) -> FloatArray:
-    """The same of climbs."""
+    """The log likelihood (climbs,) of each, less half of the square of its deviates."""
     predicted = problem.run(np.array([theta for theta, _ in climbs]))
     squares = np.array([square for _, square in climbs])
     return np.asarray(problem.likelihood.marginal(predicted) - 0.5 * squares)
@@ -199,6 +222,22 @@ def climbed(
         theta = coordinates.of_smooth(full[:, :count], full[:, count:])
         return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, full[:, count:]])
 
+    lower = np.append(np.zeros(count), np.full(len(seen), -np.inf))[free]
+    upper = np.append(np.ones(count), np.full(len(seen), np.inf))[free]
+    whole[free] = fitted(scaled, whole[free], lower, upper)
+    theta = coordinates.of_smooth(whole[None, :count], whole[None, count:])[0]
+    return np.asarray(theta), float((whole[count:] ** 2).sum())
+
+
+def fitted(
+    scaled: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> FloatArray:
+    """The point (k,) within its bounds with the least squares of `scaled`, which gives the misfits
+    (n, data) of points (n, k)."""
+
     def one(point: FloatArray) -> FloatArray:
         return np.asarray(scaled(point[None])[0])
 
@@ -207,9 +246,5 @@ def climbed(
         found = scaled(np.vstack([point, point + np.diag(steps)]))
         return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
 
-    lower = np.append(np.zeros(count), np.full(len(seen), -np.inf))[free]
-    upper = np.append(np.ones(count), np.full(len(seen), np.inf))[free]
-    fit = least_squares(one, whole[free], slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS)
-    whole[free] = fit.x
-    theta = coordinates.of_smooth(whole[None, :count], whole[None, count:])[0]
-    return np.asarray(theta), float((whole[count:] ** 2).sum())
+    fit = least_squares(one, start, slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS)
+    return np.asarray(fit.x)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
@@ -17,9 +17,8 @@ from shm.inference.options import UpdateOptions
 from shm.inference.other_answers import (
     Outcome,
     climbed,
-    description_off_sd,
-    tension_of_other_ends_n,
-    tension_of_other_orders_n,
+    fitted,
+    other_answers,
 )
 from shm.inference.problem import Problem
 from shm.inference.tmcmc import Mover
@@ -27,7 +26,6 @@ from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"
 _FINAL_STEPS = 5
-_DIFFERENCE = 1e-6
 
 _EDGE, _MANY = 0.02, 5.0
 """A parameter is at its bound where the outermost 2 % of its range hold five times the draws that
@@ -74,7 +72,7 @@ def assembled(
         # What is kept can be computed again from the posterior alone.
         likelihood.settle(model, most_probable[:-1])
         log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
-    return Posterior(
+    posterior = Posterior(
         model=model.name,
         hanger=tests[0].hanger,
         names=(*problem.prior.names, SIGMA),
@@ -96,11 +94,9 @@ def assembled(
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
         misfit_percent=_misfit_percent(problem, outcome.predicted),
-        tension_of_other_ends_n=tension_of_other_ends_n(problem, outcome),
-        tension_of_other_orders_n=tension_of_other_orders_n(problem, outcome, tests),
-        description_off_sd=description_off_sd(problem, outcome),
         log_occam=log_occam,
     )
+    return replace(posterior, **vars(other_answers(problem, outcome, tests)))
 
 
 def _draws(
@@ -199,21 +195,11 @@ def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
     width = prior.upper - prior.lower
     noise = np.hypot(best[-1], likelihood.identification_error)
 
-    def scaled_misfit(shares: FloatArray) -> FloatArray:
-        theta = prior.lower + width * np.atleast_2d(shares)
-        return np.asarray(likelihood.misfit(problem.run(theta)) / noise)
-
-    def one(shares: FloatArray) -> FloatArray:
-        return np.asarray(scaled_misfit(shares)[0])
-
-    def slopes(shares: FloatArray) -> FloatArray:
-        steps = np.where(shares < 0.5, _DIFFERENCE, -_DIFFERENCE)
-        misfits = scaled_misfit(np.vstack([shares, shares + np.diag(steps)]))
-        return np.asarray(((misfits[1:] - misfits[0]) / steps[:, None]).T)
+    def scaled(shares: FloatArray) -> FloatArray:
+        return np.asarray(likelihood.misfit(problem.run(prior.lower + width * shares)) / noise)
 
     start = ((best[:-1] - prior.lower) / width).clip(0, 1)
-    fit = least_squares(one, start, slopes, bounds=(0, 1), max_nfev=30)
-    theta = prior.lower + width * fit.x
+    theta = prior.lower + width * fitted(scaled, start, np.zeros_like(start), np.ones_like(start))
     climbed = np.append(theta, likelihood.likeliest_sigma(problem.run(theta[None])))
     candidates = np.array([best, np.append(theta, best[-1]), climbed])
     predicted = problem.run(candidates[:, :-1])

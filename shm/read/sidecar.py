@@ -23,11 +23,10 @@ import math
 import tomllib
 from collections.abc import Iterable, Sequence
 from datetime import datetime
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from shm.documents import format_time
+from shm.documents import format_time, key_meant
 from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.base import PeekChannel
@@ -36,7 +35,6 @@ from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spr
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
-_ALIKE = 0.75
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
 
 
@@ -71,13 +69,11 @@ def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Head
 
 
 def _refuse_misspelt(document: Iterable[str], sidecar: Path) -> None:
-    """Keys of others are left alone, but not those that somebody may think are read."""
-    known = (*KEYS, *CHANNEL_KEYS, "channel")
     for key in document:
-        meant = get_close_matches(key, known, n=1, cutoff=_ALIKE)
-        if key not in known and meant:
+        meant = key_meant(key, (*KEYS, *CHANNEL_KEYS, "channel"))
+        if meant:
             raise BadInput(
-                f"unknown key {key}.", file=sidecar, remedy=f"Write {meant[0]}, or leave it out."
+                f"unknown key {key}.", file=sidecar, remedy=f"Write {meant}, or leave it out."
             )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import sqlalchemy as sa
 from shm.store.archive import Archive
 from shm.store.database import Database, insert
 from shm.store.files import write_event
-from shm.store.missing import ACCEPTED, MissingRow
+from shm.store.missing import ACCEPTED, missing_rows
 from shm.store.rows import StoredRecording
 from shm.store.tables import events, recordings
 
@@ -21,11 +20,15 @@ _REMOVED, _BACKUP = "removed", "backup"
 class Upkeep(Database):
     """The part of the store that remembers what was done to keep it in order."""
 
-    def accept_missing(self, rows: Sequence[MissingRow], who: str, why: str, at: datetime) -> None:
-        """Notes that a person knows these rows to be gone for good: they are missed no more."""
+    def accept_missing(self, who: str, why: str, at: datetime) -> int:
+        """Notes that a person knows what only a backup has to be gone for good: it is missed no
+        more. How many rows that is.
+        """
         with self.writing() as connection:
-            for row in rows:
+            gone = [row for row in missing_rows(connection) if row.only_in_backup]
+            for row in gone:
                 write_event(connection, at, ACCEPTED, None, row.key, f"by {who}: {why}")
+        return len(gone)
 
     def note_removed(self, recording: StoredRecording, copy_folder: str, at: datetime) -> None:
         """Notes that a raw file is no longer here, and where its copy lies."""

@@ -166,9 +166,10 @@ class Posterior:
                 "diameter, length and material."
             )
         if math.isfinite(self.tension_of_other_orders_n):
+            other_n = self.tension_of_other_orders_n
             found.append(
                 f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
-                f"tension of {_told(self.tension_of_other_orders_n)}, nearer to the nominal one. "
+                f"tension of {force_unit(other_n).told(other_n)}, nearer to the nominal one. "
                 "Find the first mode of each plane."
             )
         return tuple(found)
@@ -179,8 +180,9 @@ class Posterior:
         if not math.isfinite(other_n):
             return ()
         way = "down" if other_n < float(np.median(self.tension_n)) else "up"
+        told = force_unit(other_n).told(other_n)
         return (
-            f"{_ENDS_DECIDE}: with ends of another stiffness all {way} to {_told(other_n)} fits as "
+            f"{_ENDS_DECIDE}: with ends of another stiffness all {way} to {told} fits as "
             "well. A test with a known mass, or a mode shape, tells which.",
         )
 
@@ -255,8 +257,3 @@ def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:
         head = each.partition(":")[0].partition(", by ")[0]
         found.setdefault(head if head in _SAID_ONCE else each, each)
     return tuple(found.values())
-
-
-def _told(tension_n: float) -> str:
-    unit = force_unit(tension_n)
-    return f"{unit.of(tension_n):.3g} {unit.name}"

@@ -61,7 +61,10 @@ def commands(files: Path) -> dict[str, tuple[object, ...]]:
         "held": ("ingest", "--held"),
         "peek": ("ingest", "--peek", recording),
         "identify": ("identify", recording, "--hanger-file", hanger),
-        "predict": ("predict", "beam1", "--set", "theta_F=0.9", "--set", "theta_L=1.01"),
+        "predict": (
+            "predict", "beam1", "--set", "theta_F=0.9", "--set", "theta_L=1.01",
+            "--hanger-file", hanger,
+        ),
         "update": ("update", modes, "--hanger-file", hanger, "--model", "beam2"),
         "update-thesis": (
             "update", modes, "--hanger-file", hanger, "--model", "beam1", "--priors", "thesis",
@@ -93,10 +96,9 @@ def answers(folder: Path) -> Iterator[tuple[str, str]]:
         place = ("--workspace", workspace.folder)
         yield f"{name}.txt", _said(*place, *words)
         yield f"{name}.json", _said(*place, *words, "--json")
-    for form in ("html",):
-        out = folder / f"report.{form}"
-        _said("--workspace", workspace.folder, "report", "--hanger", 3, "--out", out)
-        yield f"report.{form}", _BYTES_OF_PICTURES.sub("<picture>", out.read_text())
+    out = folder / "report.html"
+    _said("--workspace", workspace.folder, "report", "--hanger", 3, "--out", out)
+    yield "report.html", _BYTES_OF_PICTURES.sub("<picture>", out.read_text())
     yield from _pages(workspace)
     yield "schema.txt", _schema(workspace)
     yield from _trial(folder / "trial")
