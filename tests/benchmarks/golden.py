@@ -6,7 +6,8 @@
 JSON documents, texts, pages, what figures say in words, answers of a sealed trial and the schema,
 on one bridge whose tests are simulated from fixed seeds. Without a folder they are made twice and
 compared: the same seed must give the same answer. Times of the clock, seconds taken, paths,
-checksums of these and numbers of processes are left out. Numbers in JSON may differ by 1e-9 of themselves, words not.
+checksums of these and numbers of processes are left out. Numbers in JSON may differ by 1e-9 of
+themselves, words not.
 """
 
 from __future__ import annotations
