@@ -13,11 +13,11 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
-from shm.identify.finding.jackknife import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.finding.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
-from shm.identify.joining.fit import fitted
+from shm.identify.finding.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.joining.joined import Joined, joined
 from shm.identify.joining.products import joined_response
+from shm.identify.joining.ringing import fitted
 from shm.identify.joining.together import alike, sharpened, together
 from shm.identify.measuring.setups import measured
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions

@@ -1,15 +1,20 @@
-"""What an identification may be told; every default suits a hanger hit by a soft hammer."""
+"""What an identification may be told; every default suits a hanger hit by a soft hammer, and others
+suit records that were made for their whole band.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from shm.errors import UsageError
-from shm.values import NAN
+from shm.values import NAN, Recording
 
 NO_CROSS_CHECK = "none"
+_PASSED = 0.4
+"""Of the sampling rate: what anti-aliasing filters pass."""
 
 
 @dataclass(frozen=True)
@@ -76,3 +81,22 @@ class IdentifyOptions:
                     f"{name} = {value} is too small.",
                     remedy=f"Give at least {low}, or leave it out.",
                 )
+
+
+def campaign_options(
+    records: Sequence[Recording],
+    *,
+    reference_force_n: float = 1000.0,
+    frequency_allowance: float = 1e-4,
+    shape_allowance: float = 0.005,
+) -> IdentifyOptions:
+    """The defaults of the settings, and as the band all that the loggers of `records` pass.
+
+    What hits repeat to 1e-4 of a shape, sensors clamped on again do not: half a percent is allowed.
+    """
+    return IdentifyOptions(
+        band_high_hz=_PASSED * min(record.sampling_rate_hz for record in records),
+        reference_force_n=reference_force_n,
+        frequency_allowance=frequency_allowance,
+        shape_allowance=shape_allowance,
+    )

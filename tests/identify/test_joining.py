@@ -9,8 +9,7 @@ import pytest
 
 from shm.identify import Dropped, IdentifyOptions, Poles
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.joining.joined import Joined, joined
-from shm.identify.joining.matching import LARGEST_SHIFT, matched
+from shm.identify.joining.joined import LARGEST_SHIFT, Joined, joined, matched
 from shm.values import NAN, Plane, ResponsePoint
 
 OPTIONS = IdentifyOptions()

@@ -2,9 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.identify.finding.candidates import Candidate, resolved, stable_candidates
+from shm.identify.finding.candidates import (
+    Candidate,
+    Pole,
+    continued,
+    link,
+    resolved,
+    stable_candidates,
+)
 from shm.identify.finding.poles import PoleSet
-from shm.identify.finding.tracks import Pole, continued, link
 from shm.identify.options import IdentifyOptions
 
 X, Y = np.array([1.0 + 0j, 0.0]), np.array([0.0 + 0j, 1.0])

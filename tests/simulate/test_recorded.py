@@ -11,7 +11,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.identify import identify
-from shm.identify.campaign_options import campaign_options
+from shm.identify.options import campaign_options
 from shm.read import read
 from shm.read.single import write_single
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign_with_truth

@@ -14,7 +14,7 @@ from shm.bridge import load_hanger
 from shm.errors import BadInput, ShmError
 from shm.gap import GapOptions, diagnose
 from shm.identify import identify
-from shm.identify.campaign_options import campaign_options
+from shm.identify.options import campaign_options
 from shm.modes_document import load_modes, modes_document
 from shm.read import read_test
 from shm.values import Answer, Hanger, ModalTest, Recording

@@ -14,11 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.identify.finding.candidates import Candidate
-from shm.identify.finding.jackknife import LEAST_HITS
+from shm.identify.finding.candidates import Candidate, Pole
 from shm.identify.finding.poles import PoleSet
-from shm.identify.finding.repeats import Repeats, doubt, repeats_of
-from shm.identify.finding.tracks import Pole
+from shm.identify.finding.repeats import LEAST_HITS, Repeats, doubt, repeats_of
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray, IntArray
 

@@ -16,12 +16,20 @@ Modes from Hankel matrices, one a hit, whose sum has the modes of all hits in it
 State-space models of rising order are cut from the sum. Leaving out a hit need not cost a new
 decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
 one, spans the same columns but for terms of second order.
+
+The one door to pyOMA2: two functions of its `ssi` module, kept quiet.
+
+Importing pyOMA2 turns numpy's warnings off, attaches a log handler, mutes matplotlib's logger and
+draws progress bars on standard error; all four are undone here. Only `pyoma2.functions.ssi` is
+imported: the rest of the package brings pandas and scikit-learn.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,13 +37,24 @@ from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
 from shm.identify.finding.poles import PoleSet, poles_of
 from shm.identify.finding.stabilise import final_orders, nothing_moves, stabilised
-from shm.identify.finding.subspace import hankel, hankel_with_input, realise
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
 _NOBODY_HIT = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
 the largest standard deviation of a hammer test are taken."""
+_ROWS = 240
+_BLOCK_ROWS = (60, 120)
+_BLOCK_ROWS_ALONE = 320
+"""A single channel tells close modes apart by time alone: it needs more lags."""
+_MOST_ROWS = 640
+_REFERENCES = 4
+_MAX_ORDER = 120
+_COARSE_FROM = 60
+_LEAST_ORDER = 2
+_RANK_TOLERANCE = 1e-17
+"""Singular values below this share of the first are zero but for rounding."""
+_MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -66,19 +85,6 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
         for driven in measurement.driven
     ]
     return modes_of_hankel(matrices, rows, measurement, options)
-
-
-_ROWS = 240
-_BLOCK_ROWS = (60, 120)
-_BLOCK_ROWS_ALONE = 320
-"""A single channel tells close modes apart by time alone: it needs more lags."""
-_MOST_ROWS = 640
-_REFERENCES = 4
-_MAX_ORDER = 120
-_COARSE_FROM = 60
-_LEAST_ORDER = 2
-_RANK_TOLERANCE = 1e-17
-"""Singular values below this share of the first are zero but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -162,3 +168,54 @@ def _models_without_each_hit(
     total = np.sum(projected, axis=0)
     orders = final_orders(size.orders)
     return [_models(total - part, size, orders)[1] for part in projected]
+
+
+with np.errstate():
+    from pyoma2.functions import ssi
+
+
+def _no_progress_bar(*bounds: int, **_: Any) -> Iterator[int]:
+    return iter(range(*bounds))
+
+
+def _silence() -> None:
+    logger = logging.getLogger("pyoma2")
+    for handler in list(logger.handlers):
+        logger.removeHandler(handler)
+    logger.setLevel(logging.WARNING)
+    logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
+    setattr(ssi, "trange", _no_progress_bar)  # noqa: B010
+
+
+_silence()
+
+
+def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:
+    """Sum over time of future responses times past references.
+
+    `response` (channels, samples) and `reference` (references, samples) give a matrix of shape
+    (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
+    out lag zero, hence white noise.
+    """
+    matrix, _ = ssi.build_hank(response, reference, block_rows, "cov")
+    return np.asarray(matrix * response.shape[1], dtype=np.float64)
+
+
+def hankel_with_input(
+    response: FloatArray, reference: FloatArray, force: FloatArray, block_rows: int
+) -> FloatArray:
+    """The same after what the future of `force` (1, samples) explains is projected out.
+
+    Its least squares are scaled by the force's own size; as future responses and past references
+    enter both with the share of a direction that the force has, weak ones do no harm.
+    """
+    matrix, _ = ssi.build_hank(response, reference, block_rows, "IOcov", U=force)
+    return np.asarray(matrix * response.shape[1], dtype=np.float64)
+
+
+def realise(
+    matrix: FloatArray, block_rows: int, max_order: int
+) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+    """Observability matrix (rows, max_order); state and output matrices of orders 0, 2, 4, ..."""
+    observability, states, outputs, _ = ssi.SSI_fast(matrix, block_rows, max_order, step=2)
+    return np.asarray(observability, dtype=np.float64), list(states), list(outputs)

@@ -9,9 +9,8 @@ import numpy as np
 from shm.identify.contract import Dropped, Finding, Poles
 from shm.identify.finding.candidates import diagram, resolved, stable_candidates
 from shm.identify.finding.close_pairs import told_apart
-from shm.identify.finding.jackknife import LEAST_HITS
 from shm.identify.finding.poles import PoleSet
-from shm.identify.finding.repeats import find_again, proven
+from shm.identify.finding.repeats import LEAST_HITS, find_again, proven
 from shm.identify.options import IdentifyOptions
 
 _FINAL_ORDERS = 5

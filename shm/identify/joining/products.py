@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shm.errors import BadInput
 from shm.identify.contract import FoundMode, Measurement
-from shm.identify.finding.jackknife import jackknife_sd
+from shm.identify.finding.repeats import jackknife_sd
 from shm.identify.joining.ringing import Ringing
 from shm.identify.measuring.points import Place, place_of
 from shm.values import BoolArray, FloatArray, FrequencyResponse, Plane, ResponsePoint

@@ -23,10 +23,9 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.finding.jackknife import LEAST_HITS
 from shm.identify.finding.poles import modal_assurance
-from shm.identify.joining.joined import Joined
-from shm.identify.joining.matching import LARGEST_SHIFT, matched
+from shm.identify.finding.repeats import LEAST_HITS
+from shm.identify.joining.joined import LARGEST_SHIFT, Joined, matched
 from shm.identify.joining.ringing import levels, ringing
 from shm.identify.measuring.points import place_of
 from shm.identify.placing.planes import transverse_share

@@ -1,6 +1,6 @@
-"""Windowed spectra, accelerance and coherence from the ring-downs of several hits.
+"""Windowed spectra, accelerance (H1, H2, Hv) and coherence from the ring-downs of several hits.
 
-Accelerance and coherence from the spectra of several hits: H1, H2 and Hv.
+Ring-downs are low-passed and thinned to the band; the exponentials in them stay what they are.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
+from scipy.signal import firwin, upfirdn
 
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
@@ -19,6 +20,12 @@ BAND_MARGIN = 1.25
 MOST_LINES = 8192
 END_LEVEL = 0.01
 """A ring-down that is above this share at the end of its window gets an exponential one."""
+_TINY = np.finfo(float).tiny
+RATE_OVER_BAND = 2.56
+_HALF_LENGTH = 16
+"""Of the filter, in samples of its output: what folds into the band is 90 dB down."""
+_KAISER_BETA = 9.0
+_LEAST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -129,9 +136,6 @@ def _force_window(length: int, keep: int) -> FloatArray:
     return np.asarray(0.5 + 0.5 * np.cos(np.pi * phase))
 
 
-_TINY = np.finfo(float).tiny
-
-
 def response_of(spectra: ComplexArray, estimator: str) -> tuple[ComplexArray, FloatArray]:
     """Accelerance in m/s^2/N and coherence, each (points, lines); 0 where nothing is known.
 
@@ -171,3 +175,31 @@ _ESTIMATORS: dict[str, Callable[[ComplexArray, FloatArray, FloatArray], ComplexA
     "h2": _h2,
     "hv": _hv,
 }
+
+
+def least_seconds(band_high_hz: float) -> float:
+    """The shortest signal that leaves enough samples for an identification."""
+    return (_LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
+
+
+def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int]:
+    """How many samples the filter of `band_limited` reaches to either side, and the thinning."""
+    factor = max(1, int(sampling_rate_hz // (RATE_OVER_BAND * band_high_hz)))
+    return (_HALF_LENGTH * factor if factor > 1 else 0), factor
+
+
+def band_limited(
+    signals: FloatArray, sampling_rate_hz: float, band_high_hz: float
+) -> tuple[FloatArray, float]:
+    """Signals (channels, samples) at the lowest whole fraction of their rate that holds the band.
+
+    Only outputs for which the filter lies wholly inside the signal are kept: there a finite filter
+    turns a sum of exponentials into the same exponentials, so poles come out unchanged.
+    """
+    reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
+    if factor < 2:
+        return signals, sampling_rate_hz
+    taps = firwin(2 * reach + 1, 1 / factor, window=("kaiser", _KAISER_BETA))
+    filtered = np.asarray(upfirdn(taps, signals, down=factor, axis=-1))
+    last = (signals.shape[-1] - 1) // factor
+    return filtered[..., 2 * _HALF_LENGTH : last + 1], sampling_rate_hz / factor

@@ -12,7 +12,7 @@ import numpy as np
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Measurement
-from shm.identify.measuring.bandlimit import band_limited
+from shm.identify.measuring.frf import band_limited
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray, FrequencyResponse
 

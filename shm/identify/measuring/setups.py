@@ -19,8 +19,13 @@ import numpy as np
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Hit, Measurement
 from shm.identify.measuring.ambient import ambient_measurement
-from shm.identify.measuring.bandlimit import band_limited, filter_reach
-from shm.identify.measuring.frf import Window, averaged_response, common_window
+from shm.identify.measuring.frf import (
+    Window,
+    averaged_response,
+    band_limited,
+    common_window,
+    filter_reach,
+)
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.points import point_of
 from shm.identify.measuring.responses import measurement_of_responses

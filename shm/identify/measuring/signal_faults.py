@@ -1,17 +1,27 @@
-"""The fault of each acceleration after each hit, and the names that faults go by."""
+"""The fault of each acceleration after each hit, and the names that faults go by.
+
+Faults of one signal that a logger or its connectors make: clipped, or standing still.
+
+What no ring-down can do: jumps, bursts and gaps that its past does not foretell.
+
+A ring-down is a sum of decaying sines, so each sample follows from the ones before it by one linear
+rule (Prony). What does not follow came in on the way from the sensor to the file.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.linalg import solve
+from scipy.ndimage import median_filter
+from scipy.signal import oaconvolve
 
-from shm.identify.measuring.bandlimit import RATE_OVER_BAND
-from shm.identify.measuring.faults import clipped, frozen
+from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
-from shm.identify.measuring.prediction import surprise, thinned
 from shm.identify.options import IdentifyOptions
-from shm.values import Channel, FloatArray
+from shm.values import BoolArray, Channel, FloatArray
 
 DOUBLE_HIT = "double hit"
 CUT_OFF = "ring-down cut off"
@@ -33,6 +43,24 @@ _OFFSET_SECONDS = 0.5
 _OFFSET_MOVES = 2.0
 _SILENT_SHARE = 1e-3
 _COPY_SAMPLES = 256
+LEAST_REPEATS = 3
+FULL_SCALE_SHARE = 0.999
+"""A converter's largest code lies below its full scale: by 1/2048 of it for 12 bits."""
+FROZEN_SAMPLES = 16
+_LEVELS_BELOW = 10
+_TOP = 200
+_CROWDED = 8.0
+_MOVES = 30.0
+_FINE = 4000.0
+"""Levels up to the peak: forces of hits differ by tens of percent, a thousand levels, so that two
+are hardly the same by chance."""
+_ORDER = 128
+"""Two for each mode that a channel sees, aliased ones too; 64 left sound tests of long hangers with
+errors 8 times those around them."""
+_FIT_SAMPLES = 600
+_BLOCK = 16
+_AROUND = 25
+_RIDGE = 1e-9
 
 
 def faults_of_channels(
@@ -149,3 +177,135 @@ def _surprises(free: Sequence[FloatArray], known: Faults, single: Sequence[bool]
         [(KNOCK if knock else CABLE) if is_wild else "" for is_wild in row]
         for row, knock in zip(wild, knocks, strict=True)
     ]
+
+
+def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:
+    """Which parts of one signal, each (samples,), reach what its logger can record.
+
+    Where nobody says what that is: an extreme value is a limit if three samples have it, and more
+    than the values next to it make likely.
+    """
+    if np.isfinite(full_scale):
+        tops = [np.max(np.abs(part), initial=0.0) for part in parts]
+        return np.array([top >= FULL_SCALE_SHARE * full_scale for top in tops], dtype=bool)
+    return np.asarray(_flat_topped(parts) | _flat_topped([-part for part in parts]))
+
+
+def _flat_topped(parts: Sequence[FloatArray]) -> BoolArray:
+    tops = np.array([part.max(initial=-np.inf) for part in parts])
+    top = float(tops.max(initial=-np.inf))
+    reaches = tops == top
+    repeats = sum(int(np.sum(part == top)) for part, at in zip(parts, reaches, strict=True) if at)
+    if repeats < LEAST_REPEATS or not _is_crowded(np.concatenate(parts), repeats):
+        return np.zeros(len(parts), dtype=bool)
+    return np.asarray(reaches)
+
+
+def _is_crowded(values: FloatArray, repeats: int) -> bool:
+    """Is the largest value met far more often than each of the ten levels below it?
+
+    The crest of a sine, quantised, has its top level 3 to 4 times as often as those; a clipped one
+    tens of times. A signal of one level is not clipped, it is dead.
+    """
+    highest = np.sort(np.partition(values, -_TOP)[-_TOP:] if len(values) > _TOP else values)
+    steps = np.diff(highest)
+    if not np.any(steps > 0):
+        return len(values) > _TOP and float(values.min()) < highest[-1]
+    step = float(steps[steps > 0].min())
+    below = np.sum(
+        (highest < highest[-1]) & (highest >= highest[-1] - (_LEVELS_BELOW + 0.5) * step)
+    )
+    return bool(repeats > _CROWDED * max(1, below) / _LEVELS_BELOW)
+
+
+def same_peaks(parts: Sequence[FloatArray]) -> BoolArray:
+    """Which parts of one signal, each (samples,), share their largest value to the last bit.
+
+    No two hits are alike: what two have in common is the limit of the logger, even where a pulse
+    of few samples reaches it once. False where levels are so coarse that chance does it.
+    """
+    tops = np.array([part.max(initial=-np.inf) for part in parts])
+    top = float(tops.max(initial=-np.inf))
+    reaches = tops == top
+    if np.sum(reaches) < 2:
+        return np.zeros(len(parts), dtype=bool)
+    steps = np.diff(np.unique(np.concatenate(parts)))
+    return np.asarray(reaches & (top > _FINE * float(steps.min(initial=np.inf))))
+
+
+def frozen(signals: FloatArray) -> BoolArray:
+    """Which signals, (channels, samples), stand still for 16 samples while they ought to move."""
+    stride = FROZEN_SAMPLES // 2
+    # Sixteen equal samples hold two equal ones that are eight apart: only those are looked into.
+    thin = signals[:, ::stride]
+    suspects = np.flatnonzero(np.any(thin[:, 1:] == thin[:, :-1], axis=1))
+    found = np.zeros(len(signals), dtype=bool)
+    found[suspects] = [_stands_still(signals[row]) for row in suspects]
+    return found
+
+
+def _stands_still(signal: FloatArray) -> bool:
+    steps = np.abs(np.diff(signal))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], steps == 0, [0]))))
+    runs = [(a, b) for a, b in edges.reshape(-1, 2) if b - a + 1 >= FROZEN_SAMPLES]
+    if not runs or not np.any(steps > 0):
+        return False
+    # A slow or weak signal rests on one level of its converter for long: there the samples around
+    # move by a few levels (nine around a crest). Where they move by 30, it cannot have rested.
+    level = float(steps[steps > 0].min())
+    return any(_moves_around(signal, a, b + 1, _MOVES * level) for a, b in runs)
+
+
+def _moves_around(signal: FloatArray, first: int, stop: int, least: float) -> bool:
+    length = stop - first
+    sides = signal[max(0, first - length) : first], signal[stop : stop + length]
+    moves = [float(np.ptp(side)) for side in sides if len(side) >= min(length, FROZEN_SAMPLES)]
+    return bool(moves) and min(moves) >= least
+
+
+def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:
+    """Means of neighbouring samples, (channels, fewer samples), at no less than the wanted rate.
+
+    What folds back stays a sum of decaying sines, which is all that counts here.
+    """
+    factor = max(1, int(sampling_rate_hz / wanted_rate_hz))
+    samples = signals.shape[1] // factor * factor
+    parts = signals[:, :samples].reshape(len(signals), -1, factor)
+    return np.asarray(parts.mean(axis=2))
+
+
+def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
+    """How far one channel's ring-downs, each (samples,), leave their rule at worst, (hits,).
+
+    Largest error of the prediction in a block of 16 samples over the median of those of the blocks
+    around it, or of those before it: what comes back slowly disturbs the blocks after it for long.
+    NaN for a ring-down too short to tell.
+    """
+    long_enough = [part for part in ring_downs if len(part) >= 2 * _ORDER]
+    if not long_enough:
+        return np.full(len(ring_downs), np.nan)
+    rule = _rule(long_enough)
+    return np.array([_worst(part, rule) for part in ring_downs])
+
+
+def _rule(parts: Sequence[FloatArray]) -> FloatArray:
+    """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
+    rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
+    past, now = rows[:, :-1], rows[:, -1]
+    square = past.T @ past
+    square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
+    weights = solve(square, past.T @ now, assume_a="pos")
+    return np.concatenate(([1.0], -weights[::-1]))
+
+
+def _worst(part: FloatArray, rule: FloatArray) -> float:
+    if len(part) < 2 * _ORDER:
+        return float("nan")
+    error = np.abs(oaconvolve(part, rule, mode="valid"))
+    peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
+    width = min(_AROUND, len(peaks))
+    around = median_filter(peaks, width)
+    usual = around.copy()
+    late = width // 2 + 1
+    usual[late:] = np.minimum(around[late:], around[:-late])
+    return float(np.max(peaks / np.maximum(usual, np.finfo(float).tiny)))

@@ -18,8 +18,15 @@ from typing import Literal, TypeAlias
 import numpy as np
 from scipy.linalg import eigh
 
-from shm.identify.placing.alignment import Grid, PlaneModes, Tolerance, aligned
-from shm.identify.placing.pattern import HIGHEST_ORDER, log_pinned, tensioned_beam_pattern
+from shm.identify.placing.alignment import (
+    HIGHEST_ORDER,
+    Grid,
+    PlaneModes,
+    Tolerance,
+    aligned,
+    log_pinned,
+    tensioned_beam_pattern,
+)
 from shm.values import FloatArray, Hanger, IntArray
 
 TOLERANCES = (Tolerance(0.012, 0.08), Tolerance(0.03, 0.24))

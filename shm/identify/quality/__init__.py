@@ -1,6 +1,6 @@
 """What can be wrong with a test, each as a figure beside its limit and what to do about it.
 
-A check is one file and one line of `CHECKS`.
+A check is one function and one line of `CHECKS`.
 """
 
 from __future__ import annotations
@@ -8,41 +8,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.errors import NotIdentifiable
-from shm.identify.quality import (
-    cable,
-    clipping,
-    coherence,
-    cross_check,
-    double_hits,
-    drop_outs,
-    force_spectrum,
-    hits,
-    noise,
-    pre_trigger,
-    repeatability,
-    ring_down,
-)
-from shm.identify.quality import tones as steady
+from shm.identify.quality import of_hits, of_modes, of_signals
 from shm.identify.quality.inspection import Check, Inspection
-from shm.identify.quality.tones import tones
+from shm.identify.quality.tones import steady_tones, tones
 from shm.values import QualityCheck
 
 __all__ = ["CHECKS", "Check", "Inspection", "assess", "refusal", "tones"]
 
 CHECKS: tuple[Check, ...] = (
-    hits.check,
-    double_hits.check,
-    clipping.check,
-    cable.check,
-    drop_outs.check,
-    pre_trigger.check,
-    ring_down.check,
-    force_spectrum.check,
-    coherence.check,
-    noise.check,
-    steady.check,
-    repeatability.check,
-    cross_check.check,
+    of_hits.hits_used,
+    of_hits.double_hits,
+    of_signals.clipping,
+    of_signals.cable,
+    of_signals.drop_outs,
+    of_hits.pre_trigger,
+    of_hits.ring_down,
+    of_hits.force_spectrum,
+    of_modes.coherence,
+    of_signals.noise,
+    steady_tones,
+    of_hits.repeatability,
+    of_modes.agreement,
 )
 
 

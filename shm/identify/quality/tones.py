@@ -17,9 +17,9 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from shm.identify.contract import Hit, Measurement, Tone
-from shm.identify.measuring.bandlimit import RATE_OVER_BAND
+from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES
-from shm.identify.measuring.prediction import thinned
+from shm.identify.measuring.signal_faults import thinned
 from shm.identify.options import IdentifyOptions
 from shm.identify.quality.inspection import Inspection
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, QualityCheck, Recording
@@ -65,7 +65,7 @@ def tones(
     return _in_most(lists, options)
 
 
-def check(inspection: Inspection) -> QualityCheck | None:
+def steady_tones(inspection: Inspection) -> QualityCheck | None:
     """How many tones lie in the band, and at which frequencies."""
     if not inspection.records:
         return None
