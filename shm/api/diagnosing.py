@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from shm.api.tests import Tests, modal_tests
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
-from shm.gap.options import silent
+from shm.gap.contract import silent
 from shm.values import Diagnosis, Hanger
 
 _DEFAULT = GapOptions()

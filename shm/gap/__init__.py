@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
+from shm.gap.contract import GapOptions, Progress
 from shm.gap.diagnose import diagnose
-from shm.gap.options import GapOptions, Progress
 
 __all__ = ["GapOptions", "Progress", "diagnose"]

@@ -1,8 +1,7 @@
-"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown.
+"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown; what
+is claimed of it, and what stays possible.
 
-Faint second causes: beside a large effect they may be no more than its own law's error.
-
-A real effect does not follow the catalogue to the letter, and the larger it is, the better the data
+Faint second causes beside a large effect may be no more than its own law's error: a real effect does not follow the catalogue to the letter, and the larger it is, the better the data
 show by how much. What is left then often looks like a small effect of another kind. Where the
 second cause of a pair moves the data by little against the first, it counts for the most part as
 the law of the first.
@@ -16,18 +15,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.gap.chances import Family, Tried, doubted, families, missed, probabilities
-from shm.gap.contract import Fit, Hypothesis, NoiseNode
+from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
-from shm.gap.options import GapOptions, Progress, silent
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
+from shm.inference.tmcmc import normalised
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray, Leads, leads
 
 WITHIN_REACH = 7.0
 AS_GOOD_A_FIT = 1.0
 """What a cause may fit worse than the best one, in log likelihood, and still fit as well."""
+FAINT = 0.075
+"""A second cause is faint that moves the data by less than this share of what the first does."""
+LAW_TO_CAUSE = 5.0
+"""Odds that a faint second cause is the first one's law. In blind trials eight pairs so faint were
+one effect and none was two; of ten with a second cause of up to a fifth, eight were two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,13 +245,6 @@ def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:
     return any(single > pair.log_bayes_factor - SUPPORTED for single in singles)
 
 
-FAINT = 0.075
-"""A second cause is faint that moves the data by less than this share of what the first does."""
-LAW_TO_CAUSE = 5.0
-"""Odds that a faint second cause is the first one's law. In blind trials eight pairs so faint were
-one effect and none was two; of ten with a second cause of up to a fifth, eight were two."""
-
-
 def without_faint(
     problem: GapProblem, baseline: Fit, kinds: Sequence[Family], chances: FloatArray
 ) -> FloatArray:
@@ -296,3 +293,47 @@ def _beyond(shift: FloatArray, baseline: Fit, errors: NoiseNode) -> float:
     products = Likelihood([errors]).gram(columns)[0, 0]
     inner, outer = products[:-1, :-1] + np.eye(len(baseline.z)), products[:-1, -1]
     return float(products[-1, -1] - outer @ np.linalg.solve(inner, outer))
+
+
+def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
+    """The fits, with their probabilities, of what the diagnosis claims.
+
+    All members of the leading group: which of them it is, the data cannot tell.
+    """
+    leading = attribution.leading
+    if leading is None:
+        no_gap = attribution.leads == "no gap"
+        return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
+    group = [
+        each
+        for each in attribution.explanations
+        if each is leading or (each.group is not None and each.group == leading.group)
+    ]
+    found = [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+    # A group may lead by members that screening alone has weighed.
+    return found or [(1.0, attribution.unexplained)]
+
+
+def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
+    """The fits of all that may be, with their probabilities: no gap, every cause, the unknown.
+
+    A number that does not hang on the cause, such as the tension, is averaged over them (Hoeting
+    et al., Stat. Sci. 14, 1999); over the places too where a cause may act.
+    """
+    fits = [
+        (attribution.no_gap_probability, attribution.baseline),
+        (attribution.unexplained_probability, attribution.unexplained),
+    ]
+    for each in attribution.explanations:
+        fits += _anywhere(each)
+    return fits
+
+
+def _anywhere(cause: Explanation) -> list[tuple[float, Fit]]:
+    """The fits of a cause wherever it may act, with their shares of its probability."""
+    found = [(each.log_evidence, each.posterior) for each in cause.variants]
+    fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
+    if not fitted:
+        return []
+    share = normalised(np.array([evidence for evidence, _ in fitted]))
+    return [(cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)]

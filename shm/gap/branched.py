@@ -9,9 +9,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.contract import Peak
-from shm.gap.coordinates import Branch
+from shm.gap.coordinates import Branch, Straight
 from shm.gap.landscape import log_normal
-from shm.gap.straight import Straight
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray, IntArray

@@ -1,4 +1,4 @@
-"""What the steps of a diagnosis hand to each other.
+"""What the steps of a diagnosis hand to each other, and what it may be told.
 
 All data of a hanger are one vector: first the logarithms of the measured frequencies, then the
 components of the measured shapes, each shape scaled to length 1 over its own components and turned
@@ -8,6 +8,7 @@ matrix.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -169,3 +170,26 @@ class Fit:
     method: Method
     peaks: tuple[Peak, ...] = ()
     effective: float = float("nan")
+
+
+Progress = Callable[[str, float], None]
+
+
+def silent(label: str, fraction: float) -> None:
+    """No progress is shown."""
+
+
+@dataclass(frozen=True)
+class GapOptions:
+    """`baseline` is the model class whose gap is diagnosed, its length that of the description.
+
+    `without` are effects taken out of the catalogue; `hold_out` what the held-out misfit leaves out
+    of the fit: ids of tests, or orders of modes such as `4`; empty: every order and every test in
+    turn. `draws` are kept of each posterior.
+    """
+
+    baseline: str = "beam1"
+    without: tuple[str, ...] = ()
+    hold_out: tuple[str, ...] = ()
+    draws: int = 1000
+    seed: int = 1

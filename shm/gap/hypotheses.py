@@ -1,10 +1,20 @@
-"""The single effects that these data could show, each at each place where it may act."""
+"""The single effects that these data could show, each at each place where it may act, and which of
+them are worth a full fit: each is tried linearised, on top of a fit without it.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
 from shm.errors import UsageError
-from shm.gap.contract import Hypothesis
+from shm.gap.chances import Tried
+from shm.gap.contract import Fit, Hypothesis, Progress
+from shm.gap.marginal import marginal
 from shm.gap.problem import GapProblem
+from shm.gap.sensitivity import Scan, scan, superposed, truncate
 from shm.models.effects import EFFECTS
 
 IN_BASELINE = {
@@ -13,6 +23,10 @@ IN_BASELINE = {
     "solid2": ("rotational_end_flexibility",),
 }
 """Effects that a baseline class has as parameters of its own."""
+HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
+HOPELESS_SHARE = 0.3
+STARTS = 3
+NOTHING_SEEN = 1.0
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -42,3 +56,81 @@ def invisible(problem: GapProblem) -> dict[str, str]:
     for name in IN_BASELINE.get(problem.baseline, ()):
         reasons[name] = f"The baseline {problem.baseline} has it as parameters of its own."
     return {name: reason for name, reason in reasons.items() if reason}
+
+
+def screened(
+    problem: GapProblem, baseline: Fit, singles: Sequence[Hypothesis], progress: Progress
+) -> dict[Hypothesis, Scan]:
+    """The single effects that these data can show, scanned, their priors cut to visible sizes."""
+    scans: dict[Hypothesis, Scan] = {}
+    for count, hypothesis in enumerate(singles):
+        progress(f"screening {hypothesis.name}", count / len(singles))
+        found = scan(problem, baseline, hypothesis)
+        if found.smallest < NOTHING_SEEN:
+            truncate(problem, found)
+            scans[hypothesis] = found
+    return scans
+
+
+def paired(
+    problem: GapProblem, leader: Fit, scans: Mapping[Hypothesis, Scan]
+) -> dict[Hypothesis, Scan]:
+    """The leader with every other effect: what each does alone is added to the leader's fit."""
+    first = leader.hypothesis
+    pairs = {
+        Hypothesis((*first.effects, *single.effects)): found
+        for single, found in scans.items()
+        if single.name != first.name
+    }
+    return {pair: superposed(problem, leader, found, pair) for pair, found in pairs.items()}
+
+
+def tried_by_screening(
+    problem: GapProblem, before: Fit, scans: Mapping[Hypothesis, Scan]
+) -> tuple[Tried, ...]:
+    """What scans on top of a fit say, the best first, as gains on it to stand beside fits."""
+    nothing = marginal(problem, Hypothesis(), before, np.zeros((1, len(before.predicted))))
+    best = Tried.fitted(before, len(before.z))
+    level = float(nothing.log_likelihood[0])
+    tried = [
+        Tried(
+            hypothesis,
+            before.log_evidence + found.log_evidence - level,
+            best.log_fit + float(found.marginal.log_peak.max()) - level,
+        )
+        for hypothesis, found in scans.items()
+    ]
+    return tuple(sorted(tried, key=lambda each: -each.log_evidence))
+
+
+def hopeful(
+    tried: Sequence[Tried],
+    priors: Sequence[float],
+    coarse: Sequence[bool],
+    rival: float,
+    gap: float,
+    most: int,
+) -> tuple[Tried, ...]:
+    """Those that may come near the likeliest, the best first, at most `most`.
+
+    `priors` are the logarithms of theirs, `rival` the log of prior times evidence of the best so
+    far. A scan of several parameters is `coarse` and may be farther off. The larger the gap (what
+    the best gains in log evidence), the more a scan, which takes it as linear, may be wrong.
+    """
+    weighed = [each.log_evidence + prior for each, prior in zip(tried, priors, strict=True)]
+    order = np.argsort(-np.array(weighed), kind="stable")[:most]
+    best = max([rival, *weighed])
+    own = np.where(coarse, HOPELESS_IF_COARSE, HOPELESS)
+    reach = np.maximum(own, HOPELESS_SHARE * gap)
+    return tuple(tried[i] for i in order if weighed[i] > best - reach[i])
+
+
+def varied(tried: Sequence[Tried], alike: int, most: int) -> tuple[Tried, ...]:
+    """The best by their evidence, at most `most`, and no more than `alike` of one family."""
+    before: Counter[str] = Counter()
+    kept = []
+    for each in sorted(tried, key=lambda each: -each.log_evidence):
+        before[each.hypothesis.name] += 1
+        if before[each.hypothesis.name] <= alike:
+            kept.append(each)
+    return tuple(kept[:most])

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from shm.gap.contract import Design, Fit
 from shm.gap.problem import GapProblem
-from shm.gap.where import identification_sd
+from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, IntArray
 
 _LEAST_SCALE = 0.05

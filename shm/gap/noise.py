@@ -21,8 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
-from shm.gap.repeated import Repeated
-from shm.gap.shapes import turned_modes
+from shm.gap.repeated import Repeated, turned_modes
 from shm.values import FloatArray, IntArray
 
 MODEL_ERROR_SCALE = 2e-5

@@ -13,13 +13,18 @@ from functools import cached_property
 import numpy as np
 
 from shm.gap.contract import Design, Fit, Hypothesis, Observations
-from shm.gap.coordinates import DEVIATIONS, Coordinates, cut
+from shm.gap.coordinates import DEVIATIONS, Coordinates, Pair, Straight, cut
 from shm.gap.flexible import flexible_nodes
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
-from shm.gap.repeated import STRETCHES, Repeated, section_loads, sensor_loads
-from shm.gap.shapes import ShapeScaling, turn_loads
-from shm.gap.straight import Pair, Straight
+from shm.gap.repeated import (
+    STRETCHES,
+    Repeated,
+    ShapeScaling,
+    section_loads,
+    sensor_loads,
+    turn_loads,
+)
 from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Variant, parameters_of

@@ -25,11 +25,10 @@ from scipy.special import logsumexp
 
 from shm.gap.branched import Points, Proposal
 from shm.gap.contract import Fit
-from shm.gap.coordinates import Branch
+from shm.gap.coordinates import Branch, Straight
 from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
-from shm.gap.straight import Straight
 from shm.inference.pool import Pool
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray

@@ -9,22 +9,22 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.chances import Family, Tried, families, log_prior
-from shm.gap.contract import Fit, Hypothesis
+from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
 from shm.gap.fit import baseline_fit, fitted, with_remainder
-from shm.gap.hypotheses import hypotheses, invisible
-from shm.gap.laws import by_its_laws, mixed, otherwise
-from shm.gap.options import GapOptions, Progress
-from shm.gap.predictive import predictive_p_value
-from shm.gap.problem import GapProblem
-from shm.gap.sampled import sampled
-from shm.gap.screening import (
+from shm.gap.hypotheses import (
     STARTS,
     hopeful,
+    hypotheses,
+    invisible,
     paired,
     screened,
     tried_by_screening,
     varied,
 )
+from shm.gap.laws import by_its_laws, mixed, otherwise
+from shm.gap.problem import GapProblem
+from shm.gap.residuals import predictive_p_value
+from shm.gap.sampled import sampled
 from shm.gap.sensitivity import Scan
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray

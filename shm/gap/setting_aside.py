@@ -11,13 +11,19 @@ from itertools import product
 
 import numpy as np
 
-from shm.gap.answer import answered
-from shm.gap.attribution import Attribution, attributed, more_thorough
-from shm.gap.contract import Fit
+from shm.gap.attribution import Attribution, answered, attributed, more_thorough
+from shm.gap.contract import Fit, GapOptions, Progress, silent
 from shm.gap.fit import baseline_fit, with_remainder
-from shm.gap.gross_error import LeftOut, at, log_gross, log_ordinary, without_shape
-from shm.gap.options import GapOptions, Progress, silent
-from shm.gap.outliers import SURE, GrossError, gross_errors
+from shm.gap.outliers import (
+    SURE,
+    GrossError,
+    LeftOut,
+    at,
+    gross_errors,
+    log_gross,
+    log_ordinary,
+    without_shape,
+)
 from shm.gap.problem import GapProblem
 from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 

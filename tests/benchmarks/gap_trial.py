@@ -30,8 +30,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, attributed
+from shm.gap.contract import GapOptions
 from shm.gap.observations import observed
-from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
 from shm.simulate import (
     PLANTED,

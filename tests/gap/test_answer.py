@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shm.gap.answer import answered, possible
-from shm.gap.attribution import Attribution, Explanation
+from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis
 from shm.models.effects import Variant

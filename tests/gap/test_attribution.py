@@ -9,9 +9,8 @@ import pytest
 
 from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind, more_thorough
 from shm.gap.chances import MISSED, Tried
-from shm.gap.contract import Hypothesis
+from shm.gap.contract import GapOptions, Hypothesis
 from shm.gap.observations import observed
-from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from tests.helpers.effects import all_but

@@ -10,13 +10,12 @@ import pytest
 from scipy.special import logsumexp
 
 from shm.gap.contract import Fit, Hypothesis, Observations
-from shm.gap.coordinates import Coordinates
+from shm.gap.coordinates import Coordinates, Straight
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
 from shm.gap.sampled import sampled
 from shm.gap.sensitivity import scan, superposed, truncate
-from shm.gap.straight import Straight
 from shm.models.effects import Parameter, Variant
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy

@@ -12,8 +12,8 @@ from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.laws import EXACT, ByLaws, by_its_laws
 from shm.gap.observations import observed
-from shm.gap.predictive import predictive_p_value
 from shm.gap.problem import GapProblem
+from shm.gap.residuals import predictive_p_value
 from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.simulate.reality import Reality

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import attributed
+from shm.gap.contract import GapOptions
 from shm.gap.diagnose import diagnose
 from shm.gap.observations import observed
-from shm.gap.options import GapOptions
 from shm.gap.problem import GapProblem
 from shm.gap.setting_aside import misnumbered
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign

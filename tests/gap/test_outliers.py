@@ -11,9 +11,8 @@ from scipy import stats
 
 from shm.gap import GapOptions, diagnose
 from shm.gap.fit import baseline_fit
-from shm.gap.gross_error import FREEDOM, GROSS_ERROR, left_out, log_gross, log_ordinary
 from shm.gap.observations import observed
-from shm.gap.outliers import SURE
+from shm.gap.outliers import FREEDOM, GROSS_ERROR, SURE, left_out, log_gross, log_ordinary
 from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign
 from shm.values import Diagnosis, ModalTest

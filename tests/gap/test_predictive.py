@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.gap.predictive import predictive_p_value
+from shm.gap.residuals import predictive_p_value
 from tests.gap import linear_toy as toy
 
 

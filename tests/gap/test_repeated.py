@@ -16,10 +16,10 @@ from shm.gap.repeated import (
     STRETCHES,
     TURN_SD_RAD,
     Repeated,
+    ShapeScaling,
     section_loads,
     section_ways,
 )
-from shm.gap.shapes import ShapeScaling
 from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline
 from shm.models.hanger import PhysicalHanger, Zone, solve

@@ -12,13 +12,12 @@ from scipy.special import logsumexp
 
 from shm.gap.branched import Proposal
 from shm.gap.contract import Hypothesis, Peak
-from shm.gap.coordinates import Branch
+from shm.gap.coordinates import Branch, Straight
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.noise import nodes
 from shm.gap.problem import GapProblem
 from shm.gap.sampled import sampled
 from shm.gap.sensitivity import scan, truncate
-from shm.gap.straight import Straight
 from shm.inference.tmcmc import normalised
 from shm.models.effects import Variant
 from shm.values import ENOUGH_EFFECTIVE, FloatArray

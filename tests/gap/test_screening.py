@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shm.gap.chances import Tried
 from shm.gap.contract import Hypothesis
-from shm.gap.screening import varied
+from shm.gap.hypotheses import varied
 from shm.models.effects import Variant
 
 

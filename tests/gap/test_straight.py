@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.gap.straight import Pair, Straight
+from shm.gap.coordinates import Pair, Straight
 
 PAIR = Pair(0, 2, -1.5, 3.0, 1.1)
 STRAIGHT = Straight([PAIR])

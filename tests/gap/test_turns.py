@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.gross_error import without_shape
 from shm.gap.noise import nodes
 from shm.gap.observations import observed, told_apart
+from shm.gap.outliers import without_shape
 from shm.gap.problem import GapProblem
-from shm.gap.shapes import turn_loads
+from shm.gap.repeated import turn_loads
 from shm.simulate import CampaignPlan, HangerState, campaign
 from shm.values import ModalTest, Mode
 from tests.helpers.hangers import HANGER_3

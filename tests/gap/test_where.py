@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis, Observations
+from shm.gap.residuals import identification_sd, residuals, trends
 from shm.gap.shrinkage import HeldOut
-from shm.gap.trends import trends
-from shm.gap.where import identification_sd, residuals
 from shm.models.effects import Conditions
 from shm.values import NAN, AddedMass
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension

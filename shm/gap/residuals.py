@@ -1,0 +1,209 @@
+"""Where model and measurement differ: the residual of every measured frequency, with which conditions
+it grows, and whether a fitted hypothesis would produce data that lie as far off.
+
+Residuals are weighed by the identification's errors alone, not by the model error that a fit may
+have taken up to live with the gap: else a large gap would look like none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy import stats
+
+from shm.gap.contract import Covariance, Design, Fit, Observations
+from shm.gap.likelihood import ShapeErrors
+from shm.gap.problem import GapProblem
+from shm.gap.shrinkage import HeldOut
+from shm.values import NAN, PLANES, FloatArray, IntArray, Residual, Trend
+
+_LEAST_LEFT = 1e-9
+DRAWS = 100
+
+
+def residuals(
+    problem: GapProblem, before: Fit, after: Fit | None, held_out: HeldOut | None
+) -> tuple[Residual, ...]:
+    """The residual of each frequency from the baseline's fit `before`, in the data's order.
+
+    `z` is the residual over its own standard deviation, which is smaller than the
+    identification's: part of each error is absorbed by the tension and the other free parameters
+    (standardised residual, Cook and Weisberg 1982, 2.1; here with known variances and priors). It
+    equals the z-score of the measurement against a prediction from all other data. Shares are
+    parts of the frequencies' chi-square and add to 1; NaN where there is no misfit at all.
+    """
+    design = problem.observations.design
+    frequencies = design.frequencies
+    deviation = (problem.observations.value - before.predicted)[:frequencies]
+    sd = identification_sd(problem.observations, before if after is None else after)
+    z = deviation / sd[:frequencies] / np.sqrt(unabsorbed(before.slopes, sd)[:frequencies])
+    misfit = (deviation / sd[:frequencies]) ** 2
+    columns = np.column_stack(
+        [
+            np.exp(problem.observations.value[:frequencies]),
+            np.exp(before.predicted[:frequencies]),
+            100 * np.expm1(deviation),
+            z,
+            misfit / misfit.sum() if misfit.sum() > 0 else np.full(frequencies, NAN),
+            _percent(problem.observations, after),
+            *_held_out_percent(frequencies, held_out),
+        ]
+    )
+    named = zip(design.frequency_plane, design.frequency_order, design.frequency_test, strict=True)
+    return tuple(
+        Residual(PLANES[plane], int(order), design.conditions[test].test, *row)
+        for (plane, order, test), row in zip(named, columns.tolist(), strict=True)
+    )
+
+
+def identification_sd(observations: Observations, fit: Fit) -> FloatArray:
+    """Standard deviations (data,); those that nobody gave are what `fit` takes for the errors."""
+    total = np.concatenate([np.diag(fit.noise.frequency), fit.noise.shape_variance])
+    return np.where(np.isfinite(observations.sd), observations.sd, np.sqrt(total))
+
+
+def unabsorbed(slopes: FloatArray, sd: FloatArray) -> FloatArray:
+    """The part (data,) of each datum's error variance that the free parameters do not absorb.
+
+    One less the leverage, for parameters with standard normal priors, `slopes` (data, d) and
+    independent errors `sd` (data,).
+    """
+    weighted = slopes / sd[:, None]
+    covariance = np.linalg.inv(np.eye(slopes.shape[1]) + weighted.T @ weighted)
+    leverage = np.einsum("ij,jk,ik->i", weighted, covariance, weighted)
+    return np.asarray(np.maximum(1 - leverage, _LEAST_LEFT))
+
+
+def _percent(observations: Observations, fit: Fit | None) -> FloatArray:
+    frequencies = observations.design.frequencies
+    if fit is None:
+        return np.full(frequencies, NAN)
+    return 100 * np.expm1((observations.value - fit.predicted)[:frequencies])
+
+
+def _held_out_percent(frequencies: int, held_out: HeldOut | None) -> tuple[FloatArray, FloatArray]:
+    if held_out is None:
+        return np.full(frequencies, NAN), np.full(frequencies, NAN)
+    return held_out.before_percent, held_out.after_percent
+
+
+def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
+    """The trends of the frequency residuals, that with the largest share first.
+
+    Conditions that the tests do not vary are absent. The regression is weighted by the
+    identification's errors. Tests are compared mode by mode (each plane and order has its own
+    mean), so that a test with other modes cannot pass for a trend; orders are compared within a
+    test and plane, planes within an order. Standard deviations allow for what the baseline's
+    parameters have absorbed. The trend over planes is longitudinal less transverse.
+    """
+    frequencies = problem.observations.design.frequencies
+    residual = 100 * (problem.observations.value - before.predicted)[:frequencies]
+    sd = 100 * identification_sd(problem.observations, before)
+    covariance = _left_over(100 * before.slopes, sd, frequencies)
+    found = [
+        _trend(name, values, groups, residual, sd[:frequencies], covariance)
+        for name, values, groups in _conditions(problem.observations.design)
+        if _varies(values, groups)
+    ]
+    return tuple(sorted(found, key=lambda trend: -trend.share))
+
+
+def _conditions(design: Design) -> Iterator[tuple[str, FloatArray, IntArray]]:
+    """Each condition's name, its value at each frequency and the groups it is compared within."""
+    test, plane, order = design.frequency_test, design.frequency_plane, design.frequency_order
+    mode = 2 * order + plane
+    each = design.conditions
+    masses = [0.0 if c.added_mass is None else c.added_mass.mass_kg for c in each]
+    yield "temperature", np.array([c.temperature_shift_k for c in each])[test], mode
+    yield "amplitude", np.array([c.amplitude for c in each])[test], mode
+    yield "added mass", np.array(masses)[test], mode
+    yield "order", order.astype(float), 2 * test + plane
+    yield "plane", plane.astype(float), order
+
+
+def _varies(values: FloatArray, groups: IntArray) -> bool:
+    return any(np.ptp(values[groups == group]) > 0 for group in np.unique(groups))
+
+
+def _trend(
+    name: str,
+    values: FloatArray,
+    groups: IntArray,
+    residual: FloatArray,
+    sd: FloatArray,
+    covariance: FloatArray,
+) -> Trend:
+    weight = 1 / sd**2
+    contrast = _centred(values / np.ptp(values), groups, weight)
+    spread = weight @ contrast**2
+    estimator = weight * contrast / spread
+    slope = float(estimator @ residual)
+    misfit = float(weight @ residual**2)
+    return Trend(
+        condition=name,
+        slope_percent=slope,
+        slope_sd_percent=float(np.sqrt(max(float(estimator @ covariance @ estimator), 0.0))),
+        share=float(slope**2 * spread / misfit) if misfit > 0 else NAN,
+    )
+
+
+def _centred(values: FloatArray, groups: IntArray, weight: FloatArray) -> FloatArray:
+    centred = values.copy()
+    for group in np.unique(groups):
+        rows = groups == group
+        centred[rows] -= np.average(values[rows], weights=weight[rows])
+    return centred
+
+
+def _left_over(slopes: FloatArray, sd: FloatArray, rows: int) -> FloatArray:
+    """Covariance (rows, rows) of the first residuals of a fit with standard normal priors."""
+    weighted = slopes / sd[:, None]
+    information = np.eye(slopes.shape[1]) + weighted.T @ weighted
+    absorbed = slopes[:rows] @ np.linalg.solve(information, slopes[:rows].T)
+    return np.asarray(np.diag(sd[:rows] ** 2) - absorbed)
+
+
+def predictive_p_value(observations: Observations, fit: Fit, noise: Covariance) -> float:
+    """Posterior predictive p-value of the misfit (Gelman, Meng and Stern, Stat. Sinica 6, 1996).
+
+    `noise` is the covariance that the data should have about a right prediction. Three misfits are
+    looked at, each a chi-square: of all frequencies, of each mode's mean frequency over the tests
+    (a gap that repeats drowns in the first) and of the shapes. The smallest p-value is returned,
+    times their number.
+    """
+    residual = observations.value - _predictions(fit)
+    count = observations.design.frequencies
+    misfits = [
+        _p_value(residual[:, :count], noise.frequency, np.eye(count)),
+        _p_value(residual[:, :count], noise.frequency, _means(observations.design)),
+    ]
+    if noise.shape.size:
+        distance = ShapeErrors([noise]).squares(residual[:, count:])[:, 0]
+        misfits.append(float(np.mean(stats.chi2.sf(distance, _freedom(observations.design)))))
+    return min(1.0, len(misfits) * min(misfits))
+
+
+def _predictions(fit: Fit) -> FloatArray:
+    """Of draws of the posterior (draws, data), linearised about its most probable point."""
+    some = fit.draws[:: max(1, len(fit.draws) // DRAWS)]
+    return np.asarray(fit.predicted + (some - fit.z) @ fit.slopes.T)
+
+
+def _p_value(residual: FloatArray, covariance: FloatArray, means: FloatArray) -> float:
+    """The mean p-value of `means` (m, F) of residuals (draws, F) whose covariance is (F, F)."""
+    lower = np.linalg.cholesky(means @ covariance @ means.T)
+    whitened = np.linalg.solve(lower, means @ residual.T)
+    return float(np.mean(stats.chi2.sf(np.sum(whitened**2, axis=0), len(means))))
+
+
+def _freedom(design: Design) -> int:
+    """Of the components of shapes; scaling to unit length takes one from each shape."""
+    return len(design.shape_mode) - len(np.unique(design.shape_mode))
+
+
+def _means(design: Design) -> FloatArray:
+    """Rows (m, F) that average each mode over the tests in which it was measured."""
+    mode = design.frequency_plane * (design.frequency_order.max() + 1) + design.frequency_order
+    rows = (mode == np.unique(mode)[:, None]).astype(float)
+    return np.asarray(rows / rows.sum(axis=1, keepdims=True))
