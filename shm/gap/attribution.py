@@ -1,10 +1,11 @@
 """Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown; what
 is claimed of it, and what stays possible.
 
-Faint second causes beside a large effect may be no more than its own law's error: a real effect does not follow the catalogue to the letter, and the larger it is, the better the data
-show by how much. What is left then often looks like a small effect of another kind. Where the
-second cause of a pair moves the data by little against the first, it counts for the most part as
-the law of the first.
+Faint second causes beside a large effect may be no more than its own law's error: a real effect
+does not follow the catalogue to the letter, and the larger it is, the better the data show by how
+much. What is left then often looks like a small effect of another kind. Where the second cause of a
+pair moves the data by little against the first, it counts for the most part as the law of the
+first.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Where model and measurement differ: the residual of every measured frequency, with which conditions
-it grows, and whether a fitted hypothesis would produce data that lie as far off.
+"""Where model and measurement differ: the residual of every measured frequency, with which
+conditions it grows, and whether a fitted hypothesis would produce data that lie as far off.
 
 Residuals are weighed by the identification's errors alone, not by the model error that a fit may
 have taken up to live with the gap: else a large gap would look like none.
