@@ -20,7 +20,7 @@ from shm.simulate import (
     TestConditions,
     campaign_with_truth,
 )
-from shm.simulate.manufacture import GLOBAL
+from shm.simulate.reality import GLOBAL
 from shm.values import AddedMass, Hanger
 
 LACKS: dict[str, dict[str, Any]] = {

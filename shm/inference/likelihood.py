@@ -20,7 +20,7 @@ from scipy.special import logsumexp
 
 from shm.errors import BadInput
 from shm.models import Model
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
 
 _STEP_IN_SD = 1.2

@@ -1,7 +1,7 @@
 """The model classes of a hanger: parameters to frequencies and shapes.
 
 A new class is one file and one line in `MODELS`; a baseline with effects that a hanger's owner
-adopted is made from its name (see `shm.models.adopted_name`).
+adopted is made from its name (see `shm.models.adopted`).
 """
 
 from __future__ import annotations
@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.errors import UsageError
-from shm.models.adopted import Adopted
+from shm.models.adopted import Adopted, AdoptedName, is_adopted
 from shm.models.adopted import unfit as adopted_unfit
-from shm.models.adopted_name import AdoptedName, is_adopted
 from shm.models.as_made import AsMade
 from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
 from shm.models.composed import AS_DESCRIBED

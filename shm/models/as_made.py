@@ -23,9 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from shm.models.base import DESCRIPTION, Model, silent
+from shm.models.base import DESCRIPTION, Conditions, Model, silent
 from shm.models.beam import Beam, Beam3
-from shm.models.conditions import Conditions
 from shm.values import AddedMass, FloatArray, ModalTest, Plane
 
 TENSION, LENGTH = "theta_F", "theta_L"

@@ -1,19 +1,18 @@
 """What a model class is: named parameters with a prior, and a map from them to frequencies.
 
-What a known mass, clamped on for one test, does to the frequencies of any model class.
+Besides, what a known mass, clamped on for one test, does to the frequencies of any class.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.models.conditions import Conditions
 from shm.models.end_effects import EndWaves
 from shm.models.hanger import PointMass, solve
 from shm.models.turnbuckles import coupled_bar
@@ -24,6 +23,7 @@ Swap = tuple[str, str]
 THESIS, DESCRIPTION = "thesis", "description"
 PRIORS = (DESCRIPTION, THESIS)
 """Ranges made for the hanger of the thesis, an exact description; or what the description says."""
+_NOWHERE = np.empty(0)
 
 
 def silent(fraction: float) -> None:
@@ -194,9 +194,6 @@ class Model:
         return np.array([values[name] for name in self.parameter_names], dtype=float)
 
 
-_NOWHERE = np.empty(0)
-
-
 def laden_ratio(
     hanger: Hanger,
     length_m: FloatArray,
@@ -216,3 +213,21 @@ def laden_ratio(
     laden = replace(bare, masses=(mass,))
     found = [solve(each, modes, _NOWHERE, shapes=False).frequency_hz for each in (laden, bare)]
     return np.asarray(found[0] / found[1])
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What one test was made under, as far as an effect may depend on it.
+
+    `temperature_shift_k` counts from the reference (the mean of the tests), 0 where unknown: the
+    diagnosis says so; `amplitude` is relative to the reference level, 1 where unknown.
+    `tension_shift_n` is by how much the tension read in the test exceeds the mean of all readings,
+    0 where none was read, and `tension_shift_sd_n` the standard deviation of the reading.
+    """
+
+    test: str = ""
+    temperature_shift_k: float = 0.0
+    amplitude: float = 1.0
+    added_mass: AddedMass | None = None
+    tension_shift_n: float = 0.0
+    tension_shift_sd_n: float = 0.0

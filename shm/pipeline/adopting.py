@@ -16,8 +16,7 @@ from shm.errors import NothingThere, UsageError
 from shm.inference import class_probabilities, update
 from shm.inference.options import Progress, silent
 from shm.models import build, class_of
-from shm.models.adopted import variant_of
-from shm.models.adopted_name import AdoptedName
+from shm.models.adopted import AdoptedName, variant_of
 from shm.pipeline.calibrating import options_of
 from shm.pipeline.naming import adopted_name
 from shm.pipeline.terms import update_terms

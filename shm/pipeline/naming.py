@@ -10,6 +10,8 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.models.adopted import (
+    AdoptedEffect,
+    AdoptedName,
     bounds_of,
     in_log,
     missed_by_one_test,
@@ -17,7 +19,6 @@ from shm.models.adopted import (
     places_of,
     variant_of,
 )
-from shm.models.adopted_name import AdoptedEffect, AdoptedName
 from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
 from shm.store import StoredDiagnosis, StoredTest
 from shm.values import Cause, EffectEstimate, Hanger

@@ -18,7 +18,6 @@ from shm.simulate.campaign import (
 )
 from shm.simulate.detectable import at_share, scaled_to, scaled_together, size_of
 from shm.simulate.disturbances import DISTURBANCES, Planted
-from shm.simulate.drawing import drawn_hanger
 from shm.simulate.effects import (
     PLANTED,
     UNLISTED,
@@ -29,10 +28,9 @@ from shm.simulate.effects import (
 )
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import SimulatedTest, hammer_test, simulated_test
-from shm.simulate.manufacture import Deviations, SensorError
 from shm.simulate.plan import CampaignPlan
 from shm.simulate.planted import PlantedModes, planted_modes
-from shm.simulate.reality import Reality
+from shm.simulate.reality import Deviations, Reality, SensorError, drawn_hanger
 from shm.simulate.state import HammerPlan, HangerState, spread_places_m
 
 __all__ = [

@@ -12,10 +12,9 @@ import numpy as np
 
 from shm.simulate.bar import Bar
 from shm.simulate.effects import PlantedEffect, TestConditions
-from shm.simulate.manufacture import Deviations, SensorError, drawn_sensors, drawn_waves
 from shm.simulate.plan import CampaignPlan
 from shm.simulate.planted import PlantedModes, bar_under, planted_modes
-from shm.simulate.reality import sd_factors
+from shm.simulate.reality import Deviations, SensorError, drawn_sensors, drawn_waves, sd_factors
 from shm.simulate.state import HangerState
 from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest, Mode, ShapePoint, TrueFrequency
 

@@ -12,9 +12,8 @@ import numpy as np
 from shm.errors import UsageError
 from shm.simulate.campaign import noiseless
 from shm.simulate.effects import PlantedEffect, ranges_of
-from shm.simulate.manufacture import GLOBAL, Deviations, SensorError, wave_sd
 from shm.simulate.plan import CampaignPlan
-from shm.simulate.reality import sd_factors
+from shm.simulate.reality import GLOBAL, Deviations, SensorError, sd_factors, wave_sd
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger
 

@@ -2,6 +2,7 @@
 
 Each node carries a deflection and a slope; the deflections of both ends are held. Element
 matrices: J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6, 11.3 and 15.2.
+The hanger is pieces of uniform section: the bar and its turnbuckles.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from shm.errors import UsageError
-from shm.simulate.pieces import Piece, pieces_of
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -31,6 +31,7 @@ _LEAST_ELEMENTS_A_PIECE = 16
 _BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float)
 _TENSION = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / 30
 _MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420
+_CLOSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,3 +194,42 @@ def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArr
             remedy="Give a larger tension.",
         )
     return squares, vectors * np.sign(vectors[0])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of a hanger of one section."""
+
+    length_m: float
+    bending_stiffness_n_m2: float
+    mass_per_length_kg_m: float
+
+
+def pieces_of(hanger: Hanger, effective_length_m: float) -> Sequence[Piece]:
+    """The pieces from the deck end up at an effective length.
+
+    Turnbuckles keep their length; the bar between them takes up what the effective length differs
+    from the hanger's own, in proportion.
+    """
+    clear = _gaps(hanger)
+    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
+    stretch = 1 + (effective_length_m - hanger.length_m) / sum(clear)
+    found = []
+    for gap, turnbuckle in zip(clear, [*turnbuckles, None], strict=True):
+        if gap > _CLOSED * hanger.length_m:
+            found.append(
+                Piece(gap * stretch, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
+            )
+        if turnbuckle is not None:
+            mass = turnbuckle.mass_kg / turnbuckle.length_m
+            found.append(Piece(turnbuckle.length_m, turnbuckle.bending_stiffness_n_m2, mass))
+    return found
+
+
+def _gaps(hanger: Hanger) -> list[float]:
+    """Lengths of bar below, between and above the turnbuckles."""
+    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
+    starts = [each.x_m - each.length_m / 2 for each in turnbuckles]
+    ends = [each.x_m + each.length_m / 2 for each in turnbuckles]
+    pairs = zip([0.0, *ends], [*starts, hanger.length_m], strict=True)
+    return [start - end for end, start in pairs]

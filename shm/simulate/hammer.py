@@ -17,17 +17,16 @@ from shm.simulate.disturbances.base import Scene, T, Verb
 from shm.simulate.effects import PlantedEffect, TestConditions
 from shm.simulate.elements import PlaneModes, modes_below, plane_modes
 from shm.simulate.logger import Line, logged
-from shm.simulate.planted_motion import (
+from shm.simulate.planted import (
     by_logger,
     planted_bar,
     planted_plane_modes,
     seen_by_turned,
     shifted,
 )
-from shm.simulate.pulse import force_of, pulse_of
 from shm.simulate.response import accelerations
 from shm.simulate.state import HammerPlan, HangerState, check
-from shm.simulate.strikes import Strike, draw_schedule
+from shm.simulate.strikes import Strike, draw_schedule, force_of, pulse_of
 from shm.values import NAN, PLANES, FloatArray, Hanger, Recording
 
 

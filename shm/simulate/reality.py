@@ -1,15 +1,18 @@
-"""How a simulated campaign departs from the textbook, so that nobody inverts his own model."""
+"""What a hanger really is beside what is written of it: as it is built, as the bar and the sensors
+are, as a campaign departs from the textbook, so that nobody inverts his own model.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shm.simulate.bar import bar_modes, bar_of
+from shm.simulate.bar.description import Bar, Pair, Profile
 from shm.simulate.state import HangerState
 from shm.values import FloatArray, Hanger
 
@@ -19,6 +22,16 @@ if TYPE_CHECKING:
 _HIT = 0.16  # of the length, where a hammer reaches
 _LEAST_SD, _MOST_SD = 0.5, 4.0
 _MERGED = 0.004  # of the frequency: peaks so close overlap, twice the bandwidth at 0.1 % damping
+_POINTS = 33  # of the bar's section along its length
+GLOBAL = ("section", "density", "length", "modulus")
+"""The deviations that a hanger's `Scatter` states."""
+_YIELD_PA = 355e6
+_MODULUS_PA, _DENSITY_KG_M3 = 210e9, 7850.0
+_LENGTH_M = (6.0, 15.0)
+_DIAMETERS_MM = np.arange(80, 141, 5)
+_TENSION_N, _OF_YIELD = (150e3, 900e3), (0.15, 0.5)
+_NOMINAL_OFF = 0.1
+_DAMPING = (0.0005, 0.002)
 
 
 @dataclass(frozen=True)
@@ -78,3 +91,126 @@ def sd_factors(hanger: Hanger, state: HangerState, plan: CampaignPlan) -> FloatA
     least = np.median(seen) / _MOST_SD
     factors = np.median(seen) / np.maximum(seen, least)
     return np.asarray(np.clip(factors, _LEAST_SD, _MOST_SD))
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """By which fractions a bar as made differs from its description.
+
+    Bending stiffness goes with modulus and the square of the section (an area), mass with density
+    and section; turnbuckles keep theirs. A longer bar ends farther from the deck. `section_waves`
+    are amplitudes of the section's cosines along the bar, a half, two halves ... of a wave long.
+    """
+
+    section: float = 0.0
+    density: float = 0.0
+    length: float = 0.0
+    modulus: float = 0.0
+    section_waves: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """How the sensor said to sit at `x_m` errs, in all tests of a campaign.
+
+    It sits `off_m` farther up, its axes (transverse, longitudinal) report `gain` times what they
+    see, and it is turned about the bar from transverse to longitudinal.
+    """
+
+    x_m: float
+    off_m: float = 0.0
+    gain: Pair = (1.0, 1.0)
+    turn_rad: float = 0.0
+
+
+def wave_sd(reality: Reality) -> float:
+    """Of the amplitude of each wave of the section: a cosine's mean square is a half."""
+    return reality.section_sd * math.sqrt(2 / reality.section_waves)
+
+
+def drawn_waves(reality: Reality, rng: np.random.Generator) -> tuple[float, ...]:
+    """Amplitudes of the section's waves."""
+    return tuple(
+        float(wave_sd(reality) * drawn) for drawn in rng.standard_normal(reality.section_waves)
+    )
+
+
+def drawn_sensors(
+    reality: Reality, places_m: tuple[float, ...], rng: np.random.Generator
+) -> tuple[SensorError, ...]:
+    """An error of each sensor."""
+    gain = 1 + reality.gain_sd * rng.standard_normal((len(places_m), 2))
+    off = reality.place_sd_m * rng.standard_normal(len(places_m))
+    turn = reality.turn_sd_rad * rng.standard_normal(len(places_m))
+    return tuple(
+        SensorError(place, float(off[i]), (float(gain[i, 0]), float(gain[i, 1])), float(turn[i]))
+        for i, place in enumerate(places_m)
+    )
+
+
+def as_made(bar: Bar, by: Deviations) -> Bar:
+    """The bar with its deviations."""
+    bending = (1 + by.modulus) * (1 + by.section) ** 2
+    mass = (1 + by.section) * (1 + by.density)
+    own = bar.bending_stiffness_n_m2
+    made = replace(
+        bar,
+        arch_end_m=bar.deck_end_m + bar.length_m * (1 + by.length),
+        bending_stiffness_n_m2=(own[0] * bending, own[1] * bending),
+        mass_per_length_kg_m=bar.mass_per_length_kg_m * mass,
+        stretches=tuple(
+            replace(
+                each,
+                stiffness_factor=(
+                    each.stiffness_factor[0] / bending,
+                    each.stiffness_factor[1] / bending,
+                ),
+                mass_factor=each.mass_factor / mass,
+            )
+            for each in bar.stretches
+        ),
+    )
+    return replace(made, profiles=(_wavy(made, by.section_waves),)) if by.section_waves else made
+
+
+def _wavy(bar: Bar, waves: tuple[float, ...]) -> Profile:
+    share = np.linspace(0, 1, _POINTS)
+    order = np.arange(1, len(waves) + 1)
+    section: FloatArray = 1 + np.cos(np.pi * np.outer(share, order)) @ np.array(waves)
+    return Profile(
+        tuple(bar.deck_end_m + bar.length_m * share),
+        tuple((float(each**2), float(each**2)) for each in section),
+        tuple(float(each) for each in section),
+    )
+
+
+def drawn_hanger(rng: np.random.Generator, *, number: int = 1) -> tuple[Hanger, HangerState]:
+    """A steel rod of 6 to 15 m and 80 to 140 mm, clamped, with its true tension.
+
+    That is 150 to 900 kN and 0.15 to 0.5 of the yield force of S355 steel, log-uniform between the
+    tighter of both. The nominal tension is off by 10 % and rounded to 1 kN, lengths to 0.1 m.
+    Damping is 0.05 to 0.2 %, log-uniform.
+    """
+    diameter_m = float(rng.choice(_DIAMETERS_MM)) / 1000
+    area_m2 = math.pi * diameter_m**2 / 4
+    low, high = np.log(_tensions_n(area_m2))
+    tension_n = float(np.exp(rng.uniform(low, high)))
+    nominal_n = 1e3 * round(tension_n * math.exp(_NOMINAL_OFF * rng.standard_normal()) / 1e3)
+    hanger = Hanger(
+        id=number,
+        length_m=round(float(rng.uniform(*_LENGTH_M)), 1),
+        elastic_modulus_pa=_MODULUS_PA,
+        area_m2=area_m2,
+        second_moment_m4=math.pi * diameter_m**4 / 64,
+        mass_per_length_kg_m=_DENSITY_KG_M3 * area_m2,
+        nominal_tension_n=nominal_n,
+        diameter_m=diameter_m,
+    )
+    damping = float(np.exp(rng.uniform(*np.log(_DAMPING))))
+    return hanger, replace(HangerState(tension_n), damping_ratio=damping)
+
+
+def _tensions_n(area_m2: float) -> tuple[float, float]:
+    """From the lowest to the highest for a section."""
+    yields_n = _YIELD_PA * area_m2
+    return max(_TENSION_N[0], _OF_YIELD[0] * yields_n), min(_TENSION_N[1], _OF_YIELD[1] * yields_n)

@@ -18,8 +18,8 @@ from shm.simulate.campaign import CampaignTruth, bar_in_test, realised
 from shm.simulate.effects import PlantedEffect
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import struck
-from shm.simulate.manufacture import SensorError
 from shm.simulate.plan import CampaignPlan
+from shm.simulate.reality import SensorError
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Channel, FloatArray, Hanger, ModalTest, Plane, Recording
 

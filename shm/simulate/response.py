@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from shm.simulate.elements import PlaneModes
-from shm.simulate.pulse import Pulse, samples_of
+from shm.simulate.strikes import Pulse, samples_of
 from shm.values import PLANES, ComplexArray, FloatArray, Plane
 
 _MODES_AT_ONCE = 16

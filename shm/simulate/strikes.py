@@ -1,14 +1,25 @@
-"""When, where and how hard the hammer strikes, and from when to when the record runs."""
+"""When, where and how hard the hammer strikes, from when to when the record runs, and the pulses as
+an anti-aliased logger sees them, on a grid finer than its samples.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import cast
 
 import numpy as np
+from scipy.signal import firwin, kaiserord
 
 from shm.simulate.state import HammerPlan
-from shm.values import NAN, Hanger, Plane
+from shm.values import NAN, FloatArray, Hanger, IntArray, Plane
+
+_LEAST_STEPS = 32
+_STEPS_PER_PULSE = 16
+_PASS, _STOP = 0.4, 0.5  # of the sampling rate
+_STOP_BAND_DB = 100.0
 
 
 @dataclass(frozen=True)
@@ -64,3 +75,63 @@ def draw_schedule(hanger: Hanger, plan: HammerPlan, rng: np.random.Generator) ->
         for start, peak in zip(starts, level, strict=True)
     )
     return Schedule(strikes, 0.0, plan.samples / plan.sampling_rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A blow in the record: `fine_n` (samples, steps + 1) holds its force at the steps of each
+    sample interval.
+
+    `first` is the sample of the recording at which the first row begins; it may lie before 0.
+    """
+
+    strike: Strike
+    first: int
+    fine_n: FloatArray
+
+
+def pulse_of(strike: Strike, sampling_rate_hz: float) -> Pulse:
+    """The force of a blow, low-passed by the logger."""
+    steps = _steps(strike.seconds * sampling_rate_hz)
+    taps = _filter(steps)
+    half = len(taps) // 2
+    rate = sampling_rate_hz * steps
+    origin = math.floor(strike.start_s * sampling_rate_hz)
+    rows = math.ceil(strike.seconds * sampling_rate_hz) + 1
+    phase = ((origin * steps + np.arange(rows * steps)) / rate - strike.start_s) / strike.seconds
+    raw = strike.peak_n * np.where((phase >= 0) & (phase <= 1), np.sin(np.pi * phase), 0.0)
+    fine = np.append(np.convolve(raw, taps), 0.0)
+    first_of_rows = np.arange(0, len(fine) - steps, steps)
+    return Pulse(
+        strike, origin - half // steps, fine[first_of_rows[:, None] + np.arange(steps + 1)]
+    )
+
+
+def samples_of(pulse: Pulse, samples: int) -> tuple[IntArray, FloatArray]:
+    """Which of the recording's samples a pulse touches, and the force at them."""
+    places = pulse.first + np.arange(len(pulse.fine_n))
+    inside = (places >= 0) & (places < samples)
+    return places[inside], pulse.fine_n[inside, 0]
+
+
+def force_of(pulses: Sequence[Pulse], samples: int) -> FloatArray:
+    """The force over time, (samples,)."""
+    force = np.zeros(samples)
+    for pulse in pulses:
+        places, values = samples_of(pulse, samples)
+        force[places] += values
+    return force
+
+
+def _steps(samples: float) -> int:
+    """Fine steps a sample, an even number: enough for the filter and for the pulse's shape."""
+    return max(_LEAST_STEPS, 2 * math.ceil(_STEPS_PER_PULSE / samples / 2))
+
+
+@cache
+def _filter(steps: int) -> FloatArray:
+    """Linear-phase low-pass of the logger: flat to 0.4, closed from 0.5 of the sampling rate."""
+    count, beta = kaiserord(_STOP_BAND_DB, (_STOP - _PASS) * 2 / steps)
+    half = math.ceil(count / (2 * steps)) * steps
+    cutoff = (_PASS + _STOP) / steps
+    return cast(FloatArray, firwin(2 * half + 1, cutoff, window=("kaiser", beta)))

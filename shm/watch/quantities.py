@@ -20,8 +20,8 @@ from scipy.interpolate import PchipInterpolator
 
 from shm.errors import UsageError
 from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
+from shm.models.base import Conditions
 from shm.models.beam import Beam
-from shm.models.conditions import Conditions
 from shm.values import (
     PLANES,
     TENSION,

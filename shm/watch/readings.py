@@ -32,7 +32,7 @@ from scipy.special import chdtri
 
 from shm.errors import BadInput
 from shm.models import Model, class_of, described
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import (
     PLANES,
     TENSION,

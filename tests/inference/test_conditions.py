@@ -10,7 +10,7 @@ import pytest
 from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
 from shm.models import THESIS, Model, build
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.simulate import HangerState, TestConditions, planted_modes
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3

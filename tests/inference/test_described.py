@@ -15,7 +15,7 @@ from shm.inference.priors import Calibration, EndDetails, calibration_of, readin
 from shm.inference.problem import Problem
 from shm.models import AsMade, build
 from shm.models.as_made import RESTRAINT
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import (
     NAN,
     PLANES,

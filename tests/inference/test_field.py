@@ -11,7 +11,7 @@ from shm.errors import BadInput
 from shm.inference.field import TAU_LOWER, TAU_UPPER, TAU_USUAL, FieldLikelihood
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import build
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
 

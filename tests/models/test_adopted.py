@@ -9,8 +9,7 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.models import PRIORS, Model, applicable, build, competing_names, described
-from shm.models.adopted import missed_by_one_test, places_of
-from shm.models.adopted_name import AdoptedEffect, AdoptedName
+from shm.models.adopted import AdoptedEffect, AdoptedName, missed_by_one_test, places_of
 from shm.models.effects import EFFECTS, Variant
 from shm.values import AddedMass, ModalTest, Scatter
 from tests.helpers.hangers import HANGER_3

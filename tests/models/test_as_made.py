@@ -9,7 +9,7 @@ import pytest
 
 from shm.models import THESIS, AsMade, build, described
 from shm.models.as_made import BENDING_FACTOR, RESTRAINT, SHEAR_SHARE, TENSION_RATIO
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import AddedMass, FloatArray, Hanger, Scatter, Turnbuckle
 from tests.helpers.hangers import HANGER_3
 

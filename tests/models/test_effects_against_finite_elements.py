@@ -24,7 +24,7 @@ from shm.simulate import (
     planted_modes,
 )
 from shm.simulate.effects import ranges_of, where_of
-from shm.simulate.manufacture import GLOBAL
+from shm.simulate.reality import GLOBAL
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, Turnbuckle
 
 PLACES = (1.56, 3.48, 5.4, 7.92)

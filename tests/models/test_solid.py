@@ -11,9 +11,8 @@ import pytest
 from shm.models.base import silent
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.models.solid.affine import natural_modes
-from shm.models.solid.assembly import assembled
+from shm.models.solid.assembly import Mesh, assembled
 from shm.models.solid.basis import transverse_basis
-from shm.models.solid.mesh import Mesh
 from shm_cli import thesis
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.timoshenko import clamped_frequencies_hz

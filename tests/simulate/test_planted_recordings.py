@@ -17,7 +17,7 @@ from shm.simulate import (
     planted_modes,
     simulated_test,
 )
-from shm.simulate.planted_motion import planted_bar, planted_plane_modes
+from shm.simulate.planted import planted_bar, planted_plane_modes
 from shm.values import AddedMass, FloatArray, Hanger, Recording
 
 STATE = HangerState(711e3)

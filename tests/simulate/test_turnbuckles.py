@@ -10,8 +10,7 @@ from scipy.optimize import brentq
 
 from shm.errors import UsageError
 from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
-from shm.simulate.elements import modes_below
-from shm.simulate.pieces import pieces_of
+from shm.simulate.elements import modes_below, pieces_of
 from shm.values import Hanger, Turnbuckle
 
 MIDDLE = Turnbuckle(x_m=6.0, length_m=0.5, mass_kg=400.0, bending_stiffness_n_m2=5e7)

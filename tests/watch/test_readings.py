@@ -13,7 +13,7 @@ from scipy import stats
 
 from shm.errors import BadInput
 from shm.models import described
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.values import (
     NAN,
     AddedMass,

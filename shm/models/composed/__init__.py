@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from shm.models.composed.baseline import AS_DESCRIBED, Baseline
+from shm.models.composed.baseline import (
+    AS_DESCRIBED,
+    DEVIATIONS,
+    Baseline,
+    Deviation,
+    deviations_of,
+    scattered,
+)
 from shm.models.composed.hanger import ComposedHanger
-from shm.models.composed.scatter import DEVIATIONS, Deviation, deviations_of, scattered
 
 __all__ = [
     "AS_DESCRIBED",

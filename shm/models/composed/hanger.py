@@ -8,8 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from shm.models.composed.baseline import Baseline
-from shm.models.composed.scatter import DEVIATIONS, deviations_of, scattered
+from shm.models.composed.baseline import DEVIATIONS, Baseline, deviations_of, scattered
 from shm.models.effects import EFFECTS, Conditions, Parameter, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, PointMass, solve
 from shm.values import AddedMass, FloatArray, Hanger

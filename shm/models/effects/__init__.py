@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.effects.catalogue import EFFECTS
 from shm.models.effects.owner import check_effect_priors, parameters_of

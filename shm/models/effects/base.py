@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import AddedMass, FloatArray, Hanger, Plane
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.models.effects import places
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import LateralSpring, PhysicalHanger

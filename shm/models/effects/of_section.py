@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.models.effects import places
 from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone

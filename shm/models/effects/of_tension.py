@@ -6,15 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.conditions import Conditions
+from shm.models.base import Conditions
 from shm.models.effects import places, scales
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
-from shm.models.effects.levels import missing_levels
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
 _LEAST_RANGE_K = 1.0
 _STEEL_EXPANSION_1_K = 1.2e-5
+_DYING = 1.5
+_LOSS_AT_REFERENCE_LEVEL = 0.1
+_SLIP = 0.5
+_LEAST_RATIO = 1.2
 
 
 class TemperatureTension(Effect):
@@ -71,9 +74,6 @@ def _range(temperatures_c: tuple[float, ...]) -> float:
     return max(temperatures_c) - min(temperatures_c)
 
 
-_DYING = 1.5
-
-
 class GeometricHardening(Effect):
     """Swinging widely stretches the hanger and raises its mean tension with the amplitude squared.
 
@@ -120,10 +120,6 @@ class GeometricHardening(Effect):
         power = _DYING if variant.law else 2.0
         factor = 1 + values[:, 0] * conditions.amplitude**power
         return replace(physical, tension_n=physical.tension_n * factor)
-
-
-_LOSS_AT_REFERENCE_LEVEL = 0.1
-_SLIP = 0.5
 
 
 class JointSoftening(Effect):
@@ -231,3 +227,11 @@ class Sag(Effect):
         parameter[:, list(variant.planes)] += values[:, :1]
         as_it_bends = physical.sags_as_it_bends or variant.law == 1
         return replace(physical, sag_parameter=parameter, sags_as_it_bends=as_it_bends)
+
+
+def missing_levels(survey: Survey) -> str:
+    """Why an effect of the amplitude cannot be seen; empty where the levels differ enough."""
+    levels = survey.amplitudes
+    if levels and max(levels) >= _LEAST_RATIO * min(levels):
+        return ""
+    return "It takes tests at two known levels, one at least 1.2 times the other."

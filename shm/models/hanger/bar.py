@@ -12,12 +12,13 @@ from shm.models.hanger.functions import (
     DECK_SLOPE,
     HERMITE,
     SHEAR_ENDS,
+    Kinks,
     Table,
     hermite,
+    normalised,
     polynomials,
     shear_strains,
 )
-from shm.models.hanger.kinks import Kinks, normalised
 from shm.values import FloatArray, IntArray
 
 _RIDGE = 1e-10

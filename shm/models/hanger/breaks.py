@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shm.models.hanger.bar import Bar, Counts, Spans, broken_bar, uniform_bar
-from shm.models.hanger.kinks import Kinks
+from shm.models.hanger.functions import Kinks
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import FloatArray
 

@@ -19,8 +19,7 @@ import numpy as np
 from shm.models.hanger.breaks import stiffness_ratio
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import PhysicalHanger
-from shm.models.hanger.springs import are_coupled, rotational_n_m_rad
-from shm.models.hanger.swings import Swing
+from shm.models.hanger.supports import Swing, are_coupled, rotational_n_m_rad
 from shm.models.hanger.system import System
 from shm.values import BoolArray, FloatArray, IntArray
 

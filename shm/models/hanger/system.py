@@ -14,8 +14,7 @@ from shm.models.hanger.bar import Bar
 from shm.models.hanger.breaks import along, stiffness_ratio
 from shm.models.hanger.functions import DEFLECTIONS, HERMITE, SLOPES
 from shm.models.hanger.physical import PhysicalHanger
-from shm.models.hanger.springs import bending_unit, rotational_n_m_rad
-from shm.models.hanger.swings import Swing, on_swings, swings
+from shm.models.hanger.supports import Swing, bending_unit, on_swings, rotational_n_m_rad, swings
 from shm.values import FloatArray, IntArray
 
 _RIGID_IN_SHEAR = 1e12

@@ -24,10 +24,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from shm.models.solid.geometry import Geometry
-from shm.models.solid.material import Material
-from shm.models.solid.projected import TARGET_ERROR, Projected, Reduction
-from shm.models.solid.support import Support
+from shm.models.solid.geometry import Geometry, Material, Support
+from shm.models.solid.reduction import TARGET_ERROR, Projected, Reduction
 from shm.values import FloatArray, Plane
 
 if TYPE_CHECKING:

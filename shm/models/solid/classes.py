@@ -11,13 +11,14 @@ import numpy as np
 from shm.errors import BadInput
 from shm.models.base import Model, silent
 from shm.models.solid.basis import Description, transverse_basis
-from shm.models.solid.geometry import Fineness, Geometry
-from shm.models.solid.material import Material
-from shm.models.solid.support import (
+from shm.models.solid.geometry import (
     ALL_SPRINGS,
     AXIAL,
     AXIAL_SPRINGS,
     FIXED,
+    Fineness,
+    Geometry,
+    Material,
     Support,
     face_springs_n_m_rad,
 )

@@ -1,4 +1,4 @@
-"""A small basis that stands for the solid model over its whole prior box.
+"""A small basis that stands for the solid model over its whole prior box, and the model on it.
 
 Modes of the full model at a few points of the box span a reservoir. It is compressed by proper
 orthogonal decomposition in the energy of a reference stiffness (Kunisch and Volkwein 2001), and
@@ -17,7 +17,6 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
-from shm.models.solid.projected import TARGET_ERROR, Projected, Reduction
 from shm.values import BoolArray, FloatArray
 
 _REFERENCE_SPRING_N_M = 1e8
@@ -28,6 +27,8 @@ _MOST_CORNERS = 128
 _MOST_POINTS = 200
 _GOOD_IN_A_ROW = 10
 _SHARE_OF_TARGET = 0.25
+TARGET_ERROR = 1e-4
+"""In frequency, over the whole prior box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,3 +201,48 @@ def _smallest(
         if error < (1 - _SHARE_OF_TARGET) * TARGET_ERROR:
             break
     return basis, projected, error
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """K(theta) on a basis whose mass matrix is the unit matrix.
+
+    `matrices` (2 + springs, n, n): stiffness, initial stress of 1 N, springs of 1 N/m per node.
+    """
+
+    matrices: FloatArray
+
+    @property
+    def unknowns(self) -> int:
+        return int(self.matrices.shape[1])
+
+    def stiffness(self, points: FloatArray) -> FloatArray:
+        """K (m, n, n) at points (m, 1 + springs) of tension in N and log10 k."""
+        factors = np.column_stack([np.ones(len(points)), points[:, :1], 10 ** points[:, 1:]])
+        flat = self.matrices.reshape(len(self.matrices), -1)
+        square = (len(points), self.unknowns, self.unknowns)
+        return np.asarray((factors @ flat).reshape(square))
+
+    def frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
+        """The lowest frequencies (m, modes) at points (m, 1 + springs)."""
+        eigenvalues = np.linalg.eigvalsh(self.stiffness(points))[:, :modes]
+        return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
+
+    def mode(self, point: FloatArray, order: int) -> FloatArray:
+        """The coordinates (n,) of one mode at a point (1 + springs,)."""
+        return np.asarray(np.linalg.eigh(self.stiffness(point[None])[0])[1][:, order - 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A projected system and how it was found.
+
+    `deflections` (points, n) are its vectors along the hanger's axis at `axis_m`; `solutions` of
+    the full model were needed; `estimated_error` is the worst against the reservoir.
+    """
+
+    projected: Projected
+    axis_m: FloatArray
+    deflections: FloatArray
+    solutions: int
+    estimated_error: float

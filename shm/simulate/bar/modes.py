@@ -1,22 +1,19 @@
-"""Modes of a bar: each plane by itself, or both together where an end couples them.
-
-Frequencies of a bar on which something acts for a part of each mode's time only.
+"""Modes of a bar, to be read at any place: each plane by itself, or both together where an end
+couples them; also where something acts for a part of each mode's time only.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from shm.simulate.bar.description import Bar, BarEnd
-from shm.simulate.bar.mesh import mesh_of
-from shm.simulate.bar.parts import Beyond, Pair, Ringing, Spring
+from shm.simulate.bar.description import Bar, BarEnd, Beyond, Pair, Ringing, Spring
+from shm.simulate.bar.mesh import interpolation, mesh_of
 from shm.simulate.bar.problem import Solved, solved
-from shm.simulate.bar.shapes import BarModes
 from shm.values import BoolArray, FloatArray, IntArray
 
 # The frequency of a Hermite element errs by (wave number x size)^4/1440, 2e-6 in the highest mode;
@@ -25,6 +22,8 @@ _LEAST_ELEMENTS = 160
 _ELEMENTS_PER_MODE = 24
 _TIMES_FOR_SHEAR = 3
 _SPARE_MODES = 4
+_MEAN_RINGING = 0.757  # of n/(n + 1) for n from 1 to 8
+_BEND_OVER = 1e-3  # of the length: the second difference of a shape
 
 
 def bar_modes(
@@ -176,10 +175,6 @@ def _chosen(found: Solved, nodes_m: FloatArray, kept: IntArray) -> BarModes:
     )
 
 
-_MEAN_RINGING = 0.757  # of n/(n + 1) for n from 1 to 8
-_BEND_OVER = 1e-3  # of the length: the second difference of a shape
-
-
 def alternatives(bar: Bar) -> Iterator[Bar]:
     """The bar without what acts part-time, then with each of these for good."""
     plain = replace(bar, part_time=())
@@ -227,3 +222,32 @@ def _beyond(own: BarModes, plane: int, when: Beyond) -> FloatArray:
     reach = np.maximum(most / most.max(), 1e-9) if most.max() > 0 else np.full_like(most, 1e-9)
     part = np.arccos(np.minimum(1.0, when.threshold / reach)) / np.pi
     return np.asarray(2 * part if when.both_sides else part)
+
+
+@dataclass(frozen=True, eq=False)
+class BarModes:
+    """Modes that belong to one plane, mass-normalised, ascending.
+
+    `angular_frequency_rad_s` (modes,); `nodes_m` (nodes,); `deflection` and `rotation` (planes,
+    nodes, modes) in kg^-1/2 and kg^-1/2/m; `added_damping_ratio` (modes,) is what joints add.
+    """
+
+    angular_frequency_rad_s: FloatArray
+    nodes_m: FloatArray
+    deflection: FloatArray
+    rotation: FloatArray
+    added_damping_ratio: FloatArray
+
+    def at(self, places_m: Sequence[float]) -> FloatArray:
+        """Deflections, (places, planes, modes); 0 beyond the ends."""
+        places = np.asarray(places_m, float)
+        beyond = (places < self.nodes_m[0]) | (places > self.nodes_m[-1])
+        element, weights = interpolation(self.nodes_m, np.where(beyond, self.nodes_m[0], places))
+        ends = (
+            self.deflection[:, element],
+            self.rotation[:, element],
+            self.deflection[:, element + 1],
+            self.rotation[:, element + 1],
+        )
+        seen = np.einsum("wx,wpxm->xpm", weights, np.array(ends))
+        return np.where(beyond[:, None, None], 0.0, seen)

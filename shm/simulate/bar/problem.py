@@ -15,10 +15,8 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from shm.errors import UsageError
-from shm.simulate.bar.description import Bar, BarEnd
-from shm.simulate.bar.elements import load_of, mass_of, stiffness_of
-from shm.simulate.bar.mesh import Mesh, interpolation, slopes
-from shm.simulate.bar.parts import Attached
+from shm.simulate.bar.description import Attached, Bar, BarEnd
+from shm.simulate.bar.mesh import Mesh, interpolation, load_of, mass_of, slopes, stiffness_of
 from shm.values import FloatArray
 
 

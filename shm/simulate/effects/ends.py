@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shm.simulate.bar.description import Bar, BarEnd
-from shm.simulate.bar.parts import Pair, Stretch
+from shm.simulate.bar.description import Bar, BarEnd, Pair, Stretch
 from shm.simulate.effects.along import in_planes
 from shm.simulate.effects.base import Range, Scene, Where
 from shm.values import Hanger

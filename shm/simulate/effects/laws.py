@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.simulate.bar.description import Bar
-from shm.simulate.bar.parts import Mass, PartTime, Profile, Ringing
+from shm.simulate.bar.description import Bar, Mass, PartTime, Profile, Ringing
 from shm.simulate.effects import along, ends
 from shm.simulate.effects.along import in_planes
 from shm.simulate.effects.base import Scene

@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shm.simulate.bar.description import Bar
+from shm.simulate.bar.description import Attached, Bar
 from shm.simulate.bar.modes import bar_modes
-from shm.simulate.bar.parts import Attached
 from shm.simulate.effects.base import Range, Scene, Where
 from shm.values import Hanger
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shm.simulate.bar.description import Bar
-from shm.simulate.bar.parts import Mass
+from shm.simulate.bar.description import Bar, Mass
 from shm.simulate.effects.base import Range, Scene, Where
 from shm.values import Hanger
 
