@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shm.api.tests import Tests, modal_tests
+from shm.api.reading import Tests, modal_tests
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
 from shm.gap.contract import silent

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shm.api.tests import Tests, modal_tests
+from shm.api.reading import Tests, modal_tests
 from shm.inference import METHODS, Progress, UpdateOptions, updating
 from shm.models import DESCRIPTION, build, competing_names
 from shm.settings import load_settings

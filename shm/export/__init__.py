@@ -6,8 +6,7 @@ in the attributes of a DataTree and in the names of a table's columns.
 
 from __future__ import annotations
 
-from shm.export.tables import modes, samples
 from shm.export.tree import datatree
-from shm.export.writing import FORMATS, check_format, write
+from shm.export.writing import FORMATS, check_format, modes, samples, write
 
 __all__ = ["FORMATS", "check_format", "datatree", "modes", "samples", "write"]

@@ -29,7 +29,7 @@ from shm.gap.coordinates import Branch, Straight
 from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape, log_normal
 from shm.gap.problem import GapProblem
-from shm.inference.pool import Pool
+from shm.inference.mixture import Pool
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
 

@@ -2,7 +2,7 @@
 
 It gives the evidence without the bias and the scatter of the stages, with the error of a plain
 mean, and independent weighted draws of the posterior. Each trial batch is drawn from a mixture
-refitted to all trials before (`shm.inference.pool`). The weights of draws that were fitted
+refitted to all trials before (`shm.inference.mixture`). The weights of draws that were fitted
 to are too small, so that the answer rests on fresh draws from the last mixture alone. Shares of it
 come from the prior (Hesterberg 1995, defensive mixture) and from the sampler's earlier, wider
 stages: no weight is unbounded.
@@ -24,8 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.inference.mixture import TMixture
-from shm.inference.pool import Pool
+from shm.inference.mixture import Pool, TMixture
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, carried
 from shm.inference.tmcmc import effective, normalised, systematic

@@ -17,10 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.inference.hint import Hint
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.problem import Points, Problem
-from shm.inference.search import Anchors
+from shm.inference.search import Anchors, Hint
 from shm.values import FloatArray, IntArray
 
 _TARGET_VARIATION = 2.0

@@ -9,14 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.inference.hint import Hint, hinted
 from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
 from shm.inference.priors import reading_of
 from shm.inference.problem import Problem
-from shm.inference.search import search
+from shm.inference.search import Hint, hinted, search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
 from shm.models import THESIS, AsMade, Model

@@ -19,11 +19,10 @@ from shm.errors import BadInput
 from shm.read import assemble, responses
 from shm.read.arrays import Arrays, Variable, arranged
 from shm.read.base import Peek
-from shm.read.guard import guarded
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, quantity_named
-from shm.read.limits import limits, refuse_large, refuse_many_samples
+from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples
 from shm.read.sidecar import channels_described, with_sidecar
-from shm.read.timebase import REMEDY, evened, rate_of
+from shm.read.table import REMEDY, evened, rate_of
 from shm.read.units import accelerance_si, unit_of
 from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Recording
 

@@ -36,8 +36,7 @@ from shm.read.comma_header import Heading, parse_heading
 from shm.read.content import is_text, text_of
 from shm.read.header import mass_entries
 from shm.read.sidecar import with_sidecar
-from shm.read.table import parse_table, rows_in
-from shm.read.timebase import REMEDY, evened, rate_of
+from shm.read.table import REMEDY, evened, parse_table, rate_of, rows_in
 from shm.read.units import ACCELERANCE, SI
 from shm.values import NAN, Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 

@@ -1,15 +1,20 @@
-"""How much one file may hold, stated once; readers check it before they allocate."""
+"""How much one file may hold, stated once and checked before it is allocated, and what parsers of
+others raise on damaged files, as one refusal.
+"""
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 
-from shm.errors import BadInput
+import numpy as np
+
+from shm.errors import BadInput, ShmError
 from shm.settings import Settings
 
 _SPLIT = "Split the record, or leave out what is not needed."
@@ -99,3 +104,26 @@ def too_large(path: Path) -> BadInput:
         file=path,
         remedy=_SPLIT,
     )
+
+
+@contextmanager
+def guarded(path: Path, what: str = "the file") -> Iterator[None]:
+    """Turns whatever a parser raises or warns of within the context into a BadInput."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("error")
+            yield
+    except ShmError:
+        raise
+    except MemoryError as error:
+        raise BadInput(
+            f"{what} needs more memory than is given to one file.",
+            file=path,
+            remedy="Export a small file again; split a long one, or raise parse_memory_bytes.",
+        ) from error
+    except Exception as error:
+        raise BadInput(
+            f"{what} cannot be read: its structure is damaged or of an unknown kind.",
+            file=path,
+            remedy="Export or send it again.",
+        ) from error

@@ -29,15 +29,13 @@ import scipy.io
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_layout import layout_of
 from shm.read.array_reading import peeker, reader
-from shm.read.arrays import Arrays, Variable
+from shm.read.arrays import Arrays, Variable, layout_of
 from shm.read.atomic import replace_file
 from shm.read.base import Format
 from shm.read.content import bytes_of
-from shm.read.guard import guarded
-from shm.read.hdf5_tree import opened_nodes, variables
-from shm.read.limits import limits, refuse_large
+from shm.read.hdf5_file import opened_nodes, variables
+from shm.read.limits import guarded, limits, refuse_large
 from shm.values import FrequencyResponse, Recording
 
 _VERSION_5, _VERSION_7_3 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"

@@ -18,14 +18,12 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput, UsageError
-from shm.read.array_layout import layout_of
 from shm.read.array_reading import peeker, reader
-from shm.read.arrays import Arrays, Variable
+from shm.read.arrays import Arrays, Variable, layout_of
 from shm.read.atomic import replace_file
 from shm.read.base import Format
-from shm.read.guard import guarded
-from shm.read.limits import refuse_large
-from shm.read.packed import checked_members
+from shm.read.content import checked_members
+from shm.read.limits import guarded, refuse_large
 from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x93NUMPY"

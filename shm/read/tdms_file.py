@@ -17,13 +17,19 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
 from nptdms.log import log_manager
 
 from shm.errors import BadInput
-from shm.read.array_layout import Layout, NamedArray, layout_of
 from shm.read.array_reading import peeker, reader
-from shm.read.arrays import Arrays, Variable, attributes_of, named_apart
+from shm.read.arrays import (
+    Arrays,
+    Layout,
+    NamedArray,
+    Variable,
+    attributes_of,
+    layout_of,
+    named_apart,
+)
 from shm.read.atomic import replace_file
 from shm.read.base import Format
-from shm.read.guard import guarded
-from shm.read.limits import refuse_large
+from shm.read.limits import guarded, refuse_large
 from shm.values import FrequencyResponse, Recording
 
 log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words

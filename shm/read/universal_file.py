@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.read import assemble, universal_frf, universal_marks
+from shm.read import assemble, universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, Peek, PeekChannel
 from shm.read.header import Header
@@ -104,7 +104,7 @@ def recording(content: Content, path: Path) -> Recording:
     if not sets:
         assemble.refuse_quantities([], path)
     _refuse_different(sets, path)
-    values = np.array([universal_marks.sign(found.response[2]) * _real(found) for found in sets])
+    values = np.array([universal_frf.sign(found.response[2]) * _real(found) for found in sets])
     header = _header(sets, content, path)
     return assemble.recording(header, values, path, _rate(sets))
 
@@ -121,11 +121,11 @@ def peek(content: Content, file_format: str, path: Path) -> Peek:
 def sets_of(recording: Recording) -> list[dict[str, Any]]:
     """The data sets of a recording for pyuff."""
     places = [channel.x_m for channel in recording.channels]
-    nodes = universal_marks.number_nodes(places)
+    nodes = universal_frf.number_nodes(places)
     rate = recording.sampling_rate_hz
-    sets = universal_marks.node_set(places, nodes)
+    sets = universal_frf.node_set(places, nodes)
     for channel, node in zip(recording.channels, nodes, strict=True):
-        lines = universal_marks.id_lines(recording, channel.name, {"sampling_rate_hz": rate})
+        lines = universal_frf.id_lines(recording, channel.name, {"sampling_rate_hz": rate})
         sets.append(
             {
                 **lines,
@@ -133,7 +133,7 @@ def sets_of(recording: Recording) -> list[dict[str, Any]]:
                 "func_type": TIME_RESPONSE,
                 "rsp_ent_name": channel.name[:10],
                 "rsp_node": node,
-                "rsp_dir": universal_marks.direction(channel.plane),
+                "rsp_dir": universal_frf.direction(channel.plane),
                 "ref_node": 0,
                 "ref_dir": 0,
                 "ord_data_type": _DOUBLE,
@@ -156,15 +156,15 @@ def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header
     if not sets:
         return with_sidecar(Header(path, {}), path)
     channels = {
-        name: universal_marks.channel_entries(found, *found.response[1:], content, path)
+        name: universal_frf.channel_entries(found, *found.response[1:], content, path)
         for name, found in zip(_names(sets, path), sets, strict=True)
     }
-    return with_sidecar(Header(path, channels, universal_marks.entries(sets[0], path)), path)
+    return with_sidecar(Header(path, channels, universal_frf.entries(sets[0], path)), path)
 
 
 def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
-    own = [found.lines[0] for found in sets if universal_marks.facts(found)]
+    own = [found.lines[0] for found in sets if universal_frf.facts(found)]
     if len(own) == len(sets):
         _refuse_doubles(own, sets, path)
         return own

@@ -1,28 +1,49 @@
-"""Frequency responses of a UFF file and `FrequencyResponse`, each made from the other."""
+"""Frequency responses of a UFF file and `FrequencyResponse`, each made from the other.
+
+Our own files say more in places that the format leaves free: the first id line holds the channel's
+name; id lines that begin with `shm` hold `key=value` pairs. In such files the x axis runs along the
+hanger, y is transverse and z longitudinal, and nodes (type 2411) hold the places of sensors. Files
+of others say none of this: their sidecar must.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shm.documents import format_time
 from shm.errors import BadInput
-from shm.read import assemble, universal_marks
+from shm.read import assemble
 from shm.read.base import Peek, PeekChannel
-from shm.read.header import Header
+from shm.read.header import KEYS, Entry, Header, mass_entries
 from shm.read.sidecar import with_sidecar
 from shm.read.units import accelerance_si
 from shm.read.universal_sets import COHERENCE, FREQUENCY_RESPONSE, Content, FunctionSet
-from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+from shm.values import (
+    NAN,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Plane,
+    Recording,
+    ResponsePoint,
+)
 
 _ACCELERATION, _EXCITATION, _FREQUENCY, _EVEN = 12, 13, 18, 1
 _UNIT = "m/s2/N"
 _STEP = "frequency_step_hz"
 _OFF_GRID = 0.01
 _SAME_STEP = 1e-4
+_MARK = "shm"
+_NODES = 2411
+_AXES: dict[int, Plane] = {2: "transverse", 3: "longitudinal"}
+_DIRECTIONS: dict[Plane | None, int] = {"transverse": 2, "longitudinal": 3, None: 0}
+_MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"]
 
 
 def response_sets(content: Content) -> list[FunctionSet]:
@@ -74,8 +95,8 @@ def peek(content: Content, file_format: str, path: Path) -> Peek:
 def sets_of(response: FrequencyResponse) -> list[dict[str, Any]]:
     """The data sets of frequency responses, and their coherences, for pyuff."""
     places = [point.x_m for point in response.points]
-    nodes = universal_marks.number_nodes(places)
-    sets = universal_marks.node_set(places, nodes)
+    nodes = number_nodes(places)
+    sets = node_set(places, nodes)
     for index, node in enumerate(nodes):
         own = _set(response, index, node)
         sets.append({**own, "func_type": FREQUENCY_RESPONSE, "data": response.accelerance[index]})
@@ -90,11 +111,11 @@ def _set(response: FrequencyResponse, index: int, node: int) -> dict[str, Any]:
     point = response.points[index]
     step = float(response.frequency_hz[1] - response.frequency_hz[0])
     return {
-        **universal_marks.id_lines(response, point.name, {_STEP: step}),
+        **id_lines(response, point.name, {_STEP: step}),
         "type": 58,
         "rsp_ent_name": point.name[:10],
         "rsp_node": node,
-        "rsp_dir": universal_marks.direction(point.plane),
+        "rsp_dir": direction(point.plane),
         "ref_node": 0,
         "ref_dir": 0,
         "abscissa_spacing": _EVEN,
@@ -126,9 +147,9 @@ def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header
     roving_hammer = len(references) > 1
     channels = {}
     for number, found in enumerate(sets, start=1):
-        name = found.lines[0] if universal_marks.facts(found) else f"point_{number}"
+        name = found.lines[0] if facts(found) else f"point_{number}"
         _, node, direction = found.reference if roving_hammer else found.response
-        said = universal_marks.channel_entries(found, node, direction, content, path)
+        said = channel_entries(found, node, direction, content, path)
         channels[name] = {key: entry for key, entry in said.items() if key != "unit"}
     if len(channels) < len(sets):
         raise BadInput(
@@ -136,7 +157,7 @@ def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header
             file=path,
             remedy="Give each its own first id line.",
         )
-    return with_sidecar(Header(path, channels, universal_marks.entries(sets[0], path)), path)
+    return with_sidecar(Header(path, channels, entries(sets[0], path)), path)
 
 
 def _frequencies(sets: Sequence[FunctionSet], path: Path) -> tuple[int, FloatArray]:
@@ -164,7 +185,7 @@ def _frequencies(sets: Sequence[FunctionSet], path: Path) -> tuple[int, FloatArr
 def _step(found: FunctionSet) -> float:
     """The step in Hz, with all its digits where the file is ours."""
     try:
-        own = float(universal_marks.facts(found).get(_STEP, math.nan))
+        own = float(facts(found).get(_STEP, math.nan))
     except ValueError:
         return found.step
     return own if abs(own - found.step) < _SAME_STEP * found.step else found.step
@@ -180,7 +201,7 @@ def _accelerance(found: FunctionSet, name: str, path: Path) -> ComplexArray:
             channel=name,
             remedy="Export accelerances, in m/s2 or g over N, kN or lbf.",
         )
-    direction = universal_marks.sign(found.response[2], found.reference[2])
+    direction = sign(found.response[2], found.reference[2])
     values: ComplexArray = np.asarray(found.data, dtype=complex) * complex(factor * direction)
     assemble.refuse_implausible(np.abs(values), name, path)
     return values
@@ -197,3 +218,107 @@ def _coherence(sets: Sequence[FunctionSet], content: Content, skipped: int) -> F
     if any(row is None for row in rows):
         return None
     return np.pad(np.array(rows, float), ((0, 0), (skipped, 0)), constant_values=np.nan)
+
+
+def facts(found: FunctionSet) -> dict[str, str]:
+    """The pairs of a set's id lines; empty for files of others."""
+    words = [word for line in found.lines if line.startswith(f"{_MARK} ") for word in line.split()]
+    return dict(word.split("=", 1) for word in words if "=" in word)
+
+
+def entries(found: FunctionSet, path: Path) -> dict[str, Entry]:
+    """Hanger, time, temperature and sampling rate, as far as a set says them."""
+    own = {key: Entry(value, path) for key, value in facts(found).items() if key in KEYS}
+    moment = _date(found.lines[2])
+    if "time" in own or moment is None:
+        return own
+    return {**own, "time": Entry(moment.isoformat(), path)}
+
+
+def channel_entries(
+    found: FunctionSet, node: int, direction: int, content: Content, path: Path
+) -> dict[str, Entry]:
+    """Unit, and in our own files place and plane, of the set at a node."""
+    said: dict[str, Any] = {"unit": found.unit}
+    if facts(found):
+        said["plane"] = _AXES.get(abs(direction), "")
+        said["x_m"] = content.nodes[node][0] if node in content.nodes else ""
+    return {key: Entry(value, path) for key, value in said.items()}
+
+
+def sign(*directions: int) -> float:
+    """-1 where an odd number of directions runs against its axis."""
+    return float(np.prod([-1.0 if direction < 0 else 1.0 for direction in directions]))
+
+
+def id_lines(
+    described: Recording | FrequencyResponse, name: str, own: dict[str, float]
+) -> dict[str, str]:
+    """The id lines of a set of ours."""
+    time = described.time
+    moment = [f"time={format_time(time)}"] if time else []
+    moment += [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]
+    known = {"hanger": described.hanger, "temperature_c": described.temperature_c, **own}
+    pairs = [f"{key}={value}" for key, value in known.items() if _is_known(value)]
+    return {
+        "id1": name,
+        "id2": "hammer test of a hanger",
+        "id3": _date_text(time) if time else "NONE",
+        "id4": " ".join([_MARK, *moment]) if moment else "NONE",
+        "id5": " ".join([_MARK, "format=1", *pairs]),
+    }
+
+
+def _is_known(value: float | None) -> bool:
+    return value is not None and not math.isnan(value)
+
+
+def direction(plane: Plane | None) -> int:
+    return _DIRECTIONS[plane]
+
+
+def number_nodes(places_m: Sequence[float]) -> list[int]:
+    """A node number for each place, the same for equal places, from 1."""
+    numbers: dict[object, int] = {}
+    keys = [("unknown", i) if math.isnan(x) else x for i, x in enumerate(places_m)]
+    return [numbers.setdefault(key, len(numbers) + 1) for key in keys]
+
+
+def node_set(places_m: Sequence[float], nodes: Sequence[int]) -> list[dict[str, Any]]:
+    """The data set of nodes whose place is known; none where no place is."""
+    known = {node: x for node, x in zip(nodes, places_m, strict=True) if not math.isnan(x)}
+    if not known:
+        return []
+    zeros = [0] * len(known)
+    return [
+        {
+            "type": _NODES,
+            "node_nums": list(known),
+            "def_cs": zeros,
+            "disp_cs": zeros,
+            "color": zeros,
+            "x": list(known.values()),
+            "y": zeros,
+            "z": zeros,
+        }
+    ]
+
+
+def _date(text: str) -> datetime | None:
+    """A date such as 18-Apr-16 13:49:58, taken as UTC; None for any other text."""
+    day, _, clock = text.partition(" ")
+    parts = day.split("-")
+    if len(parts) != 3 or parts[1].title() not in _MONTHS:
+        return None
+    month = _MONTHS.index(parts[1].title()) + 1
+    try:
+        year = int(parts[2]) + (2000 if len(parts[2]) == 2 else 0)
+        hour, minute, second = (int(part) for part in clock.strip().split(":"))
+        return datetime(year, month, int(parts[0]), hour, minute, second, tzinfo=UTC)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _date_text(time: datetime) -> str:
+    utc = time.astimezone(UTC)
+    return f"{utc:%d}-{_MONTHS[utc.month - 1]}-{utc:%y %H:%M:%S}"

@@ -15,10 +15,13 @@ All is derived from the sequence of tests, so that the same tests give the same 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
+from typing import Any, Literal
 
+from shm.errors import BadInput
 from shm.values import (
     Alert,
     AlertKind,
@@ -26,6 +29,7 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
+    Moved,
     Posterior,
     Reading,
     WatchedTest,
@@ -33,11 +37,14 @@ from shm.values import (
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
-from shm.watch.told import Told, Way
 from shm.watch.wording import message_of, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
+_ENDS_BELOW = 0.5
+_LONGEST_TEST = 80
+_DIGITS = 12
+_BEYOND: AlertKind = "beyond threshold"
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +139,6 @@ def _options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> W
     own = hanger.thresholds.false_call_years
     limit_years = options.limit_years if own is None else own
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
-
-
-_ENDS_BELOW = 0.5
-_LONGEST_TEST = 80
-_DIGITS = 12
-_BEYOND: AlertKind = "beyond threshold"
 
 
 @dataclass(frozen=True)
@@ -298,3 +299,61 @@ def _short(name: str) -> str:
     if len(name) <= _LONGEST_TEST:
         return name
     return f"{name[:_LONGEST_TEST]}-{hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]}"
+
+
+Way = Literal["up", "down"]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
+
+    `called` are the changes that were called, told or not: after a call the sequential test speaks
+    of a further change, no longer of that one.
+    """
+
+    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+    call: datetime | None = None
+    called: tuple[Change, ...] = ()
+
+    def to_text(self) -> str:
+        """JSON, from which `from_text` makes an equal one."""
+        return json.dumps(
+            {
+                "beyond": [[*condition, at] for condition, at in self.beyond.items()],
+                "call": self.call,
+                "called": [asdict(change) for change in self.called],
+            },
+            default=datetime.isoformat,
+        )
+
+    @classmethod
+    def from_text(cls, text: str) -> Told:
+        """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
+        if not text:
+            return cls()
+        try:
+            kept = json.loads(text)
+            return cls(
+                {(quantity, way): _time(at) for quantity, way, at in kept["beyond"]},
+                kept["call"] and _time(kept["call"]),
+                tuple(_change(each) for each in kept["called"]),
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise BadInput(
+                f"what was told of a hanger cannot be read: {error!r}.",
+                remedy="Go over the hanger's tests from its baseline on.",
+            ) from error
+
+
+def _time(text: str) -> datetime:
+    return datetime.fromisoformat(text)
+
+
+def _change(entry: dict[str, Any]) -> Change:
+    moved = tuple(
+        Moved(**{**each, **{name: tuple(each[name]) for name in ("alike", "together")}})
+        for each in entry["moved"]
+    )
+    times = {name: _time(entry[name]) for name in ("began_after", "began_by")}
+    return Change(**{**entry, **times, "moved": moved})

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shm.inference import UpdateOptions, select, update
-from shm.inference.hint import hinted
 from shm.inference.likelihood import Likelihood
 from shm.inference.problem import Problem
+from shm.inference.search import hinted
 from shm.models import THESIS, build
 from shm.models.beam import Beam2
 from shm.values import Posterior

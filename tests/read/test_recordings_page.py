@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from shm.read import FORMATS, peek, read, sidecar_path
+from shm.read.content import MOST_MEMBERS
 from shm.read.limits import Limits
-from shm.read.packed import MOST_MEMBERS
 from shm.read.units import unit_of
 from shm.values import FrequencyResponse, Recording
 from shm_cli.main import run

@@ -10,8 +10,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
-from shm.watch.told import Told
-from shm.watch.watching import after, alerts_of, new_alert
+from shm.watch.watching import Told, after, alerts_of, new_alert
 from shm.watch.wording import shift_words
 from tests.helpers.hangers import HANGER_3
 

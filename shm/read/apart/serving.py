@@ -23,11 +23,10 @@ from shm.modes_document import modes_document
 from shm.read.apart.answers import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.apart.asking import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.apart.confinement import Confinement, confine, pythons_own
+from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large
-from shm.read.modes_file import load_modes
-from shm.read.packed import unpacking_in
 from shm.read.sidecar import sidecar_path
-from shm.read.whole_test import peek_test, read_test
+from shm.read.whole_test import load_modes, peek_test, read_test
 
 _LARGEST_REQUEST = 1 << 16
 

@@ -1,4 +1,6 @@
-"""Everything that may have moved, with its probability: all explanations at all noise scales."""
+"""Everything that may have moved, with its probability: all explanations at all noise scales, a
+fraction common to all hangers or to all of one logger among them.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,6 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.values import FloatArray, IntArray
-from shm.watch.neighbours.alike import AlikeCause
 from shm.watch.neighbours.evidence import (
     Bridge,
     Weighed,
@@ -26,6 +27,9 @@ from shm.watch.neighbours.nouns import ExplanationName, HangerShift, NeighbourOp
 # Both of two equal losses stand among the likeliest single ones.
 _FIRST_OF_TWO = 3
 _NOBODY: IntArray = np.empty((0, 0), np.int64)
+_SWING_K = 5.0
+_SPREAD = 0.2
+_FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,3 +146,79 @@ def _pairs(logs_of_one: FloatArray, count: int) -> IntArray:
     """Pairs (p, 2) of hangers of which one is among the likeliest to have shed load by itself."""
     first = logsumexp(logs_of_one.reshape(-1, count), axis=0).argsort()[-_FIRST_OF_TWO:].tolist()
     return np.array([(i, j) for i in first for j in range(count) if i < j or j not in first])
+
+
+@dataclass(frozen=True, eq=False)
+class AlikeCause:
+    """A common cause: the fractions (n,) that it moves hangers by, largest about 1; what to do."""
+
+    fractions: FloatArray
+    name: str
+    remedy: str
+
+
+def alike_causes(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
+    """Every common cause that the data could tell from another.
+
+    All by one fraction; each as its temperature went, where those differ; each logger's hangers,
+    where there are several loggers. A rate that is off by e moves frequencies by e, tensions by 2e.
+    """
+    return (_common(shifts), *_by_temperature(shifts), *_by_logger(shifts))
+
+
+def _common(shifts: Sequence[HangerShift]) -> AlikeCause:
+    changes = _changes(shifts)
+    everywhere = np.ones(len(shifts))
+    clocks = "compare the loggers' clocks and sampling rates"
+    if _swing(changes) < _SWING_K:
+        return AlikeCause(
+            everywhere,
+            "a clock or a load on the whole deck",
+            f"the temperatures hardly changed; {clocks}, and ask for new surfacing or works",
+        )
+    if np.isfinite(changes).all() and changes.std() <= _SPREAD * _swing(changes):
+        return AlikeCause(
+            everywhere,
+            "a temperature or a clock",
+            f"all tests lie about {changes.mean():+.0f} K from their baselines; "
+            f"check the temperature readings, and {clocks}",
+        )
+    return AlikeCause(
+        everywhere,
+        "a temperature or a clock",
+        f"{clocks}, and the temperatures of the tests",
+    )
+
+
+def _by_temperature(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
+    changes = _changes(shifts)
+    swing = _swing(changes)
+    if not (swing >= _SWING_K and changes.std() > _SPREAD * swing):
+        return ()
+    remedy = "the shifts go with the temperatures of the tests; check those readings"
+    return (AlikeCause(changes / np.abs(changes).max(), "the temperature", remedy),)
+
+
+def _by_logger(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
+    names = np.array([each.logger for each in shifts])
+    known = sorted({name for name in names.tolist() if name})
+    if len(set(names.tolist())) < 2:
+        return ()
+    return tuple(
+        AlikeCause(
+            (names == name).astype(float),
+            f"logger {name}",
+            f"only hangers of logger {name} moved; check its clock, sampling rate and sensors",
+        )
+        for name in known
+        if np.count_nonzero(names == name) >= _FEWEST
+    )
+
+
+def _changes(shifts: Sequence[HangerShift]) -> FloatArray:
+    return np.array([each.temperature_change_k for each in shifts])
+
+
+def _swing(changes: FloatArray) -> float:
+    """Root mean square of the changes in K; NaN where one is unknown."""
+    return float(np.sqrt(np.mean(changes**2)))

@@ -13,9 +13,8 @@ from scipy.special import logsumexp
 
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray
-from shm.watch.neighbours.alike import AlikeCause, alike_causes
 from shm.watch.neighbours.evidence import Bridge
-from shm.watch.neighbours.hypotheses import Part, hypotheses
+from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
 from shm.watch.neighbours.nouns import (
     NINETY_PERCENT,
     BridgePattern,

@@ -17,10 +17,8 @@ import numpy as np
 
 from shm.values import BoolArray, FloatArray, IntArray
 from shm.watch.options import WatchOptions
-from shm.watch.sequential.design import Design
-from shm.watch.sequential.directions import Direction
+from shm.watch.sequential.design import Design, Direction, Measurement
 from shm.watch.sequential.filtering import Filters, Sight, update, update_new
-from shm.watch.sequential.measurement import Measurement
 
 STEP, RAMP = 0, 1
 KINDS = 2

@@ -27,7 +27,7 @@ from shm.values import (
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import coordinate_of, shift_of, value_at
 from shm.watch.sequential.bank import STEP, Bank, log_total
-from shm.watch.sequential.measurement import DAYS_PER_YEAR
+from shm.watch.sequential.design import DAYS_PER_YEAR
 
 _ALIKE_NATS = 3.0
 _TAIL = 0.05

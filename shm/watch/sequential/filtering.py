@@ -19,8 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.values import FloatArray, IntArray
-from shm.watch.sequential.directions import Direction
-from shm.watch.sequential.measurement import Measurement
+from shm.watch.sequential.design import Direction, Measurement
 
 _WIDER = 10.0
 _TAIL = 2.0

@@ -18,10 +18,8 @@ import numpy as np
 from shm.errors import BadInput
 from shm.values import FloatArray
 from shm.watch.sequential.bank import Bank, Beginning
-from shm.watch.sequential.design import Design
-from shm.watch.sequential.directions import Direction
+from shm.watch.sequential.design import Design, Direction, Warmth
 from shm.watch.sequential.filtering import Filters
-from shm.watch.sequential.measurement import Warmth
 
 
 @dataclass(frozen=True, eq=False)
