@@ -56,6 +56,10 @@ class Explanation:
         return self.best.hypothesis.name
 
     @property
+    def is_pair(self) -> bool:
+        return len(self.best.hypothesis.effects) > 1
+
+    @property
     def log_occam(self) -> float:
         return self.log_bayes_factor - self.log_fit
 
@@ -130,7 +134,7 @@ def more_thorough(found: Attribution) -> Attribution:
         tried = search.with_every_effect(tried)
         if search.calls_for_pairs(tried):
             tried = search.with_many_pairs(tried)
-    elif found.leading is None or " + " not in found.leading.effect:
+    elif found.leading is None or not found.leading.is_pair:
         return found
     return _weighed(search, search.with_other_pairs(tried))
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
+from shm.values.diagnosis import joined
 
 Method: TypeAlias = Literal["screened", "normal", "sampled"]
 """How far a hypothesis was taken: linearised, by Laplace's method, by importance sampling."""
@@ -119,14 +120,19 @@ class Hypothesis:
     flexible: bool = False
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names; none for the baseline."""
+        return tuple(name for name, _ in self.effects)
+
+    @property
     def name(self) -> str:
-        """The effects' names, joined by ` + `; empty for the baseline."""
-        return " + ".join(name for name, _ in self.effects)
+        """The effects' names as one; empty for the baseline."""
+        return joined(self.names)
 
     @property
     def at(self) -> str:
-        """Where the effects act, joined by ` + `."""
-        return " + ".join(variant.at for _, variant in self.effects)
+        """Where the effects act, as one."""
+        return joined(variant.at for _, variant in self.effects)
 
 
 @dataclass(frozen=True, eq=False)

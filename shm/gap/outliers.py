@@ -74,7 +74,7 @@ class GrossError:
 def believed(attribution: Attribution) -> list[Believed]:
     """No gap, something unknown, and every explanation that was fitted, at each place."""
     causes = attribution.explanations
-    variants = {each.effect: len(each.variants) for each in causes if " + " not in each.effect}
+    variants = {each.effect: len(each.variants) for each in causes if not each.is_pair}
     tried = [each for each in attribution.tried if each.hypothesis.effects]
     plain = [each.fit for each in tried if each.fit and not each.hypothesis.flexible]
     fits = [attribution.baseline, attribution.unexplained, *plain]

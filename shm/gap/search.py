@@ -110,7 +110,7 @@ class Search:
         best = self._likeliest(tried)
         while len(best.effects) > 1 and best not in seen and len(seen) < MOST_ROUNDS:
             seen.add(best)
-            tried = self._with_pairs_of(self._parts(best, tried), tried, best.name)
+            tried = self._with_pairs_of(self._parts(best, tried), tried, best.names)
             best = self._likeliest(tried)
         return tried
 
@@ -127,7 +127,7 @@ class Search:
         return [*(each.fit for each in alone if each.fit is not None), *new.values()]
 
     def _with_pairs_of(
-        self, fits: Sequence[Fit], tried: list[Tried], kind: str = ""
+        self, fits: Sequence[Fit], tried: list[Tried], kind: tuple[str, ...] = ()
     ) -> list[Tried]:
         """Adds the pairs of fitted effects that stand a chance, and all of a `kind`, fitted."""
         best = families(tried, self.variants)[0]
@@ -135,7 +135,7 @@ class Search:
         single = max(each.log_evidence for each in tried if not each.hypothesis.flexible)
         scans, rough = self._pairs(fits, tried)
         hopeful = self._hopeful(scans, rough, single, rival, MOST_PAIRS)
-        of_kind = [each for each in rough if _same_effects(each.hypothesis.name, kind)]
+        of_kind = [each for each in rough if sorted(each.hypothesis.names) == sorted(kind)]
         chosen = tuple(dict.fromkeys([*hopeful, *of_kind]))
         return self._with_fitted_pairs(tried, scans, chosen)
 
@@ -336,10 +336,6 @@ class Search:
 def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
     names = [each.name for each in singles]
     return {name: names.count(name) for name in names}
-
-
-def _same_effects(pair: str, other: str) -> bool:
-    return sorted(pair.split(" + ")) == sorted(other.split(" + "))
 
 
 def _new(pairs: Mapping[Hypothesis, Scan], known: Set[Hypothesis]) -> dict[Hypothesis, Scan]:

@@ -91,7 +91,7 @@ def _led_before(first: Attribution, last: Attribution) -> str:
     Pairs are none: among many there always is one that takes a gross error for its own.
     """
     led, leads = first.leading, last.leading
-    if led is None or " + " in led.effect or (leads and leads.effect == led.effect):
+    if led is None or led.is_pair or (leads and leads.effect == led.effect):
         return ""
     return effect_label(led.effect, led.best.hypothesis.at)
 

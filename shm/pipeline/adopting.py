@@ -22,6 +22,7 @@ from shm.pipeline.naming import adopted_name
 from shm.pipeline.terms import update_terms
 from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredSelection, Workspace
 from shm.values import Hanger
+from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown
 
 
@@ -142,8 +143,8 @@ def _adoption(
         hanger=hanger.id,
         model=str(name),
         baseline_model=name.baseline,
-        effect=" + ".join(each.effect for each in name.effects),
-        at=" + ".join(variant_of(each, hanger).at for each in name.effects),
+        effect=joined(each.effect for each in name.effects),
+        at=joined(variant_of(each, hanger).at for each in name.effects),
         why=wish.why,
         who=wish.who,
         gap_before_percent=gaps[0],

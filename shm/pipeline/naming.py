@@ -126,7 +126,7 @@ def _part(
 
 
 def _place_in(cause: Cause, effect: str) -> str:
-    return dict(zip(cause.effects, cause.at.split(" + "), strict=True))[effect]
+    return dict(zip(cause.effects, cause.places, strict=True))[effect]
 
 
 def _estimates(effect: str, cause: Cause) -> dict[str, EffectEstimate]:

@@ -15,9 +15,8 @@ from shm.errors import BadInput, UsageError
 from shm.read.arrays import natural
 from shm.read.atomic import replace_file
 from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
-from shm.read.guard import guarded
 from shm.read.header import CHANNEL_KEYS, Header
-from shm.read.limits import limits
+from shm.read.limits import guarded, limits
 from shm.read.sidecar import document_beside, sidecar_path, with_sidecar
 
 SUFFIX = ".zip"

@@ -17,8 +17,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from shm.errors import BadInput
 from shm.read.base import Format
-from shm.read.guard import guarded
-from shm.read.limits import limits, too_large
+from shm.read.limits import guarded, limits, too_large
 
 _HEAD_BYTES = 4096
 _MAGIC: tuple[tuple[bytes, str], ...] = (

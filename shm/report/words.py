@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.report.content import Interval
+from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
 
 _LONGEST_NAME = 24
@@ -155,7 +156,7 @@ def meaning(name: str, model: str) -> str:
 def model_class(name: str) -> str:
     """`beam1 + point mass (deck end)` of an adopted class's name, whose ranges are left out."""
     baseline, *effects = name.split("+")
-    return " + ".join([baseline, *(_adopted(effect.partition(":")[0]) for effect in effects)])
+    return joined([baseline, *(_adopted(effect.partition(":")[0]) for effect in effects)])
 
 
 def _adopted(effect: str) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from shm.values.kinds import NAN, Plane
 
 Leads = Literal["cause", "no gap", "unexplained"]
+_AND = " + "
 
 NO_GAP_STANDS_FROM = 0.05
 """A gap is not shown while no gap keeps this probability, what a 95 % interval leaves out: many
@@ -18,6 +20,16 @@ def effect_label(effect: str, at: str) -> str:
     """`sag (longitudinal)` of an effect and where it acts; everywhere goes without saying."""
     place = at.removeprefix("everywhere").removeprefix(", ")
     return effect.replace("_", " ") + (f" ({place})" if place else "")
+
+
+def joined(names: Iterable[str]) -> str:
+    """Names of the effects of a pair, or places of them, as one text."""
+    return _AND.join(names)
+
+
+def parted(name: str) -> tuple[str, ...]:
+    """The names that `joined` made one."""
+    return tuple(name.split(_AND))
 
 
 def leads(no_gap: float, unexplained: float, claim: float) -> Leads:
@@ -123,7 +135,17 @@ class Cause:
     @property
     def effects(self) -> tuple[str, ...]:
         """The effects of the catalogue that it holds, one or two."""
-        return tuple(self.effect.split(" + "))
+        return parted(self.effect)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Where each of its effects acts."""
+        return self.each_at(self.at)
+
+    def each_at(self, at: str) -> tuple[str, ...]:
+        """Where each of its effects acts, by `at`; one place is that of both."""
+        found = parted(at)
+        return found if len(found) == len(self.effects) else (at,) * len(self.effects)
 
 
 @dataclass(frozen=True)

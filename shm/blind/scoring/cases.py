@@ -25,6 +25,7 @@ from shm.values import (
     TrueCase,
     TrueFrequency,
 )
+from shm.values.diagnosis import joined
 
 SURE = 0.9
 """An effect named with more than this is a statement that somebody may act on."""
@@ -105,7 +106,7 @@ def _blank(truth: TrueCase) -> CaseScore:
         richness=truth.richness,
         way=truth.way,
         size=truth.size,
-        planted=" + ".join(effect.name for effect in truth.effects) or NOTHING,
+        planted=joined(effect.name for effect in truth.effects) or NOTHING,
         leader="",
         leading_probability=0.0,
         right=False,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from shm.report import words
 from shm.report.diagnosis.sizes import Sizes
 from shm.values import Cause, EffectEstimate, effect_label
+from shm.values.diagnosis import joined
 
 _PLACES = {
     "everywhere": "",
@@ -82,17 +83,15 @@ def title(effect: str) -> str:
 
 def label(cause: Cause) -> str:
     """`rotational end flexibility (both ends)`, for tables and figures."""
-    parts = zip(cause.effects, _ats(cause.at, cause), strict=True)
-    return " + ".join(effect_label(effect, at) for effect, at in parts)
+    parts = zip(cause.effects, cause.places, strict=True)
+    return joined(effect_label(effect, at) for effect, at in parts)
 
 
 def phrase(cause: Cause) -> str:
     """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
     clauses = [
         _clause(effect, at, own_estimates(cause, number))
-        for number, (effect, at) in enumerate(
-            zip(cause.effects, _ats(cause.at, cause), strict=True)
-        )
+        for number, (effect, at) in enumerate(zip(cause.effects, cause.places, strict=True))
     ]
     return " together with ".join(clauses) + _also(cause)
 
@@ -102,7 +101,7 @@ def _also(cause: Cause) -> str:
     if not cause.also_at:
         return ""
     places = [
-        " and ".join(_place(part) or "everywhere" for part in _ats(at, cause))
+        " and ".join(_place(part) or "everywhere" for part in cause.each_at(at))
         for at in cause.also_at[:_MOST_PLACES]
     ]
     return f" (about as likely: {words.listed(places)})"
@@ -126,12 +125,6 @@ def _place(at: str) -> str:
 def _place_part(part: str) -> str:
     start = _PLACE_STARTS.get(part.partition(" ")[0])
     return _PLACES.get(part, f"{start} {part}" if start else part)
-
-
-def _ats(at: str, cause: Cause) -> tuple[str, ...]:
-    """Where each effect of the cause acts, by `at`."""
-    ats = tuple(at.split(" + "))
-    return ats if len(ats) == len(cause.effects) else (at,) * len(cause.effects)
 
 
 def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:

@@ -13,6 +13,7 @@ from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import judged, large
 from shm.values import CaseScore, TrialScore
+from shm.values.diagnosis import parted
 
 _NOTHING, _TWO, _UNKNOWN = "nothing", "two effects", "not in the catalogue"
 _NO_GAP, _PAIR, _UNEXPLAINED, _FAILED = "no gap", "a pair", "unexplained", "failed"
@@ -27,7 +28,7 @@ def _row(case: CaseScore) -> str:
 def _column(case: CaseScore) -> str:
     if case.failure:
         return _FAILED
-    return _PAIR if " + " in case.leader else case.leader
+    return _PAIR if len(parted(case.leader)) > 1 else case.leader
 
 
 def _counts(score: TrialScore) -> tuple[list[str], list[str], Counter[tuple[str, str]]]:
