@@ -13,7 +13,7 @@ from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.words import model_class
 from shm.store import Store, StoredAdoption
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -36,7 +36,7 @@ _who_option = click.option("--who", show_default="the user's name", help="For th
     "effects",
     multiple=True,
     required=True,
-    shell_complete=completers.effects,
+    shell_complete=completion.effects,
     help="May be given twice.",
 )
 @click.option("--at", multiple=True, show_default="likeliest of the diagnosis", help="Where.")
@@ -44,7 +44,7 @@ _who_option = click.option("--who", show_default="the user's name", help="For th
     "--baseline",
     default="",
     show_default="of the diagnosis",
-    shell_complete=completers.models,
+    shell_complete=completion.models,
     help="A model class.",
 )
 @_why_option

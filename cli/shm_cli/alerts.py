@@ -19,7 +19,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store import StoredAlert
 from shm.values import Alert
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -100,7 +100,7 @@ command.add_command(acknowledge)
     "name",
     required=True,
     metavar="NAME",
-    shell_complete=completers.hooks,
+    shell_complete=completion.hooks,
     help="A hook of bridge.toml.",
 )
 @json_option

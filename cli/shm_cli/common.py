@@ -34,7 +34,7 @@ from shm.models import PRIORS, THESIS
 from shm.modes_document import load_modes
 from shm.plausibility.bars import Known, doubt_of
 from shm.values import Hanger, ModalTest
-from shm_cli import completers
+from shm_cli import completion
 
 if TYPE_CHECKING:
     from shm.report.table import Table as Texts
@@ -106,7 +106,7 @@ def hanger_option(required: bool = False) -> Callable[[F], F]:
         type=int,
         required=required,
         metavar="N",
-        shell_complete=completers.hangers,
+        shell_complete=completion.hangers,
         help="Hanger number.",
     )
 

@@ -1,9 +1,17 @@
-"""`shm completion`: the script by which a shell completes `shm`."""
+"""`shm completion`: the script by which a shell completes `shm`, and what it offers after an
+option: hangers, classes, effects, hooks of the workspace.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+
 import rich_click as click
-from click.shell_completion import get_completion_class
+from click.shell_completion import CompletionItem, get_completion_class
+
+from shm.bridge import Bridge, load_bridge
+from shm.errors import ShmError
 
 _VARIABLE = "_SHM_COMPLETE"
 
@@ -32,3 +40,56 @@ def command(ctx: click.Context, shell: str) -> None:
     made = get_completion_class(shell)
     assert made is not None, shell
     click.echo(made(ctx.find_root().command, {}, "shm", _VARIABLE).source())
+
+
+def hangers(
+    ctx: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Numbers of the bridge's hangers, with their names."""
+    bridge = _bridge(ctx)
+    described = bridge.hangers if bridge else ()
+    return _beginning(incomplete, ((str(each.id), each.name) for each in described))
+
+
+def hooks(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names of the bridge's hooks, with their kinds."""
+    bridge = _bridge(ctx)
+    return _beginning(
+        incomplete, ((each.name, each.kind) for each in (bridge.hooks if bridge else ()))
+    )
+
+
+def models(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Names of model classes; after a comma the next one."""
+    from shm.models.registry import MODELS
+
+    *chosen, last = incomplete.split(",")
+    before = "".join(f"{name}," for name in chosen)
+    offered = ((before + name, "") for name in MODELS if name not in chosen)
+    return _beginning(before + last, offered)
+
+
+def effects(
+    ctx: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Names of the catalogue's effects, with their titles."""
+    from shm.models.effects import EFFECTS
+
+    return _beginning(incomplete, ((name, effect.title) for name, effect in EFFECTS.items()))
+
+
+def _beginning(start: str, offered: Iterable[tuple[str, str]]) -> list[CompletionItem]:
+    return [
+        CompletionItem(value, help=beside or None)
+        for value, beside in offered
+        if value.startswith(start)
+    ]
+
+
+def _bridge(ctx: click.Context) -> Bridge | None:
+    """The bridge of the workspace that is named so far; None where there is none to be read."""
+    folder = ctx.obj or ctx.find_root().params.get("workspace") or "."
+    try:
+        return load_bridge(Path(folder) / "bridge.toml")
+    except (ShmError, OSError):
+        return None

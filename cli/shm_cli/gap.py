@@ -21,7 +21,7 @@ from shm.report import (
     diagnosis_text,
 )
 from shm.values import Diagnosis, Hanger, ModalTest
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
@@ -62,14 +62,14 @@ def command() -> None:
     metavar="NAME",
     default=_DEFAULT.baseline,
     show_default=True,
-    shell_complete=completers.models,
+    shell_complete=completion.models,
     help="The model class whose gap is diagnosed.",
 )
 @click.option(
     "--without",
     multiple=True,
     metavar="EFFECT",
-    shell_complete=completers.effects,
+    shell_complete=completion.effects,
     help="Take an effect out of the catalogue; may be given again.",
 )
 @click.option(

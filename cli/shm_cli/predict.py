@@ -11,7 +11,7 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
 from shm.values import PLANES, FloatArray
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -27,7 +27,7 @@ _MOST_POINTS = 10_000
 
 
 @click.command()
-@click.argument("model", shell_complete=completers.models)
+@click.argument("model", shell_complete=completion.models)
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter.")
 @click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
 @click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)

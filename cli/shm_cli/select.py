@@ -13,7 +13,7 @@ from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
 from shm.values import Limits, Selection
 from shm.values.force_units import force_unit
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
@@ -41,7 +41,7 @@ from shm_cli.update import modes_argument, show_stated, tell_irregular, tell_poo
 @click.option(
     "--models",
     show_default="the setting `models`",
-    shell_complete=completers.models,
+    shell_complete=completion.models,
     help="Classes, separated by commas.",
 )
 @hanger_option()

@@ -14,7 +14,7 @@ from shm.models import build
 from shm.values import Averaged, Limits, ModalTest, Posterior
 from shm.values.force_units import force_unit
 from shm.values.stated_tension import averaged_now, stated
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
@@ -52,7 +52,7 @@ modes_argument = click.argument(
     "--model",
     default="beam2",
     show_default=True,
-    shell_complete=completers.models,
+    shell_complete=completion.models,
     help="The model class.",
 )
 @hanger_option()

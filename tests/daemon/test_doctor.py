@@ -14,7 +14,7 @@ import pytest
 from shm.pipeline.intake import receive
 from shm.read import apart
 from shm.store import Archive, DeliveryState, Stage, Workspace
-from shm_daemon.doctor import Finding, Level, examine, flowing, keeping
+from shm_daemon.doctor import Finding, Level, checks, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
@@ -238,7 +238,7 @@ def test_a_long_queue_that_moves_is_not_stuck(
         with workspace.store() as store:
             receive(workspace.spool / f"{name}.csv", workspace, store, at)
     assert only(workspace, "recordings", now).level is Level.OK
-    monkeypatch.setattr(flowing, "_STUCK_BEHIND_OTHERS", timedelta(hours=1))
+    monkeypatch.setattr(checks, "_STUCK_BEHIND_OTHERS", timedelta(hours=1))
     assert only(workspace, "recordings", now).level is Level.WARNING
 
 
@@ -300,7 +300,7 @@ def test_a_clock_that_jumped_back_is_a_fault(workspace: Workspace) -> None:
 def test_whether_the_clock_is_set_by_anybody_is_told(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, said: bool | None, level: Level
 ) -> None:
-    monkeypatch.setattr(keeping, "_synchronised", lambda: said)
+    monkeypatch.setattr(checks, "_synchronised", lambda: said)
     assert only(workspace, "clock").level is level
 
 
@@ -381,7 +381,7 @@ def test_a_check_that_fails_hides_no_other(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("a fault of ours")
 
-    monkeypatch.setattr(flowing, "scan", broken)
+    monkeypatch.setattr(checks, "scan", broken)
     findings = examine(workspace.folder, datetime.now(UTC))
     (spool,) = [each for each in findings if each.check == "spool"]
     assert (spool.level, "ZeroDivisionError" in spool.found) == (Level.UNKNOWN, True)

@@ -33,16 +33,26 @@ from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import DeliveryState
 from shm.store.workspace import FOLDERS
-from shm_daemon.doctor.contract import Check, Examined, Finding, fault, ok, some, unknown, warning
-from shm_daemon.doctor.flowing import (
+from shm_daemon.doctor.checks import (
+    Check,
+    Examined,
+    Finding,
+    check_backup,
+    check_clock,
     check_daemon,
+    check_hangers,
     check_held,
     check_quarantine,
     check_raw_files,
     check_spool,
+    check_store,
     check_under_way,
+    fault,
+    ok,
+    some,
+    unknown,
+    warning,
 )
-from shm_daemon.doctor.keeping import check_backup, check_clock, check_hangers, check_store
 from shm_daemon.heartbeat import told
 from shm_daemon.hooks import HookFailed, HookNotifier
 

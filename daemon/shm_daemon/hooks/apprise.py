@@ -14,8 +14,8 @@ from pathlib import Path
 from shm.bridge import AppriseHook
 from shm.bridge.hooks import apprise_scheme
 from shm.values import Alert
+from shm_daemon.hooks.command import Processes
 from shm_daemon.hooks.contract import HookFailed, Surroundings, one_line
-from shm_daemon.hooks.processes import Processes
 
 _SENDER = Path(__file__).with_name("apprise_sender.py")
 _TITLE = "shm: hanger {0.hanger}"

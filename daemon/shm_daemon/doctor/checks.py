@@ -1,0 +1,335 @@
+"""What a check finds: whether the work flows (daemon, spool, what is under way, quarantine, raw
+files), and whether store, backups, clock and hangers are in order.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from pathlib import Path
+
+from shm.pipeline.redescribed import redescribed
+from shm.report.words import counted
+from shm.store import Stage, Store, Workspace
+from shm.store.checking import quick_troubles
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
+from shm_daemon.spool import left_alone, scan
+
+_WAITS_LONG = timedelta(minutes=10)
+_STUCK = timedelta(hours=1)
+_STUCK_BEHIND_OTHERS = timedelta(days=1)
+_NOTHING_MOVES = timedelta(minutes=15)
+_FORGOTTEN = timedelta(days=1)
+_LOOKED_AT = 100
+_BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
+_CLOCK_TOLERANCE = timedelta(minutes=1)
+_SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
+
+
+class Level(StrEnum):
+    """How a finding is to be taken; `unknown` is what could not be looked at."""
+
+    OK = "ok"
+    UNKNOWN = "unknown"
+    WARNING = "warning"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one check found, and what to do where that is not well."""
+
+    check: str
+    level: Level
+    found: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What the checks look at: an open workspace with its open store, and the time."""
+
+    workspace: Workspace
+    store: Store
+    now: datetime
+
+
+Check = Callable[[Examined], Iterator[Finding]]
+"""A check of a store that can be read; it may raise ShmError and OSError, which become findings."""
+
+
+def ok(check: str, found: str) -> Finding:
+    """All is well."""
+    return Finding(check, Level.OK, found)
+
+
+def warning(check: str, found: str, remedy: str) -> Finding:
+    """Work goes on; somebody should look."""
+    return Finding(check, Level.WARNING, found, remedy)
+
+
+def fault(check: str, found: str, remedy: str) -> Finding:
+    """Work cannot go on as it should."""
+    return Finding(check, Level.FAULT, found, remedy)
+
+
+def unknown(check: str, found: str, remedy: str = "") -> Finding:
+    """It could not be looked at."""
+    return Finding(check, Level.UNKNOWN, found, remedy)
+
+
+def some(names: list[str], most: int = 5) -> str:
+    """The first of many names."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def check_daemon(examined: Examined) -> Iterator[Finding]:
+    """Whether a daemon is active, and its loop goes round."""
+    workspace = examined.workspace
+    holder, ago_s = workspace.holder(), seconds_since_beat(workspace)
+    seen = "never seen here" if ago_s is None else f"last seen {told(timedelta(seconds=ago_s))} ago"
+    if holder is None:
+        yield warning("daemon", f"none is active, {seen}", _BEGIN)
+    elif ago_s is None or ago_s > patience_s(workspace):
+        yield warning(
+            "daemon",
+            f"{holder} holds the store, but a daemon's loop was {seen}",
+            "If that is no `shm ingest` or `shm db` at work, the daemon hangs: begin it again.",
+        )
+    else:
+        yield ok("daemon", f"{holder} is active, {seen}")
+
+
+def check_spool(examined: Examined) -> Iterator[Finding]:
+    """Whether files wait in the spool, or lie there for ever."""
+    spool = examined.workspace.spool
+    ages = [_age(path, examined.now) for path in scan(spool)]
+    if not ages:
+        yield ok("spool", "empty")
+    else:
+        found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
+        late = max(ages) > _WAITS_LONG
+        remedy = "Is a daemon active, and what does its log say of these files?"
+        yield warning("spool", found, remedy) if late else ok("spool", found)
+    forgotten = [path for path in left_alone(spool) if _age(path, examined.now) > _FORGOTTEN]
+    if forgotten:
+        yield warning(
+            "spool",
+            f"left alone there for more than a day: {some([path.name for path in forgotten])}",
+            "Uploads that broke off, or sidecars without their file: send again, or delete them.",
+        )
+
+
+def check_under_way(examined: Examined) -> Iterator[Finding]:
+    """Whether a recording has been standing still."""
+    store, now = examined.store, examined.now
+    unready = _without_baseline(examined)
+    standing = [
+        each
+        for each in store.standing()
+        if each.stage is Stage.RECEIVED or each.hanger not in unready
+    ]
+    if not standing:
+        yield ok("recordings", "none is on its way")
+        return
+    oldest = min(standing, key=lambda each: each.since)
+    newest_at = store.newest_row_at() or now
+    waits, idle = now - oldest.since, now - newest_at
+    found = (
+        f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
+        f"{oldest.stage} for {told(waits)}"
+    )
+    if waits > _STUCK_BEHIND_OTHERS or (waits > _STUCK and idle > _NOTHING_MOVES):
+        remedy = f"See the daemon's log, then `shm ingest --again {oldest.id}`."
+        yield warning("recordings", found, remedy)
+    else:
+        yield ok("recordings", found)
+
+
+def check_quarantine(examined: Examined) -> Iterator[Finding]:
+    """Which files were refused, and since when."""
+    folder = examined.workspace.quarantine.folder
+    reasons = sorted(folder.glob("*.reason.json"), key=lambda path: path.stat().st_mtime)
+    if not reasons:
+        yield ok("quarantine", "empty")
+        return
+    first, last = (_age(path, examined.now) for path in (reasons[0], reasons[-1]))
+    yield warning(
+        "quarantine",
+        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: "
+        f"{_why(reasons[-1])}",
+        "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
+    )
+
+
+def check_held(examined: Examined) -> Iterator[Finding]:
+    """Whether recordings wait for a person to decide."""
+    found = examined.store.holds()
+    if not found:
+        yield ok("held", "nothing waits for you to decide")
+        return
+    since = told(max(examined.now - found[0].held_at, timedelta(0)))
+    yield warning(
+        "held",
+        f"{counted(len(found), 'recording')}, the first for {since}: {found[0].file_name}",
+        "See why with `shm ingest --held`, then confirm or discard each.",
+    )
+
+
+def check_raw_files(examined: Examined) -> Iterator[Finding]:
+    """Whether the raw files of the latest recordings are where the store says."""
+    store, archive = examined.store, examined.workspace.archive
+    latest = store.recordings()[-_LOOKED_AT:]
+    away = store.removed_to()
+    missing = [r.file.file_name for r in latest if not archive.holds(r.file) and r.id not in away]
+    if missing:
+        yield fault(
+            "raw files",
+            f"{len(missing)} of the latest {len(latest)} are missing: {some(missing)}",
+            "Is a disk not mounted? Else `shm archive fetch`, or restore archive/ from a backup.",
+        )
+    else:
+        yield ok("raw files", f"the latest {len(latest)} are there")
+
+
+def _without_baseline(examined: Examined) -> set[int]:
+    """Hangers whose tests rightly wait until there are enough of them for a baseline."""
+    wanted, selected = examined.workspace.settings.baseline_tests, examined.store.selected_models()
+    latest = examined.store.latest_tests().items()
+    return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
+
+
+def _age(path: Path, now: datetime) -> timedelta:
+    """How long a file has been where it is; its own times come from wherever it was made."""
+    try:
+        since = datetime.fromtimestamp(path.lstat().st_ctime, UTC)
+    except FileNotFoundError:
+        return timedelta(0)
+    return max(now - since, timedelta(0))
+
+
+def _why(reason: Path) -> str:
+    try:
+        said = json.loads(reason.read_text(encoding="utf-8"))
+        return f"{said['file']}: {said['message']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return reason.name
+
+
+def check_store(examined: Examined) -> Iterator[Finding]:
+    """Whether the store is whole, as far as a quick look tells."""
+    store = examined.store
+    troubles = (*quick_troubles(store), *(error.message for error in store.known_damage()))
+    if troubles:
+        yield fault(
+            "store",
+            f"{store.location} is damaged: {some(list(troubles))}",
+            "`shm db check` names each damaged row and what heals it; else stop the daemon, then "
+            "`shm db restore FILE --replace`.",
+        )
+    else:
+        held = sum(store.stage_counts().values())
+        kind = store.engine.dialect.name
+        yield ok(
+            "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
+        )
+
+
+def check_backup(examined: Examined) -> Iterator[Finding]:
+    """How old the last backup is, and how many raw files have no copy."""
+    store, now = examined.store, examined.now
+    last, remedy = store.last_backup(), "`shm db backup FILE --archive DIR`, best every night."
+    if last is None:
+        yield warning("backup", "never made here", remedy)
+    else:
+        found = f"{last[1]}, {told(now - last[0])} ago"
+        late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
+        yield warning("backup", found, remedy) if late else ok("backup", found)
+    copied = {copy.recording_id for copy in store.archive_copies()}
+    alone = sum(recording.id not in copied for recording in store.recordings())
+    if last is not None and alone:
+        yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
+
+
+def check_clock(examined: Examined) -> Iterator[Finding]:
+    """Whether the clock has jumped back, and whether anything sets it."""
+    newest, now = examined.store.newest_row_at(), examined.now
+    if newest is not None and newest - now > _CLOCK_TOLERANCE:
+        yield fault(
+            "clock",
+            f"it says {now:%Y-%m-%d %H:%M} UTC, {told(newest - now)} before the newest row",
+            "Set it; tests without a time of their own are dated by it.",
+        )
+    said = _synchronised()
+    if said is None:
+        yield unknown("clock", "whether anything sets it cannot be told here")
+    elif said:
+        yield ok("clock", "synchronised")
+    else:
+        yield warning("clock", "not synchronised", "`timedatectl set-ntp true`.")
+
+
+def check_hangers(examined: Examined) -> Iterator[Finding]:
+    """Which hangers have no test, none lately, or no baseline."""
+    store, bridge = examined.store, examined.workspace.bridge
+    settings, latest, selected = (
+        examined.workspace.settings,
+        store.latest_tests(),
+        store.selected_models(),
+    )
+    ids = [hanger.id for hanger in bridge.hangers]
+    never = [str(each) for each in ids if each not in latest]
+    before = examined.now - timedelta(days=settings.quiet_days)
+    quiet = [str(each) for each in ids if each in latest and latest[each].time < before]
+    forming = [
+        f"{each} ({latest[each].tests} of {settings.baseline_tests} tests)"
+        for each in ids
+        if each in latest and each not in selected
+    ]
+    if quiet:
+        yield warning(
+            "hangers",
+            f"no test for {settings.quiet_days:g} days: {some(quiet)}",
+            "Test them, or raise quiet_days.",
+        )
+    if never:
+        yield warning("hangers", f"no test yet: {some(never)}", "Test them.")
+    if forming:
+        yield warning("hangers", f"no baseline yet: {some(forming)}", "Take more tests.")
+    changed = [
+        str(each.id) for each in bridge.hangers if redescribed(each, store.baseline(each.id))
+    ]
+    if changed:
+        yield warning(
+            "hangers",
+            f"described otherwise since the baseline: {some(changed)}",
+            f"Set a new baseline: `shm drift rebaseline --hanger {changed[0]} --since DAY --why "
+            "TEXT`.",
+        )
+    strangers = sorted(set(latest) - set(ids))
+    if strangers:
+        names = some([str(each) for each in strangers])
+        yield warning(
+            "hangers", f"tests of hangers not described: {names}", "Describe them in bridge.toml."
+        )
+    if not (quiet or never or forming or changed or strangers):
+        yield ok("hangers", f"{len(ids)}, with a baseline and recent tests")
+
+
+def _synchronised() -> bool | None:
+    """Whether a service keeps the clock right; None where nobody can tell."""
+    if shutil.which(_SYNCHRONISED[0]) is None:
+        return None
+    try:
+        ended = subprocess.run(  # noqa: S603 - no word of it is anybody's input
+            _SYNCHRONISED, capture_output=True, text=True, timeout=5, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return {"yes": True, "no": False}.get(ended.stdout.strip())
