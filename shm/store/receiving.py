@@ -15,6 +15,7 @@ from shm.store.files import (
     by_checksum,
     by_id,
     in_force,
+    note_name,
     recording_from,
     write_event,
 )
@@ -67,6 +68,8 @@ def _notice(
 ) -> None:
     if outcome is Outcome.RESUMED:
         return
+    if outcome is not Outcome.DUPLICATE:
+        note_name(connection, known, file.file_name, at)
     message = f"the same file as {known.file_name}; not stored twice."
     if outcome is Outcome.REOPENED:
         _reopen(connection, known.id, file, at)

@@ -20,6 +20,7 @@ from shm.store.database import make_engine
 from shm.store.holding import Holding
 from shm.store.listing import Listing
 from shm.store.measuring import Measuring
+from shm.store.naming import Naming
 from shm.store.receiving import Receiving
 from shm.store.results import Results
 from shm.store.stepping import Stepping
@@ -40,6 +41,7 @@ class Store(
     Adopting,
     Stepping,
     Superseding,
+    Naming,
     Measuring,
     Tokens,
     ArchiveCopies,

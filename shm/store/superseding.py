@@ -37,29 +37,6 @@ _BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 class Superseding(Database):
     """The part of the store that sends tests back and remembers what was known before."""
 
-    def recording_named(self, which: str) -> tuple[int, str | None]:
-        """The recording that is meant: by its number or by the name of a test of it.
-
-        Also the test's name, where it was that. Raises NothingThere, and UsageError where several
-        hangers have a test of that name.
-        """
-        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
-        with self.reading() as connection:
-            if which.isdecimal():
-                by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
-                if connection.scalar(by_number) is not None:
-                    return int(which), None
-            found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
-        if not found:
-            raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
-        if len(found) > 1:
-            numbers = ", ".join(map(str, found))
-            raise UsageError(
-                f"{len(found)} hangers have a test {which!r}.",
-                remedy=f"Give its recording's number: {numbers}.",
-            )
-        return found[0], which
-
     def again(
         self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
     ) -> Rerun:
