@@ -83,7 +83,7 @@ def _candidate(
         neighbours=[other.test.time for other in found if other is not item and other.test.time],
         same_time=[each.test for each in at_once],
         reference=[each.test for each in reference],
-        reference_at=max(each.time for each in reference) if baseline else None,
+        reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,

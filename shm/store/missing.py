@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -38,6 +38,8 @@ class MissingRow:
     """A row that must be there: of which table, its number where that is known, and what tells.
 
     `referred`: others refer to it, so that a store with foreign keys does not take their rows.
+    Where its number is not known it stands for `count` rows, and `about` says of what, in words
+    that stay the same while more is done and counted.
     """
 
     table: str
@@ -45,6 +47,8 @@ class MissingRow:
     message: str
     remedy: str
     referred: bool = False
+    count: int = 1
+    about: str = ""
 
     def __str__(self) -> str:
         return f"{self.message} {self.remedy}"
@@ -57,7 +61,18 @@ class MissingRow:
     @property
     def key(self) -> str:
         """What it is called by where a person has accepted that it is gone."""
-        return self.message if self.id is None else f"{self.table}/{self.id}"
+        return (self.about or self.message) if self.id is None else f"{self.table}/{self.id}"
+
+    def beyond(self, accepted: Mapping[str, int]) -> int:
+        """How many rows are missing beyond those that were accepted.
+
+        An older version called them by the message, whatever was counted in it.
+        """
+        return (
+            self.count
+            - accepted.get(self.key, 0)
+            - (self.key != self.message) * (accepted.get(self.message, 0))
+        )
 
 
 def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
@@ -68,12 +83,14 @@ def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
         found.setdefault(row.key, row)
     for row in _gaps(connection, accepted):
         found.setdefault(row.key, row)
-    return tuple(row for key, row in found.items() if key not in accepted)
+    left = ((row, row.beyond(accepted)) for row in found.values())
+    return tuple(replace(row, count=count) for row, count in left if count > 0)
 
 
-def _accepted(connection: Connection) -> frozenset[str]:
+def _accepted(connection: Connection) -> Mapping[str, int]:
+    """How many rows were accepted as gone, by what they were called: an event a row."""
     query = sa.select(events.c.file_name).where(events.c.kind == ACCEPTED)
-    return frozenset(connection.scalars(query))
+    return Counter(connection.scalars(query))
 
 
 def _by_rules(connection: Connection) -> Iterator[MissingRow]:
@@ -84,12 +101,24 @@ def _by_rules(connection: Connection) -> Iterator[MissingRow]:
 
 @cache
 def _queries() -> tuple[tuple[Rule, sa.TextClause], ...]:
-    return tuple((rule, sa.text(rule.query.replace(":", "\\:"))) for rule in RULES)
+    return tuple((rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in RULES)
+
+
+def _lacking(rule: Rule) -> str:
+    if not rule.counts:
+        return rule.query
+    more, fewer = rule.counts[:2]
+    return f"SELECT * FROM ({rule.query}) found WHERE {more} > {fewer}"  # noqa: S608 - no input
 
 
 def _missed(rule: Rule, row: RowMapping) -> MissingRow:
     told = {str(name): value for name, value in row.items()}
-    return MissingRow(rule.table, None, rule.said.format(**told), rule.remedy.format(**told))
+    said, remedy = rule.said.format(**told), rule.remedy.format(**told)
+    if not rule.counts:
+        return MissingRow(rule.table, None, said, remedy)
+    more, fewer = rule.counts[:2]
+    about = rule.said.format(**{**told, **dict.fromkeys(rule.counts, "so many")})
+    return MissingRow(rule.table, None, said, remedy, False, told[more] - told[fewer], about)
 
 
 def _referred(connection: Connection) -> Iterator[MissingRow]:
@@ -176,9 +205,11 @@ def _held_steps(connection: Connection, held: _Documents) -> Iterator[MissingRow
     for row, document in held:
         named[row.recording_id] += len(document.get("tests", ()))
     for recording, count in named.items():
-        if count > steps.get((recording,), 0):
-            said = f"a step of recording {recording} is missing: {count} times a test was held."
-            yield MissingRow("steps", None, said, HISTORY)
+        lost = count - steps.get((recording,), 0)
+        if lost > 0:
+            about = f"a step of recording {recording} is missing: {{}} times a test was held."
+            said, about = about.format(count), about.format("so many")
+            yield MissingRow("steps", None, said, HISTORY, False, lost, about)
 
 
 def _made_of(connection: Connection, made: _Documents) -> Iterator[MissingRow]:
