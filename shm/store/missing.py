@@ -30,6 +30,9 @@ from shm.store.tables import events, metadata
 ACCEPTED = "accepted"
 """The kind of event by which a person accepts that a row is gone."""
 
+UNHELD = ("withdrawn", "reinstated")
+"""Decisions on what was not held: no step, no event and no alert tells of a hold."""
+
 _ROWS_AT_ONCE = 500
 
 
@@ -161,7 +164,7 @@ def _gaps(connection: Connection, accepted: Collection[str]) -> Iterator[Missing
 def _by_documents(connection: Connection) -> Iterator[MissingRow]:
     """Rows that are named by the documents of others."""
     for name, columns, told in (
-        ("holds", ("recording_id",), _held_steps),
+        ("holds", ("recording_id", "decision"), _held_steps),
         ("posteriors", (), _made_of),
         ("watches", ("test_id", "baseline_id", "superseded_at"), _said_of),
         ("alerts", ("key",), _told_to),
@@ -203,7 +206,8 @@ def _held_steps(connection: Connection, held: _Documents) -> Iterator[MissingRow
     )
     named: Counter[int] = Counter()
     for row, document in held:
-        named[row.recording_id] += len(document.get("tests", ()))
+        if row.decision not in UNHELD:
+            named[row.recording_id] += len(document.get("tests", ()))
     for recording, count in named.items():
         lost = count - steps.get((recording,), 0)
         if lost > 0:
@@ -262,7 +266,9 @@ def _recording_of(connection: Connection, test: int) -> object:
 def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]:
     """What is owed of alerts, holds that were told of, and notices of holds."""
     owed = set(_counts(connection, "SELECT alert_id, hook, 1 FROM deliveries"))
-    holds = {id_ for (id_,) in _counts(connection, "SELECT id, 1 FROM holds")}
+    rows = connection.execute(sa.text("SELECT id, decision FROM holds"))
+    decisions: dict[int, str | None] = {row.id: row.decision for row in rows}
+    holds = set(decisions)
     told = set()
     for row, document in alerts:
         for hook in document.get("hooks", ()):
@@ -275,5 +281,6 @@ def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]
             if int(number) not in holds:
                 said = f"row {number} of holds is missing: alert {row.id} tells of it."
                 yield MissingRow("holds", int(number), said, RESTORE)
-    for hold in sorted(holds - told):
+    unheld = {id_ for id_, decision in decisions.items() if decision in UNHELD}
+    for hold in sorted(holds - told - unheld):
         yield MissingRow("alerts", None, f"the alert that told of hold {hold} is missing.", RESTORE)

@@ -47,7 +47,8 @@ RULES = (
         RESTORE,
         """
         SELECT e.recording_id AS recording, count(*) AS events, (SELECT count(*) FROM holds h
-            WHERE h.recording_id = e.recording_id) AS holds
+            WHERE h.recording_id = e.recording_id
+            AND coalesce(h.decision, '') NOT IN ('withdrawn', 'reinstated')) AS holds
         FROM events e WHERE e.kind = 'held' GROUP BY e.recording_id
         """,
         ("events", "holds"),
@@ -59,7 +60,9 @@ RULES = (
         HISTORY,
         """
         SELECT h.recording_id AS recording, h.holds, coalesce(e.events, 0) AS events FROM
-            (SELECT recording_id, count(*) AS holds FROM holds GROUP BY recording_id) h
+            (SELECT recording_id, count(*) AS holds FROM holds
+             WHERE coalesce(decision, '') NOT IN ('withdrawn', 'reinstated')
+             GROUP BY recording_id) h
             LEFT JOIN (SELECT recording_id, count(*) AS events FROM events
              WHERE kind = 'held' GROUP BY recording_id) e ON h.recording_id = e.recording_id
         """,
@@ -85,7 +88,8 @@ RULES = (
         SELECT e.recording_id AS recording, e.kind AS decision, count(*) AS events,
             (SELECT count(*) FROM holds h
                 WHERE e.recording_id = h.recording_id AND e.kind = h.decision) AS holds
-        FROM events e WHERE e.kind IN ('confirmed', 'discarded', 'replaced')
+        FROM events e
+        WHERE e.kind IN ('confirmed', 'discarded', 'replaced', 'withdrawn', 'reinstated')
         GROUP BY e.recording_id, e.kind
         """,
         ("events", "holds"),
@@ -112,7 +116,7 @@ RULES = (
             (SELECT recording_id, count(*) AS steps FROM steps
              WHERE stage = 'refused' AND test_id IS NULL GROUP BY recording_id) s
             LEFT JOIN (SELECT recording_id, count(*) AS events FROM events
-             WHERE kind IN ('refused', 'discarded') GROUP BY recording_id) e
+             WHERE kind IN ('refused', 'discarded', 'withdrawn') GROUP BY recording_id) e
             ON e.recording_id = s.recording_id
         """,
         ("steps", "events"),
@@ -211,7 +215,8 @@ RULES = (
         SELECT h.recording_id AS recording, count(*) AS holds,
             (SELECT count(*) FROM steps s WHERE s.recording_id = h.recording_id
                 AND s.stage = 'held' AND s.test_id IS NULL) AS steps
-        FROM holds h GROUP BY h.recording_id
+        FROM holds h WHERE coalesce(h.decision, '') NOT IN ('withdrawn', 'reinstated')
+        GROUP BY h.recording_id
         """,
         ("holds", "steps"),
     ),

@@ -28,6 +28,7 @@ from shm.store.superseding import Superseding
 from shm.store.tokens import Tokens
 from shm.store.trends import Trends
 from shm.store.upkeep import Upkeep
+from shm.store.withdrawing import Withdrawing
 
 
 class Store(
@@ -41,6 +42,7 @@ class Store(
     Adopting,
     Stepping,
     Superseding,
+    Withdrawing,
     Naming,
     Measuring,
     Tokens,
