@@ -255,7 +255,7 @@ RULES = (
         "Make it again: `shm ingest --again {recording}`.",
         """
         SELECT r.id AS recording FROM recordings r
-        WHERE r.modified_at IS NOT NULL
+        WHERE r.modified_at IS NOT NULL AND r.stage <> 'refused'
             AND NOT EXISTS (SELECT 1 FROM fingerprints f WHERE f.recording_id = r.id)
             AND lower(r.file_name) NOT LIKE '%.modes.json'
             AND EXISTS (SELECT 1 FROM tests t WHERE t.recording_id = r.id
