@@ -17,8 +17,18 @@ ShmError                      exit code 1
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import Any
+
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Codes of an OSError where a disk, or the share of it that one may use, is full."""
+
+
+def sentence(text: str) -> str:
+    """A text with one full stop at its end, whatever it is quoted from had there already."""
+    text = text.rstrip()
+    return text if text.endswith(("?", "!", "...")) else f"{text.rstrip('.')}."
 
 
 class ShmError(Exception):
@@ -30,6 +40,8 @@ class ShmError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, remedy: str = "", retry_after_s: float | None = None):
+        if message.endswith(".."):  # what it quotes had its own full stop
+            message = sentence(message)
         super().__init__(message)
         self.message = message
         self.remedy = remedy

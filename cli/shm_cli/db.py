@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import getpass
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import DamagedRow, StoreError
+from shm.errors import DamagedRow, StoreError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
@@ -103,7 +104,7 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
             click.echo(f"Accepted as gone for good: {count} rows.", err=True)
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
-    troubles = (*checked.troubles, *(archive.troubles if archive else ()))
+    findings = (*checked.findings, *(archive.findings if archive else ()))
     if as_json:
         document = {
             "store": location,
@@ -111,7 +112,8 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
             "archive": asdict(archive) if archive else None,
             "damaged": [_damage_document(each) for each in checked.damaged],
             "missing": [_missing_document(each) for each in checked.missing],
-            "troubles": list(troubles),
+            "troubles": [*checked.troubles, *(archive.troubles if archive else ())],
+            "findings": [asdict(each) for each in findings],
         }
         show(document)
     else:
@@ -120,12 +122,14 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
         click.echo(f"The store has the present schema and holds {held} recordings.")
         if archive is not None:
             click.echo(_archive_said(archive))
-    _raise_troubles(
-        troubles,
-        "What cannot be made again is restored, store or raw files, from a backup."
-        if checked.damaged or checked.missing
-        else "Restore the store, or its raw files, from a backup.",
-    )
+    if findings:
+        kinds = Counter(each.kind for each in findings)
+        counted = ", ".join(_counted(count, kind) for kind, count in kinds.items())
+        _raise_lines(
+            f"{_counted(len(findings), 'finding')}: {counted}. What nothing makes again is "
+            "restored, store or raw files, from a backup.",
+            findings,
+        )
 
 
 @command.command()
@@ -269,5 +273,17 @@ def _archive_said(archive: CheckedArchive) -> str:
 
 def _raise_troubles(troubles: Sequence[str], remedy: str) -> None:
     if troubles:
-        said = "; ".join(each.removesuffix(".") for each in troubles)
-        raise StoreError(f"{said}.", remedy=remedy)
+        _raise_lines(f"{_counted(len(troubles), 'finding')}. {remedy}", map(sentence, troubles))
+
+
+def _raise_lines(summary: str, findings: Iterable[object]) -> None:
+    """One finding a line, after what they amount to: for the eye, and for grep."""
+    raise StoreError("\n".join((summary, *map(str, findings))))
+
+
+def _counted(count: int, what: str) -> str:
+    """`1 damaged row`, `3 faults of the file`."""
+    if count == 1:
+        return f"1 {what}"
+    head, of, rest = what.partition(" of ")
+    return f"{count} {head}s{of}{rest}"

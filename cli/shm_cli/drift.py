@@ -87,8 +87,8 @@ def rebaseline(
         f"{tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
     )
     if alerts:
-        numbers = ", ".join(str(each) for each in alerts)
-        click.echo(f"Still open of it: alert {numbers}. Take note of them by `shm alerts ack ID`.")
+        notes = ", ".join(f"`shm alerts ack {each}`" for each in alerts)
+        click.echo(f"Alerts of it are still open. Take note of them: {notes}.")
 
 
 def _document(made: Baseline) -> dict[str, object]:

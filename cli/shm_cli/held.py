@@ -1,9 +1,13 @@
-"""`shm ingest --held`, `--confirm ID`, `--discard ID`: what waits for a person, and the answer."""
+"""`shm ingest --held`, `--confirm ID`, `--discard ID`: what waits for a person, and the answer.
+
+What counts is discarded, and what was discarded is taken back, by the same two.
+"""
 
 from __future__ import annotations
 
 import getpass
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any
 
@@ -13,7 +17,8 @@ from shm.documents import parse_time
 from shm.errors import BadInput, StoreBusy, UsageError
 from shm.pipeline import utc_now
 from shm.plausibility import FIRST_DAY
-from shm.store import Decision, Hold, Stage, StoredAlert, Workspace
+from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
+from shm.store.holding import discarded_reason, taking_back
 from shm_cli.common import paragraph, show
 from shm_cli.working import LEFT_TO_IT, finish, working
 
@@ -32,13 +37,22 @@ def show_held(workspace: Workspace, as_json: bool) -> int:
     return 0
 
 
+@dataclass(frozen=True)
+class Decided:
+    """A decision, the alerts that it raised, and what it took out where that counted."""
+
+    hold: Hold
+    alerts: Sequence[StoredAlert] = ()
+    withdrawal: Withdrawal | None = None
+
+
 def decide(
     workspace: Workspace,
     which: str,
     decision: Decision,
     record: tuple[str | None, str | None],
     time: datetime | None,
-) -> tuple[Hold, Sequence[StoredAlert]]:
+) -> Decided:
     """Notes a decision and does what follows from it, or leaves that to the daemon at work.
 
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
@@ -47,17 +61,52 @@ def decide(
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}
-        recording_id = int(which) if which.isdecimal() else store.recording_named(which)[0]
+        recording_id, test = store.recording_named(which)
+        held = _is_held(store, recording_id, test)
+        if not held:
+            _refuse_without_reason(store, recording_id, decision, why)
+        withdrawal = None
+        if decision is Decision.DISCARDED and held:
+            return Decided(store.discard(recording_id, who, why, utc_now()))
         if decision is Decision.DISCARDED:
-            return store.discard(recording_id, who, why, utc_now()), ()
-        _refuse_copy_without_reason(store.latest_hold(recording_id), why)
-        hold = store.confirm(recording_id, who, why, utc_now(), time)
+            withdrawal = store.withdraw(recording_id, who, why, utc_now(), test)
+            hold = withdrawal.hold
+        elif held:
+            _refuse_copy_without_reason(store.latest_hold(recording_id), why)
+            hold = store.confirm(recording_id, who, why, utc_now(), time)
+        else:
+            hold = store.reinstate(recording_id, who, why, utc_now(), time, test)
         try:
             with working(workspace) as flow:
                 finish(flow, [recording_id])
         except StoreBusy:
             click.echo(LEFT_TO_IT, err=True)
-        return hold, [stored for stored in store.alerts() if stored.id not in known]
+        raised = [stored for stored in store.alerts() if stored.id not in known]
+        return Decided(hold, raised, withdrawal)
+
+
+def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
+    """Whether the recording waits for a decision, or that test of it."""
+    hold = store.latest_hold(recording_id)
+    if hold is None or hold.decision is not None:
+        return False
+    present = [each for each in store.former_tests(recording_id) if each.superseded_at is None]
+    return test is None or any(t.name == test and t.stage is Stage.HELD for t in present)
+
+
+def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
+    """What counts, or was decided on, is not turned round by one word."""
+    recording, hold = store.recording(recording_id), store.latest_hold(recording_id)
+    confirms = decision is Decision.CONFIRMED
+    is_out = hold is not None and hold.is_out
+    if why or (not is_out if confirms else recording.stage is Stage.REFUSED):
+        return  # or there is nothing to turn round, which the store says
+    now = f"is {recording.stage}" if hold is None else f"was {hold.decision} by {hold.who}"
+    verb = "confirm" if confirms else "discard"
+    raise UsageError(
+        f"recording {recording_id} is not held: it {now}.",
+        remedy=f"Say why that is changed: `shm ingest --{verb} {recording_id} --why TEXT`.",
+    )
 
 
 def _refuse_impossible(time: datetime | None, built: date | None) -> None:
@@ -81,17 +130,41 @@ def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
         )
 
 
-def decided_words(hold: Hold, stage: Stage) -> str:
-    """What became of a hold."""
-    what = f"Recording {hold.recording_id} ({hold.file_name}) is {hold.decision}"
+def decided_words(decided: Decided, stage: Stage) -> str:
+    """What became of it."""
+    hold, withdrawal = decided.hold, decided.withdrawal
+    what = f"Recording {hold.recording_id} ({hold.file_name})"
+    if withdrawal is not None:
+        return f"{_withdrawn_words(what, withdrawal)} {taking_back(hold)}"
     if hold.decision is Decision.DISCARDED:
-        return f"{what} and counts in nothing. Its raw file stays in the archive."
+        return f"{what} is discarded and counts in nothing. {taking_back(hold)}"
+    verb = "counts again" if hold.decision is Decision.REINSTATED else "is confirmed and counts"
     time = ""
     if hold.time is not None:
         time = f" Its time is {hold.time:%Y-%m-%d %H:%M}."
     elif hold.time_unknown:
         time = " Its time is not known: that of its receipt counts."
-    return f"{what} and counts from now on; it is {stage}.{time}"
+    return f"{what} {verb} from now on; it is {stage}.{time}"
+
+
+def _withdrawn_words(what: str, withdrawal: Withdrawal) -> str:
+    names = ", ".join(test.name for test in withdrawal.hold.tests)
+    said = [f"{what}: {names} is discarded and counts in nothing from now on."]
+    if withdrawal.watched_again:
+        said.append(f"Later tests that are watched again: {withdrawal.watched_again}.")
+    if withdrawal.of_baseline:
+        said.append(
+            f"The baseline was made from {', '.join(withdrawal.of_baseline)} and stays until you "
+            f"set another: `shm drift rebaseline --hanger {withdrawal.hold.hanger} --since "
+            f"{withdrawal.since:%Y-%m-%d} --why TEXT`."
+        )
+    return " ".join(said)
+
+
+def discarded_words(hold: Hold) -> str:
+    """What is said where a discarded file comes again: one line."""
+    words = discarded_reason(hold).replace("discarded", "discarded before,", 1)
+    return f"{words} {taking_back(hold)}"
 
 
 def told(hold: Hold) -> str:

@@ -27,6 +27,7 @@ from shm.store import (
     Outcome,
     Receipt,
     Stage,
+    Store,
     StoredRecording,
     Workspace,
 )
@@ -34,7 +35,14 @@ from shm.store.archive import refuse_oversize
 from shm.values import Alert
 from shm_cli.again import rerun_document, send_back
 from shm_cli.common import json_option, open_workspace, show, show_table, table
-from shm_cli.held import Time, decide, decided_words, hold_document, show_held
+from shm_cli.held import (
+    Time,
+    decide,
+    decided_words,
+    discarded_words,
+    hold_document,
+    show_held,
+)
 from shm_cli.record import Words
 from shm_cli.working import finish, working
 
@@ -62,8 +70,16 @@ from shm_cli.working import finish, working
     help="With --again: the first stage that is done again.  [default: identified]",
 )
 @click.option("--held", is_flag=True, help="Instead of files: show what is held, and why.")
-@click.option("--confirm", metavar="ID", help="Instead of files: what is held counts from now on.")
-@click.option("--discard", metavar="ID", help="Instead of files: what is held is not to count.")
+@click.option(
+    "--confirm",
+    metavar="ID",
+    help="Instead of files: what is held, or was discarded, counts from now on.",
+)
+@click.option(
+    "--discard",
+    metavar="ID",
+    help="Instead of files: what is held, or counts already, is not to count.",
+)
 @click.option("--time", type=Time(), help="With --confirm: the true time of the test.")
 @click.option("--why", type=Words(), help="With --confirm or --discard: for the record.")
 @click.option("--who", show_default="the user's name", help="With --confirm or --discard.")
@@ -84,7 +100,7 @@ def command(
     *.modes.json. The files stay where they are. Exit code 3 when any was refused.
 
     What is implausible is held and counts in nothing: --held shows it, --confirm and --discard
-    answer it.
+    answer it. With --why they also take out what counts, and take back what was discarded.
 
     \b
     Example: shm ingest hanger3_*.csv
@@ -111,10 +127,7 @@ def command(
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts()}
         receipts, unreadable = _ingest(workspace, files)
-        rows = [
-            _row(path, receipt.outcome, store.recording(receipt.recording.id))
-            for path, receipt in receipts.items()
-        ]
+        rows = [_row_of(store, path, receipt) for path, receipt in receipts.items()]
         raised = [stored.alert for stored in store.alerts() if stored.id not in known]
     _show(rows + unreadable, raised, as_json)
     refused = any(row["outcome"] == _REFUSED for row in rows + unreadable)
@@ -153,15 +166,15 @@ def _refuse_mixture(files: Sequence[Path], about: Mapping[str, Any], about_files
 def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> int:
     decision = Decision.CONFIRMED if about["confirm"] else Decision.DISCARDED
     which, record = about["confirm"] or about["discard"], (about["who"], about["why"])
-    hold, raised = decide(workspace, which, decision, record, about["time"])
+    made = decide(workspace, which, decision, record, about["time"])
     with workspace.store() as store:
-        stage = store.recording(hold.recording_id).stage
+        stage = store.recording(made.hold.recording_id).stage
     if as_json:
-        alerts = [alert_document(stored.alert) for stored in raised]
-        show({**hold_document(hold), "stage": stage.value, "alerts": alerts})
+        alerts = [alert_document(stored.alert) for stored in made.alerts]
+        show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts})
         return 0
-    click.echo(decided_words(hold, stage))
-    for stored in raised:
+    click.echo(decided_words(made, stage))
+    for stored in made.alerts:
         click.echo(f"Alert: {stored.alert.message}", err=True)
     return 0
 
@@ -204,6 +217,14 @@ def _received(
     return receipts, unreadable
 
 
+def _row_of(store: Store, path: Path, receipt: Receipt) -> dict[str, object]:
+    row = _row(path, receipt.outcome, store.recording(receipt.recording.id))
+    hold = store.discarded(receipt.recording.id)
+    if receipt.outcome is Outcome.DISCARDED and hold is not None:
+        row |= {"outcome": Outcome.DISCARDED.value, "reason": discarded_words(hold)}
+    return row
+
+
 def _row(path: Path, outcome: Outcome, recording: StoredRecording) -> dict[str, object]:
     ended = {Stage.REFUSED: _REFUSED, Stage.HELD: "held"}
     return {
@@ -232,6 +253,7 @@ _OUTCOMES = {
     Outcome.RESUMED: "taken in",
     Outcome.DUPLICATE: "known already",
     Outcome.REOPENED: "tried again",
+    Outcome.DISCARDED: Outcome.DISCARDED.value,
     Outcome.REDESCRIBED: "done again",
 }
 

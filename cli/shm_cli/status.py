@@ -233,18 +233,22 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
         recording_id, _ = store.recording_named(which)
         recording = store.recording(recording_id)
         steps, tests = store.steps(recording_id), store.former_tests(recording_id)
+        other_names = [n for n in store.names_of(recording_id) if n != recording.file.file_name]
     if as_json:
         show(
             {
                 "recording": recording_id,
                 "file": recording.file.file_name,
+                "also_came_as": other_names,
                 "stage": recording.stage.value,
                 "steps": [asdict(step) for step in steps],
                 "results": [asdict(test) for test in tests],
             }
         )
         return
-    made = table(f"recording {recording_id}: {recording.file.file_name}", "stage", "test", "at")
+    also = f" (also came as {', '.join(other_names)})" if other_names else ""
+    title = f"recording {recording_id}: {recording.file.file_name}{also}"
+    made = table(title, "stage", "test", "at")
     made.add_column("shm", justify="right")
     for step in steps:
         made.add_row(step.stage, step.test or "", f"{step.at:%Y-%m-%d %H:%M:%S}", step.version)

@@ -26,9 +26,6 @@ MASS_OVER_DESCRIBED = 0.02, 50.0
 """J/v over the hanger's mass: 0.3 to 2.7 in 120 tests of tests/benchmarks/right_signals.py, widened
 by more than 15 for sensors near a node, hits that slip and parts that nobody described."""
 
-MASS_OVER_EARLIER = 5.0
-"""Factor between J/v of one crew's tests of a hanger; 9.81 is that of g for m/s^2."""
-
 SENSORS_APART = 100.0
 """Factor between the velocities of sensors of one plane, at places that a crew reaches."""
 
@@ -50,18 +47,16 @@ class SignalDoubt:
 
 
 def signal_doubts(
-    records: Sequence[Recording],
-    hanger: Hanger | None = None,
-    earlier_masses_kg: Sequence[float] = (),
+    records: Sequence[Recording], hanger: Hanger | None = None
 ) -> tuple[SignalDoubt, ...]:
     """What is doubtful of the records of one test; none where nobody hit.
 
-    `earlier_masses_kg` are `apparent_mass_kg` of earlier accepted tests of the hanger.
+    g for m/s^2, a factor of 9.81, passes: no frequency and no tension depends on it.
     """
     found: dict[tuple[str, str], SignalDoubt] = {}
     for record in records:
         swapped = _not_a_hammer(record)
-        for doubt in swapped or _units(record, hanger, earlier_masses_kg):
+        for doubt in swapped or _units(record, hanger):
             found.setdefault((doubt.kind, doubt.channel), doubt)
     return tuple(found.values())
 
@@ -75,28 +70,17 @@ def apparent_mass_kg(record: Recording) -> float:
     return 1 / fastest if fastest > 0 else math.inf
 
 
-def _units(
-    record: Recording, hanger: Hanger | None, earlier_kg: Sequence[float]
-) -> list[SignalDoubt]:
+def _units(record: Recording, hanger: Hanger | None) -> list[SignalDoubt]:
     odd = _unlike_its_neighbours(record)
     if odd:
         return odd
     outside = [d for c in record.channels for d in _outside_bounds(c)]
-    if outside or record.force is None:
+    if outside or record.force is None or hanger is None:
         return outside
     mass_kg = apparent_mass_kg(record)
-    known = [each for each in earlier_kg if math.isfinite(each)]
-    if math.isnan(mass_kg):
-        return []
-    if known:
-        usual, factor = float(np.median(known)), MASS_OVER_EARLIER
-        low, high, whose = usual / factor, usual * factor, "earlier tests"
-    elif hanger is not None:
-        usual = hanger.mass_per_length_kg_m * hanger.length_m
-        low, high, whose = *(usual * each for each in MASS_OVER_DESCRIBED), "the description"
-    else:
-        return []
-    if low <= mass_kg <= high:
+    usual = hanger.mass_per_length_kg_m * hanger.length_m
+    low, high = (usual * each for each in MASS_OVER_DESCRIBED)
+    if math.isnan(mass_kg) or low <= mass_kg <= high:
         return []
     times = max(mass_kg / usual, usual / mass_kg)
     side = "less" if mass_kg > usual else "more"
@@ -104,8 +88,8 @@ def _units(
         SignalDoubt(
             "unit",
             record.force.name,
-            f"The hanger moves {times:.2g} times {side} for the force than by {whose}: right units "
-            f"and sensitivities of {record.force.name} and the accelerometers?",
+            f"The hanger moves {times:.2g} times {side} for the force than by its description: "
+            f"right units and sensitivities of {record.force.name} and the accelerometers?",
         )
     ]
 

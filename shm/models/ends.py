@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from shlex import quote
+
 import numpy as np
 
 from shm.errors import UsageError
@@ -20,7 +22,7 @@ def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]
     if lacking:
         raise UsageError(
             f"the posterior of {posterior.model} was made without {', '.join(lacking)}.",
-            remedy="Make it again: `shm ingest --again TEST`.",
+            remedy=f"Make it again: `shm ingest --again {quote(posterior.tests[-1])}`.",
         )
     theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
     deck, arch = model.springs_n_m_rad(theta)

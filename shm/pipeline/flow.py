@@ -23,7 +23,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from shm.errors import DamagedRow, ShmError, StoreError, WorkerDied
+from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
 from shm.pipeline.terms import competing, reason_document
@@ -38,7 +38,7 @@ _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
 _LONGEST_S = 86400.0
 _AGAIN_S = 60.0
-_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ENFILE)
+_OF_THE_MACHINE = (*DISK_FULL, errno.EROFS, errno.EIO, errno.ENFILE)
 """What a step meets that is no fault of its recording, and passes when somebody sees to it."""
 
 _NO_MORE = (
@@ -291,7 +291,7 @@ class Flow:
                 continue
             recording, now = self.store.recording(recording_id), self.clock()
             reason = reason_document(error, recording, now)
-            if any(e.recording_id == recording_id for e in self.store.events(Outcome.REDESCRIBED)):
+            if self.store.events(Outcome.REDESCRIBED, recording_id=recording_id):
                 reason["remedy"] += _NO_MORE
             name, archive = recording.file.file_name, self.workspace.archive
             try:

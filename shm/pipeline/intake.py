@@ -127,8 +127,8 @@ def _set_aside(
         "sha256": None,
     }
     lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    said = {(event.file_name, event.message) for event in store.events("refused")}
-    if lies != path or (name, error.message) not in said:  # what stays is met at each start
+    said = {event.message for event in store.events("refused", file_name=name)}
+    if lies != path or error.message not in said:  # what stays is met at each start
         store.refused_unread(name, error.message, at)
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from shm.errors import DamagedRow
 from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
 from shm.store import (
-    Decision,
     HeldTest,
     Hold,
     IdentifiedTest,
     Judged,
+    Stage,
     Store,
     StoredRecording,
     StoredTest,
@@ -40,12 +40,18 @@ def judge(
     gave it.
     """
     sidecar_as, fingerprint = recording.file.sidecar_as, found[0].fingerprint
-    judged = Judged(sidecar_as, fingerprint)
-    hold = store.latest_hold(recording.id)
-    if hold is not None and hold.decision is Decision.CONFIRMED and hold.sidecar_as == sidecar_as:
-        return tuple(_as_confirmed(item, hold) for item in found), judged
+    decided = store.decided(recording.id, sidecar_as)
+    out = tuple(n for n, hold in decided.items() if hold.is_out)
+    if set(out) >= {item.position for item in found}:  # sent anew, to be asked of once more
+        out = ()
+    judged = Judged(sidecar_as, fingerprint, out=out)
+    confirmed = [hold for hold in decided.values() if hold.is_in]
+    if confirmed:
+        newest = max(confirmed, key=lambda hold: hold.id)
+        holds = {item.position: decided.get(item.position, newest) for item in found}
+        return tuple(_as_confirmed(item, holds[item.position]) for item in found), judged
     held, candidates = [], {}
-    for item in found:
+    for item in (item for item in found if item.position not in out):
         candidate = _candidate(workspace, store, recording, item, found)
         doubts = doubts_about(candidate)
         if doubts:
@@ -81,9 +87,9 @@ def _candidate(
         built=workspace.bridge.built,
         file_times=item.times,
         neighbours=[other.test.time for other in found if other is not item and other.test.time],
-        same_time=[each.test for each in at_once],
+        same_time=[each.test for each in sorted(at_once, key=lambda t: t.stage is Stage.HELD)],
         reference=[each.test for each in reference],
-        reference_at=max(each.time for each in reference) if baseline else None,
+        reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,

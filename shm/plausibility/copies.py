@@ -15,14 +15,23 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from shm.plausibility.candidate import Candidate
-from shm.values import Doubt, Fingerprint, FloatArray, FrequencyResponse, IntArray, Recording
+from shm.values import (
+    Doubt,
+    Fingerprint,
+    FloatArray,
+    FrequencyResponse,
+    IntArray,
+    KnownSamples,
+    Recording,
+)
 
 _SAMPLES = 32
 """Of each shape, from its reach before its place up to its reach after it."""
@@ -60,6 +69,14 @@ _REPEATED = 1e-5
 """1 - correlation of two shapes in one channel, at which neither tells anything: a hum, or a mode
 that rings alone without noise, comes again in other tests, too."""
 
+_ALL = 0.995
+"""Share of the samples from which one recording is as good as wholly in the other: an export that
+begins a fraction of a second later loses less."""
+
+_MOST_NAMED = 3  # recordings in one message
+
+_WHY = "One impact counted twice would confirm itself."
+
 _TELLING = 0.25
 """Of the shapes of a channel must come once: else those of another reach are only not seen twice.
 It is 0.1 of a hum at most, and all of each simulated or real response that was tried."""
@@ -83,37 +100,99 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
     )
 
 
+@dataclass(frozen=True)
+class Common:
+    """What two recordings have in common, as a share of the samples of each (of all its channels
+    that move)."""
+
+    of_own: float
+    of_other: float
+
+    @property
+    def own_is_whole(self) -> bool:
+        """The one is in the other, but for some samples at an end."""
+        return self.of_own >= _ALL
+
+    @property
+    def other_is_whole(self) -> bool:
+        return self.of_other >= _ALL
+
+    @property
+    def own_is_longer(self) -> bool:
+        return self.of_own < min(self.of_other, _ALL)
+
+
 def copied(candidate: Candidate) -> Doubt | None:
-    """The samples of another recording, wholly or in most channels; the same modes at one time."""
+    """The samples of another recording, wholly or in most channels; the same modes at one time.
+
+    Of several recordings those that count are named first, and of these the one that has most of
+    it: a copy may have been copied.
+    """
     own = candidate.fingerprint
     if own is None:
         twin = next((t for t in candidate.same_time if t.modes == candidate.test.modes), None)
-        return None if twin is None else _doubt(f"the modes of test {twin.id}")
-    for known in candidate.copies:
-        if is_copy(own, known.fingerprint):
-            where = "" if known.hanger == candidate.hanger.id else f" of hanger {known.hanger}"
-            return _doubt(f"the samples of {known.name}{where}")
-    return None
+        return None if twin is None else _again(f"it holds the modes of test {twin.id} again")
+    found = [(each, shared(own, each.fingerprint)) for each in candidate.copies]
+    alike = [(known, common) for known, common in found if common is not None]
+    if not alike:
+        return None
+    alike.sort(key=lambda each: (not each[0].counts, -round(each[1].of_own, 2)))
+    known, common = alike[0]
+    if not common.own_is_longer:
+        return _again(_what_of(known, common, candidate.hanger.id))
+    shorter = [each for each in alike if each[1].own_is_longer and each[0].counts == known.counts]
+    told = [_what_it_has(*each, candidate.hanger.id) for each in shorter[:_MOST_NAMED]]
+    more = len(shorter) - len(told)
+    return Doubt(
+        "copy",
+        f"it holds {' and '.join(told)}" + (f" and of {more} more recordings" if more else ""),
+        "It is the longer one: usually discard the part and confirm the whole",
+        _WHY,
+        instead_of=tuple(each.recording_id for each, _ in shorter),
+    )
 
 
 def is_copy(own: Fingerprint, other: Fingerprint) -> bool:
-    """Whether one recording holds the other's impacts: at least half of the channels of the smaller
-    one, lest a dead channel that always hums alike condemns a test."""
+    """Whether one recording holds the other's impacts."""
+    return shared(own, other) is not None
+
+
+def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
+    """What two recordings have in common where one holds the other's impacts: in at least half of
+    the channels of the smaller one, lest a dead channel that always hums alike condemns a test.
+    None where it does not."""
     if own.digest == other.digest:
-        return True
+        return Common(1.0, 1.0)
     if not len(own.marks) or not len(other.marks):
-        return False
+        return None
     here, there = _alike(own, other)
     if not len(here):
-        return False
+        return None
     shifts = own.marks[here, _PLACE] - other.marks[there, _PLACE]
-    pairs = set[tuple[int, int]]()
+    pairs: dict[tuple[int, int], int] = {}
     for shift in np.unique(shifts):
         by = shifts == shift
         if by.sum() >= _LEAST:
-            pairs |= _channels(own.marks[here[by]], other.marks[there[by]], own, other)
+            moved = _channels(own.marks[here[by]], other.marks[there[by]], own, other)
+            for pair, samples in moved.items():
+                pairs[pair] = max(samples, pairs.get(pair, 0))
     alike = min(len({pair[side] for pair in pairs}) for side in (0, 1))
-    return bool(2 * alike >= min(len(np.unique(each.marks[:, 0])) for each in (own, other)))
+    if 2 * alike < min(len(np.unique(each.marks[:, 0])) for each in (own, other)):
+        return None
+    return Common(_share(pairs, own, 0), _share(pairs, other, 1))
+
+
+def _share(pairs: Mapping[tuple[int, int], int], print_: Fingerprint, side: int) -> float:
+    """How much of a recording lies in pairs of channels that are copies.
+
+    A channel of the one may hold several of the other, as that of a whole its cuts.
+    """
+    samples = {int(channel): int(length) for channel, length in print_.marks[:, :2]}
+    common = Counter[int]()
+    for pair, length in pairs.items():
+        common[pair[side]] += length
+    found = sum(min(common[channel], length) for channel, length in samples.items())
+    return found / sum(samples.values())
 
 
 def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
@@ -130,12 +209,13 @@ def _alike(own: Fingerprint, other: Fingerprint) -> tuple[IntArray, IntArray]:
 
 def _channels(
     mine: IntArray, its: IntArray, own: Fingerprint, other: Fingerprint
-) -> set[tuple[int, int]]:
+) -> dict[tuple[int, int], int]:
     """The pairs of channels that are copies if one is moved as these marks are against each other:
-    most of the shapes that both should have, where both have samples, are the same."""
+    most of the shapes that both should have, where both have samples, are the same. Of each how
+    many samples that are."""
     shift = int(mine[0, _PLACE] - its[0, _PLACE])
     pairs = Counter(zip(mine[:, 0].tolist(), its[:, 0].tolist(), strict=True))
-    found = set[tuple[int, int]]()
+    found: dict[tuple[int, int], int] = {}
     for (one, two), count in pairs.items():
         both = own.marks[own.marks[:, 0] == one], other.marks[other.marks[:, 0] == two].copy()
         both[1][:, _PLACE] += shift
@@ -146,17 +226,36 @@ def _channels(
             for marks in both
         ]
         if count >= _SHARE * min(int(each.sum()) for each in within):
-            found.add((one, two))
+            found[one, two] = int(end - start)
     return found
 
 
-def _doubt(what: str) -> Doubt:
-    return Doubt(
-        "copy",
-        f"it holds {what} again",
-        "Discard it, unless the other is the wrong one",
-        "One impact counted twice would confirm itself.",
-    )
+def _again(what: str) -> Doubt:
+    return Doubt("copy", what, "Discard it, unless the other is the wrong one", _WHY)
+
+
+def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
+    """What of another recording is in one that has no more than that."""
+    name, share = _named(known, hanger), _percent(common.of_other)
+    if not common.own_is_whole:
+        return f"{_percent(common.of_own)} of its samples are in {name}, {share} of that one"
+    if common.other_is_whole:
+        return f"it holds the samples of {name} again"
+    return f"it is a part of {name}, {share} of that one, sent again"
+
+
+def _what_it_has(known: KnownSamples, common: Common, hanger: int) -> str:
+    """The same in one that has more."""
+    how_much = "all" if common.other_is_whole else _percent(common.of_other)
+    return f"{how_much} of {_named(known, hanger)}, {_percent(common.of_own)} of its own samples"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _named(known: KnownSamples, hanger: int) -> str:
+    return known.name + ("" if known.hanger == hanger else f" of hanger {known.hanger}")
 
 
 def _motions(record: Recording | FrequencyResponse) -> list[FloatArray]:

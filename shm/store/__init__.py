@@ -47,6 +47,7 @@ from shm.store.rows import (
 from shm.store.store import Store
 from shm.store.superseding import AGAIN_FROM
 from shm.store.tokens import Scope, StoredToken
+from shm.store.withdrawing import Withdrawal
 from shm.store.workspace import Workspace
 
 __all__ = [
@@ -99,5 +100,6 @@ __all__ = [
     "TrendPoint",
     "WaitingTest",
     "WatchedName",
+    "Withdrawal",
     "Workspace",
 ]

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from shm.documents import dump
-from shm.errors import BadInput, ShmError, StoreError, TooLarge
+from shm.errors import DISK_FULL, BadInput, ShmError, StoreError, TooLarge
 from shm.read import sidecar_path
 from shm.store.rows import ReceivedFile
 
@@ -269,7 +269,7 @@ class Quarantine:
             source.rename(target)
             sync(self.folder)
         except OSError as error:
-            if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            if error.errno in DISK_FULL:
                 raise _explained(error, self.folder) from error
             stays = f"It was left at {source}, as it cannot be moved ({error.strerror})."
             self._explain(target, {**reason, "remedy": f"{reason['remedy']} {stays}"})
@@ -384,7 +384,7 @@ def _link(source: Path, target: Path) -> None:
 
 
 def _explained(error: OSError, folder: Path) -> ShmError:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if error.errno in DISK_FULL:
         return StoreError(
             f"{folder} cannot grow: the disk is full.",
             remedy="Free some space; it is tried again.",

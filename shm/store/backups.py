@@ -15,7 +15,14 @@ from tempfile import TemporaryDirectory
 import sqlalchemy as sa
 from sqlalchemy.engine import Engine
 
-from shm.errors import NothingThere, SchemaOutdated, StoreDamaged, StoreError, UsageError
+from shm.errors import (
+    NothingThere,
+    SchemaOutdated,
+    StoreDamaged,
+    StoreError,
+    UsageError,
+    sentence,
+)
 from shm.store import schema
 from shm.store.archive import sync
 from shm.store.checking import CheckedStore, check_store
@@ -144,7 +151,8 @@ def _must_be_whole(engine: Engine, file: Path, tell: Tell) -> None:
     troubles = check_store(Database(engine), tell).unfit
     if troubles:
         raise StoreError(
-            f"the backup {file} is damaged: {'; '.join(troubles)}.", remedy="Take an older one."
+            f"the backup {file} is damaged: {' '.join(map(sentence, troubles))}",
+            remedy="Take an older one.",
         )
 
 

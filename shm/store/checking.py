@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
-from shm.errors import DamagedRow
+from shm.errors import DamagedRow, sentence
 from shm.store.archive import Archive, checksum
 from shm.store.blobs import (
     alert_from_document,
@@ -18,6 +18,7 @@ from shm.store.blobs import (
     unpack,
 )
 from shm.store.checksums import (
+    RESTORE,
     Values,
     checksum_of,
     content_checksum,
@@ -34,6 +35,19 @@ from shm.store.upkeep import Upkeep
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong: its `kind` to count it by, where it is, what it is, what to do."""
+
+    kind: str
+    where: str
+    what: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what} {self.remedy}".rstrip()
+
+
+@dataclass(frozen=True)
 class CheckedStore:
     """What every table holds, and what is wrong; nothing is wrong where `troubles` is empty."""
 
@@ -43,11 +57,31 @@ class CheckedStore:
     missing: tuple[MissingRow, ...] = ()
 
     @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The troubles, each with its place and its remedy apart."""
+        known = {str(row): _damaged_finding(row) for row in self.damaged}
+        known |= {str(row): _missing_finding(row) for row in self.missing}
+        file = "fault of the file"
+        return tuple(
+            known.get(each) or Finding(file, "store", sentence(each), RESTORE)
+            for each in self.troubles
+        )
+
+    @property
     def unfit(self) -> tuple[str, ...]:
         """Troubles for which it cannot be put in another's place: not rows that only are no more,
         since an older backup may lack more than that."""
         gone = {str(row) for row in self.missing if not row.referred}
         return tuple(each for each in self.troubles if each not in gone)
+
+
+def _damaged_finding(row: DamagedRow) -> Finding:
+    return Finding("damaged row", f"{row.table}/{row.id}", row.message, row.remedy)
+
+
+def _missing_finding(row: MissingRow) -> Finding:
+    where = row.table if row.id is None else f"{row.table}/{row.id}"
+    return Finding("missing row", where, row.message, row.remedy)
 
 
 @dataclass(frozen=True)
@@ -67,6 +101,20 @@ class CheckedArchive:
     @property
     def troubles(self) -> tuple[str, ...]:
         return file_troubles(self.missing, self.damaged)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """A finding a file."""
+        gone = ("missing raw file", "it is not in the archive.", self.missing)
+        changed = ("damaged raw file", "it has another SHA-256.", self.damaged)
+        return tuple(
+            Finding(kind, f"archive/{name}", what, _HEAL)
+            for kind, what, names in (gone, changed)
+            for name in names
+        )
+
+
+_HEAL = "Drop the same file into the spool again, or bring it back: `shm archive fetch`."
 
 
 def file_troubles(missing: Iterable[str], damaged: Iterable[str]) -> tuple[str, ...]:

@@ -133,21 +133,27 @@ def decoding(table: sa.Table, row: Any, hanger: int | None = None) -> Iterator[N
 
 def damaged(table: sa.Table, id_: object, hanger: int | None = None) -> DamagedRow:
     """The error of one damaged row, with what heals it."""
-    return DamagedRow(table.name, id_, hanger, HEALING.get(table.name, RESTORE))
+    if table.name == "diagnoses" and hanger is None:  # its number is what is damaged
+        return DamagedRow(table.name, id_, hanger, RESTORE)
+    remedy = HEALING.get(table.name, RESTORE).format(table=table.name, id=id_, hanger=hanger)
+    return DamagedRow(table.name, id_, hanger, remedy)
 
 
 RESTORE = "Restore the store from a backup: `shm db restore FILE --replace`."
-_AGAIN = "Make it again from the archive: `shm ingest --again {id}`, by the recording's number."
+_AGAIN = "Make it again from the archive: `shm ingest --again {table}/{id}`."
+_WATCH_AGAIN = "Make it again: `shm ingest --again {table}/{id} --from watched`."
 HEALING: Mapping[str, str] = {
-    "posteriors": "Make it again from the archive: `shm ingest --again TEST`, one of its tests.",
-    "tests": "Make it again from the archive: `shm ingest --again TEST`.",
-    "watches": "Make it again: `shm ingest --again TEST --from watched`.",
-    "drifts": "Make it again: `shm ingest --again TEST --from watched`.",
-    "diagnoses": "Make it again: `shm gap diagnose --hanger N`.",
+    "posteriors": _AGAIN,
+    "tests": _AGAIN,
+    "watches": _WATCH_AGAIN,
+    "drifts": _WATCH_AGAIN,
+    "diagnoses": "Make it again: `shm gap diagnose --hanger {hanger}`.",
     "summaries": "Nothing is lost: `shm db upgrade` makes it again.",
     "watch_states": "Nothing is lost: the next test makes it again.",
 }
-"""What to do about a damaged row, by table; of all others a backup is the only source."""
+"""What to do about a damaged row, by table; of all others a backup is the only source.
+
+The row itself is named, as `recording_named` finds its recording; what it says may be wrong."""
 
 
 def loads(text: Any) -> Any:

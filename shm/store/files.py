@@ -25,6 +25,9 @@ from shm.store.rows import (
 from shm.store.stepping import write_step
 from shm.store.tables import events, recordings, steps, tests
 
+RENAMED = "renamed"
+"""The kind of event that keeps the former name of a file that came again under another."""
+
 
 class Files(Database):
     """The part of the store that keeps account of the files."""
@@ -141,11 +144,22 @@ class Files(Database):
                 )
         return found
 
-    def events(self, kind: str | None = None) -> tuple[Event, ...]:
-        """What was noticed on the way, oldest first; `kind` as duplicate or refused."""
+    def events(
+        self,
+        kind: str | None = None,
+        *,
+        recording_id: int | None = None,
+        file_name: str | None = None,
+    ) -> tuple[Event, ...]:
+        """What was noticed on the way, oldest first; `kind` as duplicate or refused.
+
+        Of one recording, or of what came under one name, where that is given.
+        """
         query = sa.select(events).order_by(events.c.id)
-        if kind is not None:
-            query = query.where(events.c.kind == kind)
+        wanted = {"kind": kind, "recording_id": recording_id, "file_name": file_name}
+        for name, value in wanted.items():
+            if value is not None:
+                query = query.where(events.c[name] == value)
         with self.reading() as connection:
             rows = connection.execute(query).all()
         return tuple(Event(r.at, r.kind, r.file_name, r.message, r.recording_id) for r in rows)
@@ -214,6 +228,13 @@ def counts(table: sa.Table) -> sa.ColumnElement[bool]:
 def in_force(table: sa.Table) -> sa.ColumnElement[bool]:
     """What no later run has replaced."""
     return table.c.superseded_at.is_(None)
+
+
+def note_name(connection: Connection, known: Row[Any], file_name: str, at: datetime) -> None:
+    """Keeps the former name of a file that comes again under another: it is found by both."""
+    if known.file_name != file_name:
+        said = f"called {file_name} from now on."
+        write_event(connection, at, RENAMED, known.id, known.file_name, said)
 
 
 def write_event(

@@ -10,11 +10,17 @@ from shm.values import NAN, Doubt
 
 
 class Decision(StrEnum):
-    """What a person made of a held recording; `REPLACED`: it was done again before one had."""
+    """What a person made of a held recording; `REPLACED`: it was done again before one had.
+
+    `WITHDRAWN`: it counted, and was discarded then; `REINSTATED`: what was discarded counts again.
+    Of these two nothing was held, and no alert told.
+    """
 
     CONFIRMED = "confirmed"
     DISCARDED = "discarded"
     REPLACED = "replaced"
+    WITHDRAWN = "withdrawn"
+    REINSTATED = "reinstated"
 
 
 @dataclass(frozen=True)
@@ -59,3 +65,13 @@ class Hold:
     def time_unknown(self) -> bool:
         """Whether the time that its test claims is certainly wrong."""
         return any(doubt.time_unknown for doubt in self.doubts)
+
+    @property
+    def is_in(self) -> bool:
+        """Whether a person said that it counts."""
+        return self.decision in (Decision.CONFIRMED, Decision.REINSTATED)
+
+    @property
+    def is_out(self) -> bool:
+        """Whether a person said that it does not."""
+        return self.decision in (Decision.DISCARDED, Decision.WITHDRAWN)

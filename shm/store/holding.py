@@ -10,19 +10,27 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.errors import NothingThere, UsageError
+from shm.errors import NothingThere, UsageError, sentence
 from shm.modes_document import test_document
 from shm.store.blobs import test_from_document
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import counts, in_force, write_event
+from shm.store.files import by_id, counts, in_force, write_event
 from shm.store.hold_rows import Decision, Hold
 from shm.store.judging import fingerprint_from, held_tests_from, notice_key
 from shm.store.queries import Queries, plain_tests
 from shm.store.results import advance_recordings
 from shm.store.rows import Stage, StoredTest
 from shm.store.stepping import write_step
-from shm.store.tables import acknowledgements, alerts, fingerprints, holds, recordings, tests
+from shm.store.tables import (
+    acknowledgements,
+    alerts,
+    events,
+    fingerprints,
+    holds,
+    recordings,
+    tests,
+)
 from shm.values import Fingerprint, KnownSamples
 
 _MOST_COMPARED = (
@@ -48,6 +56,11 @@ class Holding(Queries):
             row = _latest(connection, recording_id)
         return None if row is None else _hold(row)
 
+    def discarded(self, recording_id: int) -> Hold | None:
+        """The decision by which a recording is out; None where it counts, or was refused since."""
+        with self.reading() as connection:
+            return standing_discard(connection, by_id(connection, recording_id))
+
     def confirm(
         self,
         recording_id: int,
@@ -66,12 +79,12 @@ class Holding(Queries):
             hold = _undecided(connection, recording_id)
             _refuse_time(hold, time, at)
             for row in _held(connection, recording_id):
-                values = _confirmed(connection, row, hold, time, who)
-                by_id = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(by_id.values(stage=Stage.IDENTIFIED, **values))
+                values = confirmed_values(connection, row, hold, time, who)
+                this = sa.update(tests).where(tests.c.id == row.id)
+                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
                 write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
-            by_id = sa.update(recordings).where(recordings.c.id == recording_id)
-            connection.execute(by_id.values(reason=None))
+            own = sa.update(recordings).where(recordings.c.id == recording_id)
+            connection.execute(own.values(reason=None))
             advance_recordings(connection, [recording_id], at)
             decided = replace(hold, decision=Decision.CONFIRMED, time=time)
             return _decide(connection, decided, who, why, at)
@@ -84,19 +97,19 @@ class Holding(Queries):
         with self.writing() as connection:
             hold = _undecided(connection, recording_id)
             for row in _held(connection, recording_id):
-                by_id = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(by_id.values(stage=Stage.REFUSED))
+                this = sa.update(tests).where(tests.c.id == row.id)
+                connection.execute(this.values(stage=Stage.REFUSED))
                 write_step(connection, recording_id, Stage.REFUSED, at, row.id)
-            by_id = sa.update(recordings).where(recordings.c.id == recording_id)
+            own = sa.update(recordings).where(recordings.c.id == recording_id)
             reason = connection.scalar(
                 sa.select(recordings.c.reason).where(recordings.c.id == recording_id)
             )
-            told = f"discarded by {who}" + (f": {why}" if why else ".")
-            remedy = "The raw file stays in the archive; drop it again to have it judged anew."
-            discarded = {**(loads(reason) or {}), "message": told, "remedy": remedy}
-            connection.execute(by_id.values(stage=Stage.REFUSED, reason=discarded))
+            decided = replace(hold, decision=Decision.DISCARDED, decided_at=at, who=who, why=why)
+            told = {"message": discarded_reason(decided), "remedy": taking_back(decided)}
+            discarded = {**(loads(reason) or {}), **told}
+            connection.execute(own.values(stage=Stage.REFUSED, reason=discarded))
             write_step(connection, recording_id, Stage.REFUSED, at)
-            return _decide(connection, replace(hold, decision=Decision.DISCARDED), who, why, at)
+            return _decide(connection, decided, who, why, at)
 
     def known_samples(
         self, recording_id: int, hanger: int, fingerprint: Fingerprint
@@ -105,7 +118,7 @@ class Holding(Queries):
         any other; the earliest first, as the others may be copies of it."""
         same_numbers = fingerprints.c.digest == fingerprint.digest
         query = (
-            sa.select(fingerprints, recordings.c.file_name, recordings.c.hanger)
+            sa.select(fingerprints, *(recordings.c[n] for n in ("file_name", "hanger", "stage")))
             .join(recordings)
             .where(
                 (recordings.c.hanger == hanger) | same_numbers,
@@ -121,6 +134,8 @@ class Holding(Queries):
                 f"{row.file_name} (recording {row.recording_id})",
                 row.hanger,
                 fingerprint_from(row),
+                row.recording_id,
+                row.stage != Stage.HELD,
             )
             for row in sorted(rows, key=lambda row: int(row.recording_id))
         )
@@ -139,6 +154,42 @@ class Holding(Queries):
         query = plain_tests.where(mine, counts(tests), in_force(tests))
         latest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
         return self._tests(latest)[::-1]
+
+
+def holds_of(connection: Connection, recording_id: int) -> tuple[Hold, ...]:
+    """All holds of a recording and decisions on it, the oldest first."""
+    query = _holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
+    return tuple(_hold(row) for row in connection.execute(query))
+
+
+def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None:
+    """The decision by which a recording is out; None where it counts, or was refused since."""
+    if recording.stage != Stage.REFUSED:
+        return None
+    row = _latest(connection, recording.id)
+    hold = None if row is None else _hold(row)
+    if hold is None or not hold.is_out:
+        return None
+    refusals = sa.select(events.c.kind).where(
+        events.c.recording_id == recording.id,
+        events.c.kind.in_(["refused", Decision.DISCARDED, Decision.WITHDRAWN]),
+    )
+    latest = connection.scalar(refusals.order_by(events.c.id.desc()).limit(1))
+    return None if latest == "refused" else hold
+
+
+def discarded_reason(hold: Hold) -> str:
+    """Who discarded it, when and why, as a sentence."""
+    because = f", because: {hold.why}" if hold.why else ""
+    return sentence(f"discarded on {hold.decided_at:%Y-%m-%d} by {hold.who}{because}")
+
+
+def taking_back(hold: Hold) -> str:
+    """How to change one's mind about what was discarded."""
+    return (
+        "Its raw file stays in the archive. To let it count after all: "
+        f"`shm ingest --confirm {hold.recording_id} --why TEXT`."
+    )
 
 
 def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
@@ -174,8 +225,8 @@ def _undecided(connection: Connection, recording_id: int) -> Hold:
             )
         raise UsageError(
             f"recording {recording_id} is not held: it was {row.decision} by {row.who}.",
-            remedy="To decide anew, drop the file again beside a sidecar that says what is right: "
-            "it is judged again.",
+            remedy=f"`shm ingest --discard {recording_id} --why TEXT` takes out what counts, "
+            f"`shm ingest --confirm {recording_id} --why TEXT` takes back what was discarded.",
         )
     return _hold(row)
 
@@ -198,7 +249,7 @@ def _held(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
     return connection.execute(query.where(own, in_force(tests)).order_by(tests.c.id)).all()
 
 
-def _confirmed(
+def confirmed_values(
     connection: Connection, row: Row[Any], hold: Hold, time: datetime | None, who: str
 ) -> dict[str, Any]:
     """What changes of a test whose time is given, or certainly wrong."""
@@ -219,7 +270,8 @@ def _confirmed(
 def time_note(hold: Hold, time: datetime | None, who: str) -> str:
     """Where the time of a confirmed test comes from."""
     given = "not known: that of its receipt counts" if time is None else "given"
-    return f"time {given}, confirmed by {who}: {hold.doubts[0].state}"
+    why = f": {hold.doubts[0].state}" if hold.doubts else ""
+    return f"time {given}, confirmed by {who}{why}"
 
 
 def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> Hold:

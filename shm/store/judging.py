@@ -10,7 +10,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.store.blobs import number, pack, unpack
+from shm.store.blobs import number as number_from
+from shm.store.blobs import pack, unpack
 from shm.store.database import insert
 from shm.store.files import in_force, write_event
 from shm.store.hold_rows import HeldTest
@@ -26,7 +27,8 @@ class Judged:
     """What plausibility says of a recording with the sidecar that it was judged with.
 
     `held` are its tests that are held, `notice` what to tell of that; None where none is.
-    `fingerprint` is that of its samples, None where it has none.
+    `fingerprint` is that of its samples, None where it has none. `out` are the places in the file
+    of tests that a person has discarded with this sidecar: they stay so.
     """
 
     sidecar_as: str | None
@@ -34,6 +36,7 @@ class Judged:
     held: tuple[HeldTest, ...] = ()
     notice: Alert | None = None
     hooks: Sequence[str] = ()
+    out: tuple[int, ...] = ()
 
 
 def keep_judgement(
@@ -42,6 +45,8 @@ def keep_judgement(
     """Holds what is in doubt; the notice of that, None where nothing is."""
     if judged.fingerprint is not None:
         _keep_fingerprint(connection, recording.id, judged.fingerprint)
+    for position in judged.out:
+        _mark(connection, recording.id, position, Stage.REFUSED, at)
     if judged.notice is None:
         return None
     held = _hold_tests(connection, recording.id, judged.held, at)
@@ -52,7 +57,7 @@ def keep_judgement(
     }
     row = {"recording_id": recording.id, "held_at": at, "document": document}
     hold_id = insert(connection, holds, row)
-    reason = _reason(judged.notice, recording, at)
+    reason = reason_of(recording, judged.notice.message, at)
     by_id = recordings.c.id == recording.id
     connection.execute(sa.update(recordings).where(by_id).values(reason=reason))
     write_event(connection, at, "held", recording.id, recording.file_name, reason["message"])
@@ -77,11 +82,15 @@ def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
         HeldTest(
             each["position"],
             each["name"],
-            tuple(Doubt(**doubt) for doubt in each["doubts"]),
-            number(each["tension_shift"]),
+            tuple(_doubt_from(doubt) for doubt in each["doubts"]),
+            number_from(each["tension_shift"]),
         )
         for each in document["tests"]
     )
+
+
+def _doubt_from(document: Mapping[str, Any]) -> Doubt:
+    return Doubt(**{**document, "instead_of": tuple(document.get("instead_of", ()))})
 
 
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
@@ -96,24 +105,32 @@ def _hold_tests(
     connection: Connection, recording_id: int, held: Sequence[HeldTest], at: datetime
 ) -> dict[str, int]:
     """Marks the tests that are held; their numbers by the name that they came with."""
+    return {
+        test.name: _mark(connection, recording_id, test.position, Stage.HELD, at) for test in held
+    }
+
+
+def _mark(
+    connection: Connection, recording_id: int, position: int, stage: Stage, at: datetime
+) -> int:
+    """Brings the test at a place of a file to a stage; its number."""
     own = (tests.c.recording_id == recording_id) & in_force(tests)
-    numbers = {}
-    for test in held:
-        here = own & (tests.c.position == test.position)
-        numbers[test.name] = connection.scalars(sa.select(tests.c.id).where(here)).one()
-        connection.execute(sa.update(tests).where(here).values(stage=Stage.HELD))
-        write_step(connection, recording_id, Stage.HELD, at, numbers[test.name])
-    return numbers
+    here = own & (tests.c.position == position)
+    number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
+    connection.execute(sa.update(tests).where(here).values(stage=stage))
+    write_step(connection, recording_id, stage, at, number)
+    return number
 
 
-def _reason(notice: Alert, recording: Row[Any], at: datetime) -> dict[str, Any]:
+def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "") -> dict[str, Any]:
+    """Why a recording is held, or counts no more."""
     return {
         "schema": "shm.reason/1",
         "file": recording.file_name,
         "line": None,
         "channel": None,
-        "message": notice.message,
-        "remedy": "",
+        "message": message,
+        "remedy": remedy,
         "time": at,
         "sha256": recording.sha256,
     }

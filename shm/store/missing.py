@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -30,6 +30,9 @@ from shm.store.tables import events, metadata
 ACCEPTED = "accepted"
 """The kind of event by which a person accepts that a row is gone."""
 
+UNHELD = ("withdrawn", "reinstated")
+"""Decisions on what was not held: no step, no event and no alert tells of a hold."""
+
 _ROWS_AT_ONCE = 500
 
 
@@ -38,6 +41,8 @@ class MissingRow:
     """A row that must be there: of which table, its number where that is known, and what tells.
 
     `referred`: others refer to it, so that a store with foreign keys does not take their rows.
+    Where its number is not known it stands for `count` rows, and `about` says of what, in words
+    that stay the same while more is done and counted.
     """
 
     table: str
@@ -45,6 +50,8 @@ class MissingRow:
     message: str
     remedy: str
     referred: bool = False
+    count: int = 1
+    about: str = ""
 
     def __str__(self) -> str:
         return f"{self.message} {self.remedy}"
@@ -57,7 +64,18 @@ class MissingRow:
     @property
     def key(self) -> str:
         """What it is called by where a person has accepted that it is gone."""
-        return self.message if self.id is None else f"{self.table}/{self.id}"
+        return (self.about or self.message) if self.id is None else f"{self.table}/{self.id}"
+
+    def beyond(self, accepted: Mapping[str, int]) -> int:
+        """How many rows are missing beyond those that were accepted.
+
+        An older version called them by the message, whatever was counted in it.
+        """
+        return (
+            self.count
+            - accepted.get(self.key, 0)
+            - (self.key != self.message) * (accepted.get(self.message, 0))
+        )
 
 
 def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
@@ -68,12 +86,14 @@ def missing_rows(connection: Connection) -> tuple[MissingRow, ...]:
         found.setdefault(row.key, row)
     for row in _gaps(connection, accepted):
         found.setdefault(row.key, row)
-    return tuple(row for key, row in found.items() if key not in accepted)
+    left = ((row, row.beyond(accepted)) for row in found.values())
+    return tuple(replace(row, count=count) for row, count in left if count > 0)
 
 
-def _accepted(connection: Connection) -> frozenset[str]:
+def _accepted(connection: Connection) -> Mapping[str, int]:
+    """How many rows were accepted as gone, by what they were called: an event a row."""
     query = sa.select(events.c.file_name).where(events.c.kind == ACCEPTED)
-    return frozenset(connection.scalars(query))
+    return Counter(connection.scalars(query))
 
 
 def _by_rules(connection: Connection) -> Iterator[MissingRow]:
@@ -84,12 +104,24 @@ def _by_rules(connection: Connection) -> Iterator[MissingRow]:
 
 @cache
 def _queries() -> tuple[tuple[Rule, sa.TextClause], ...]:
-    return tuple((rule, sa.text(rule.query.replace(":", "\\:"))) for rule in RULES)
+    return tuple((rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in RULES)
+
+
+def _lacking(rule: Rule) -> str:
+    if not rule.counts:
+        return rule.query
+    more, fewer = rule.counts[:2]
+    return f"SELECT * FROM ({rule.query}) found WHERE {more} > {fewer}"  # noqa: S608 - no input
 
 
 def _missed(rule: Rule, row: RowMapping) -> MissingRow:
     told = {str(name): value for name, value in row.items()}
-    return MissingRow(rule.table, None, rule.said.format(**told), rule.remedy.format(**told))
+    said, remedy = rule.said.format(**told), rule.remedy.format(**told)
+    if not rule.counts:
+        return MissingRow(rule.table, None, said, remedy)
+    more, fewer = rule.counts[:2]
+    about = rule.said.format(**{**told, **dict.fromkeys(rule.counts, "so many")})
+    return MissingRow(rule.table, None, said, remedy, False, told[more] - told[fewer], about)
 
 
 def _referred(connection: Connection) -> Iterator[MissingRow]:
@@ -132,7 +164,7 @@ def _gaps(connection: Connection, accepted: Collection[str]) -> Iterator[Missing
 def _by_documents(connection: Connection) -> Iterator[MissingRow]:
     """Rows that are named by the documents of others."""
     for name, columns, told in (
-        ("holds", ("recording_id",), _held_steps),
+        ("holds", ("recording_id", "decision"), _held_steps),
         ("posteriors", (), _made_of),
         ("watches", ("test_id", "baseline_id", "superseded_at"), _said_of),
         ("alerts", ("key",), _told_to),
@@ -174,11 +206,14 @@ def _held_steps(connection: Connection, held: _Documents) -> Iterator[MissingRow
     )
     named: Counter[int] = Counter()
     for row, document in held:
-        named[row.recording_id] += len(document.get("tests", ()))
+        if row.decision not in UNHELD:
+            named[row.recording_id] += len(document.get("tests", ()))
     for recording, count in named.items():
-        if count > steps.get((recording,), 0):
-            said = f"a step of recording {recording} is missing: {count} times a test was held."
-            yield MissingRow("steps", None, said, HISTORY)
+        lost = count - steps.get((recording,), 0)
+        if lost > 0:
+            about = f"a step of recording {recording} is missing: {{}} times a test was held."
+            said, about = about.format(count), about.format("so many")
+            yield MissingRow("steps", None, said, HISTORY, False, lost, about)
 
 
 def _made_of(connection: Connection, made: _Documents) -> Iterator[MissingRow]:
@@ -231,7 +266,9 @@ def _recording_of(connection: Connection, test: int) -> object:
 def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]:
     """What is owed of alerts, holds that were told of, and notices of holds."""
     owed = set(_counts(connection, "SELECT alert_id, hook, 1 FROM deliveries"))
-    holds = {id_ for (id_,) in _counts(connection, "SELECT id, 1 FROM holds")}
+    rows = connection.execute(sa.text("SELECT id, decision FROM holds"))
+    decisions: dict[int, str | None] = {row.id: row.decision for row in rows}
+    holds = set(decisions)
     told = set()
     for row, document in alerts:
         for hook in document.get("hooks", ()):
@@ -244,5 +281,6 @@ def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]
             if int(number) not in holds:
                 said = f"row {number} of holds is missing: alert {row.id} tells of it."
                 yield MissingRow("holds", int(number), said, RESTORE)
-    for hold in sorted(holds - told):
+    unheld = {id_ for id_, decision in decisions.items() if decision in UNHELD}
+    for hold in sorted(holds - told - unheld):
         yield MissingRow("alerts", None, f"the alert that told of hold {hold} is missing.", RESTORE)

@@ -18,13 +18,15 @@ RESTORE = "Only a backup has it: `shm db restore FILE --replace`."
 class Rule:
     """Rows of `table` that are missing, one for each row of the query.
 
-    `said` and `remedy` name columns of it; a column `id` is the number of the missing row.
+    `said` and `remedy` name columns of it. With `counts`, columns that grow as work is done again,
+    only those rows count where the first exceeds the second, by as many rows as are missing.
     """
 
     table: str
     said: str
     remedy: str
     query: str
+    counts: tuple[str, ...] = ()
 
 
 RULES = (
@@ -44,13 +46,12 @@ RULES = (
         "a hold of recording {recording} is missing: events tell of {events}, {holds} are there.",
         RESTORE,
         """
-        SELECT e.recording_id AS recording, e.events, coalesce(h.holds, 0) AS holds FROM
-            (SELECT recording_id, count(*) AS events FROM events
-             WHERE kind = 'held' AND recording_id IS NOT NULL GROUP BY recording_id) e
-            LEFT JOIN (SELECT recording_id, count(*) AS holds FROM holds GROUP BY recording_id) h
-            ON h.recording_id = e.recording_id
-        WHERE e.events > coalesce(h.holds, 0)
+        SELECT e.recording_id AS recording, count(*) AS events, (SELECT count(*) FROM holds h
+            WHERE h.recording_id = e.recording_id
+            AND coalesce(h.decision, '') NOT IN ('withdrawn', 'reinstated')) AS holds
+        FROM events e WHERE e.kind = 'held' GROUP BY e.recording_id
         """,
+        ("events", "holds"),
     ),
     Rule(
         "events",
@@ -59,32 +60,39 @@ RULES = (
         HISTORY,
         """
         SELECT h.recording_id AS recording, h.holds, coalesce(e.events, 0) AS events FROM
-            (SELECT recording_id, count(*) AS holds FROM holds GROUP BY recording_id) h
+            (SELECT recording_id, count(*) AS holds FROM holds
+             WHERE coalesce(decision, '') NOT IN ('withdrawn', 'reinstated')
+             GROUP BY recording_id) h
             LEFT JOIN (SELECT recording_id, count(*) AS events FROM events
              WHERE kind = 'held' GROUP BY recording_id) e ON h.recording_id = e.recording_id
-        WHERE h.holds > coalesce(e.events, 0)
         """,
+        ("holds", "events"),
     ),
     Rule(
         "events",
         "an event of recording {recording} is missing: it was {decision}, no event tells of that.",
         HISTORY,
         """
-        SELECT h.recording_id AS recording, h.decision FROM holds h WHERE h.decision IS NOT NULL
-        GROUP BY h.recording_id, h.decision HAVING count(*) > (SELECT count(*) FROM events e
-            WHERE e.recording_id = h.recording_id AND e.kind = h.decision)
+        SELECT h.recording_id AS recording, h.decision, count(*) AS holds,
+            (SELECT count(*) FROM events e
+                WHERE e.recording_id = h.recording_id AND e.kind = h.decision) AS events
+        FROM holds h WHERE h.decision IS NOT NULL GROUP BY h.recording_id, h.decision
         """,
+        ("holds", "events"),
     ),
     Rule(
         "holds",
         "a hold of recording {recording} is missing: an event tells that it was {decision}.",
         RESTORE,
         """
-        SELECT e.recording_id AS recording, e.kind AS decision FROM events e
-        WHERE e.kind IN ('confirmed', 'discarded', 'replaced')
-        GROUP BY e.recording_id, e.kind HAVING count(*) > (SELECT count(*) FROM holds h
-            WHERE e.recording_id = h.recording_id AND e.kind = h.decision)
+        SELECT e.recording_id AS recording, e.kind AS decision, count(*) AS events,
+            (SELECT count(*) FROM holds h
+                WHERE e.recording_id = h.recording_id AND e.kind = h.decision) AS holds
+        FROM events e
+        WHERE e.kind IN ('confirmed', 'discarded', 'replaced', 'withdrawn', 'reinstated')
+        GROUP BY e.recording_id, e.kind
         """,
+        ("events", "holds"),
     ),
     Rule(
         "acknowledgements",
@@ -108,22 +116,25 @@ RULES = (
             (SELECT recording_id, count(*) AS steps FROM steps
              WHERE stage = 'refused' AND test_id IS NULL GROUP BY recording_id) s
             LEFT JOIN (SELECT recording_id, count(*) AS events FROM events
-             WHERE kind IN ('refused', 'discarded') GROUP BY recording_id) e
+             WHERE kind IN ('refused', 'discarded', 'withdrawn') GROUP BY recording_id) e
             ON e.recording_id = s.recording_id
-        WHERE s.steps > coalesce(e.events, 0)
         """,
+        ("steps", "events"),
     ),
     Rule(
         "events",
         "an event of recording {recording} is missing: it was done {steps} times, none tells why.",
         HISTORY,
         """
-        SELECT s.recording_id AS recording, count(*) AS steps FROM steps s
-        WHERE s.stage = 'received' GROUP BY s.recording_id
-        HAVING count(*) > 1 AND count(*) - 1 > (SELECT count(*) FROM events e
-            WHERE e.recording_id = s.recording_id
-            AND e.kind IN ('reopened', 'redescribed', 'again'))
+        SELECT s.recording_id AS recording, s.steps, s.steps - 1 AS again,
+            coalesce(e.events, 0) AS events FROM
+            (SELECT recording_id, count(*) AS steps FROM steps
+             WHERE stage = 'received' GROUP BY recording_id HAVING count(*) > 1) s
+            LEFT JOIN (SELECT recording_id, count(*) AS events FROM events
+             WHERE kind IN ('reopened', 'redescribed', 'again') GROUP BY recording_id) e
+            ON e.recording_id = s.recording_id
         """,
+        ("again", "events", "steps"),
     ),
     Rule(
         "steps",
@@ -180,58 +191,63 @@ RULES = (
                 AND s.stage = 'refused' AND s.test_id IS NULL) AS steps
         FROM events e JOIN steps a ON a.recording_id = e.recording_id AND a.stage = 'archived'
         WHERE e.kind IN ('refused', 'discarded') GROUP BY e.recording_id
-        HAVING count(*) > (SELECT count(*) FROM steps s WHERE s.recording_id = e.recording_id
-                AND s.stage = 'refused' AND s.test_id IS NULL)
         """,
+        ("events", "steps"),
     ),
     Rule(
         "steps",
         "a step of recording {recording} is missing: it was received once more than steps tell.",
         HISTORY,
         """
-        SELECT e.recording_id AS recording FROM events e
-        JOIN steps a ON a.recording_id = e.recording_id AND a.stage = 'archived'
+        SELECT e.recording_id AS recording, count(*) + 1 AS events,
+            (SELECT count(*) FROM steps s WHERE s.recording_id = e.recording_id
+                AND s.stage = 'received') AS steps
+        FROM events e JOIN steps a ON a.recording_id = e.recording_id AND a.stage = 'archived'
         WHERE e.kind IN ('reopened', 'redescribed') GROUP BY e.recording_id
-        HAVING count(*) + 1 > (SELECT count(*) FROM steps s WHERE s.recording_id = e.recording_id
-                AND s.stage = 'received')
         """,
+        ("events", "steps"),
     ),
     Rule(
         "steps",
         "a step of recording {recording} is missing: it was held {holds} times.",
         HISTORY,
         """
-        SELECT h.recording_id AS recording, count(*) AS holds FROM holds h GROUP BY h.recording_id
-        HAVING count(*) > (SELECT count(*) FROM steps s WHERE s.recording_id = h.recording_id
-                AND s.stage = 'held' AND s.test_id IS NULL)
+        SELECT h.recording_id AS recording, count(*) AS holds,
+            (SELECT count(*) FROM steps s WHERE s.recording_id = h.recording_id
+                AND s.stage = 'held' AND s.test_id IS NULL) AS steps
+        FROM holds h WHERE coalesce(h.decision, '') NOT IN ('withdrawn', 'reinstated')
+        GROUP BY h.recording_id
         """,
+        ("holds", "steps"),
     ),
     Rule(
         "steps",
         "the step notified of test {test} is missing: all hooks were told of its alert.",
         HISTORY,
         """
-        SELECT n.test, n.told FROM
-            (SELECT x.test_id AS test, count(*) AS told FROM alerts x
-                JOIN tests t ON t.id = x.test_id
-                JOIN steps a ON a.recording_id = t.recording_id AND a.stage = 'archived'
-            WHERE EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)
+        SELECT x.test_id AS test, count(*) AS told,
+            (SELECT count(*) FROM steps s WHERE s.test_id = x.test_id
+                AND s.stage = 'notified') AS steps
+        FROM alerts x JOIN tests t ON t.id = x.test_id
+        JOIN steps a ON a.recording_id = t.recording_id AND a.stage = 'archived'
+        WHERE EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)
             AND NOT EXISTS (
                 SELECT 1 FROM deliveries d WHERE d.alert_id = x.id AND d.state = 'waiting')
-            GROUP BY x.test_id) n
-        WHERE n.told > (SELECT count(*) FROM steps s WHERE s.test_id = n.test
-                AND s.stage = 'notified')
+        GROUP BY x.test_id
         """,
+        ("told", "steps"),
     ),
     Rule(
         "deliveries",
         "a delivery is missing: test {test} has a step notified, and no alert of it was told.",
         HISTORY,
         """
-        SELECT s.test_id AS test FROM steps s WHERE s.stage = 'notified' GROUP BY s.test_id
-        HAVING count(*) > (SELECT count(*) FROM alerts x WHERE x.test_id = s.test_id
-            AND EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id))
+        SELECT s.test_id AS test, count(*) AS steps,
+            (SELECT count(*) FROM alerts x WHERE x.test_id = s.test_id
+                AND EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)) AS told
+        FROM steps s WHERE s.stage = 'notified' GROUP BY s.test_id
         """,
+        ("steps", "told"),
     ),
     Rule(
         "fingerprints",
@@ -239,7 +255,7 @@ RULES = (
         "Make it again: `shm ingest --again {recording}`.",
         """
         SELECT r.id AS recording FROM recordings r
-        WHERE r.modified_at IS NOT NULL
+        WHERE r.modified_at IS NOT NULL AND r.stage <> 'refused'
             AND NOT EXISTS (SELECT 1 FROM fingerprints f WHERE f.recording_id = r.id)
             AND lower(r.file_name) NOT LIKE '%.modes.json'
             AND EXISTS (SELECT 1 FROM tests t WHERE t.recording_id = r.id

@@ -48,7 +48,7 @@ plain_tests = sa.select(*_columns, recordings.c.sha256).join(recordings)
 _undone = adoptions.c.undone_at.is_not(None)
 _undone_selections = sa.select(adoptions.c.selection_id).where(_undone)
 _undone_baselines = sa.select(adoptions.c.baseline_id).where(_undone)
-_WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
+WEIGHED = sa.type_coerce(tests.c.document, sa.Text).contains('"tension_read_n"')
 # Posteriors of the baseline's tests in a class that is not in force: it lost a selection that
 # holds, or it was adopted and that was undone. And those of baselines set anew: their tests have
 # a posterior each, which must still show what moved between them.
@@ -151,14 +151,14 @@ class Queries(Database):
             tests.c.time < before,
             counts(tests),
             in_force(tests),
-            _WEIGHED,
+            WEIGHED,
         )
         found = self._tests(query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(1))
         return found[0] if found else None
 
     def weighed_among(self, ids: Collection[int]) -> frozenset[int]:
         """Which of these tests are of a tension that was read, too."""
-        query = sa.select(tests.c.id).where(tests.c.id.in_(ids), _WEIGHED)
+        query = sa.select(tests.c.id).where(tests.c.id.in_(ids), WEIGHED)
         with self.reading() as connection:
             return frozenset(connection.scalars(query))
 
@@ -350,8 +350,12 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
 
 
 def _shown(hanger: int) -> sa.Select[Any]:
+    counting = sa.select(posterior_tests.c.posterior_id).join(tests).where(counts(tests))
     return sa.select(posteriors).where(
-        posteriors.c.hanger == hanger, posteriors.c.id.not_in(hidden), in_force(posteriors)
+        posteriors.c.hanger == hanger,
+        posteriors.c.id.not_in(hidden),
+        posteriors.c.id.in_(counting.where(tests.c.hanger == hanger)),
+        in_force(posteriors),
     )
 
 

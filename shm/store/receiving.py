@@ -15,9 +15,11 @@ from shm.store.files import (
     by_checksum,
     by_id,
     in_force,
+    note_name,
     recording_from,
     write_event,
 )
+from shm.store.holding import standing_discard
 from shm.store.rows import Outcome, Receipt, ReceivedFile, Stage
 from shm.store.stepping import ARCHIVED, write_step
 from shm.store.superseding import redescribe
@@ -34,7 +36,7 @@ class Receiving(Files):
         """
         with self.writing() as connection:
             known = by_checksum(connection, file.sha256)
-            outcome = _outcome(known, file)
+            outcome = _outcome(connection, known, file)
             if known is None:
                 row_id = _enter(connection, file, at)
             else:
@@ -43,14 +45,15 @@ class Receiving(Files):
             return Receipt(outcome, recording_from(by_id(connection, row_id)))
 
 
-def _outcome(known: Row[Any] | None, file: ReceivedFile) -> Outcome:
+def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile) -> Outcome:
     if known is None:
         return Outcome.NEW
     if known.arrival == file.arrival:
         return Outcome.RESUMED
-    if known.stage == Stage.REFUSED:
-        return Outcome.REOPENED
     is_described = file.sidecar_as not in (None, known.sidecar_as)
+    if known.stage == Stage.REFUSED:
+        is_out = standing_discard(connection, known) is not None
+        return Outcome.DISCARDED if is_out and not is_described else Outcome.REOPENED
     return Outcome.REDESCRIBED if is_described else Outcome.DUPLICATE
 
 
@@ -67,10 +70,14 @@ def _notice(
 ) -> None:
     if outcome is Outcome.RESUMED:
         return
+    if outcome in (Outcome.REOPENED, Outcome.REDESCRIBED):
+        note_name(connection, known, file.file_name, at)
     message = f"the same file as {known.file_name}; not stored twice."
     if outcome is Outcome.REOPENED:
         _reopen(connection, known.id, file, at)
         message = "dropped again after its refusal; tried again."
+    elif outcome is Outcome.DISCARDED:
+        message = f"the same file as {known.file_name}, which was discarded and stays so."
     elif outcome is Outcome.REDESCRIBED:
         message = redescribe(connection, known, file, at)
     write_event(connection, at, outcome, known.id, file.file_name, message)

@@ -49,6 +49,7 @@ class Outcome(StrEnum):
     RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
     DUPLICATE = "duplicate"  # the same bytes dropped again
     REOPENED = "reopened"  # refused before, dropped again: tried again
+    DISCARDED = "discarded before"  # a person discarded it, dropped again: it stays so
     REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
 
 

@@ -20,6 +20,7 @@ from shm.store.database import make_engine
 from shm.store.holding import Holding
 from shm.store.listing import Listing
 from shm.store.measuring import Measuring
+from shm.store.naming import Naming
 from shm.store.receiving import Receiving
 from shm.store.results import Results
 from shm.store.stepping import Stepping
@@ -27,6 +28,7 @@ from shm.store.superseding import Superseding
 from shm.store.tokens import Tokens
 from shm.store.trends import Trends
 from shm.store.upkeep import Upkeep
+from shm.store.withdrawing import Withdrawing
 
 
 class Store(
@@ -40,6 +42,8 @@ class Store(
     Adopting,
     Stepping,
     Superseding,
+    Withdrawing,
+    Naming,
     Measuring,
     Tokens,
     ArchiveCopies,

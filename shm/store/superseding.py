@@ -12,8 +12,8 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Database
-from shm.store.files import begin_again, in_force, recording_from, write_event
-from shm.store.holding import end_hold
+from shm.store.files import begin_again, counts, in_force, recording_from, write_event
+from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.queries import lineage_from
 from shm.store.results import advance_recordings
 from shm.store.rows import FormerPosterior, FormerTest, ReceivedFile, Rerun, Stage
@@ -31,34 +31,11 @@ from shm.store.tables import (
 )
 
 AGAIN_FROM = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
-_BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
+BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
 class Superseding(Database):
     """The part of the store that sends tests back and remembers what was known before."""
-
-    def recording_named(self, which: str) -> tuple[int, str | None]:
-        """The recording that is meant: by its number or by the name of a test of it.
-
-        Also the test's name, where it was that. Raises NothingThere, and UsageError where several
-        hangers have a test of that name.
-        """
-        by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
-        with self.reading() as connection:
-            if which.isdecimal():
-                by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
-                if connection.scalar(by_number) is not None:
-                    return int(which), None
-            found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
-        if not found:
-            raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
-        if len(found) > 1:
-            numbers = ", ".join(map(str, found))
-            raise UsageError(
-                f"{len(found)} hangers have a test {which!r}.",
-                remedy=f"Give its recording's number: {numbers}.",
-            )
-        return found[0], which
 
     def again(
         self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
@@ -70,10 +47,14 @@ class Superseding(Database):
         """
         with self.writing() as connection:
             recording = _locked(connection, recording_id)
+            out = standing_discard(connection, recording)
+            if out is not None and not _counts(connection, recording_id):
+                told = f"{recording.file_name} was {discarded_reason(out)}"
+                raise UsageError(told, remedy=taking_back(out))
             chosen = _chosen(connection, recording, stage, test)
             ids = [row.id for row in chosen]
-            own = _of_baselines(connection, chosen)
-            counts = _supersede_results(connection, ids, stage, at)
+            own = of_baselines(connection, chosen)
+            counts = supersede_results(connection, ids, stage, at)
             if stage is Stage.IDENTIFIED:
                 _identify_again(connection, recording_id, ids, at)
             else:
@@ -112,10 +93,10 @@ def redescribe(connection: Connection, known: Row[Any], file: ReceivedFile, at: 
     query = sa.select(tests).where(tests.c.recording_id == known.id, in_force(tests))
     rows = connection.execute(query).all()
     ids = [row.id for row in rows]
-    of_baseline = sorted(row.name for row in rows if row.id in _of_baselines(connection, rows))
+    of_baseline = sorted(row.name for row in rows if row.id in of_baselines(connection, rows))
     by_id = sa.update(recordings).where(recordings.c.id == known.id)
     connection.execute(by_id.values(**vars(file)))
-    _supersede_results(connection, ids, Stage.IDENTIFIED, at)
+    supersede_results(connection, ids, Stage.IDENTIFIED, at)
     _identify_again(connection, known.id, ids, at)
     connection.execute(sa.delete(watch_states).where(_kept_states(known.hanger)))
     told = f"the same bytes as {known.file_name} with another sidecar: done again with that."
@@ -164,12 +145,18 @@ def _chosen(
     return rows
 
 
+def _counts(connection: Connection, recording_id: int) -> bool:
+    """Whether any test of a recording counts."""
+    own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
+    return connection.execute(own.where(in_force(tests), counts(tests))).first() is not None
+
+
 def _has_reached(stage: str, wanted: Stage) -> bool:
     """Whether a test has what is to be done anew; one that was refused has got to nothing."""
     return stage in AGAIN_FROM[AGAIN_FROM.index(wanted) :]
 
 
-def _of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int]:
+def of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int]:
     """Which of the tests, or former identifications of them, a baseline was made from."""
     made = (
         sa.select(tests.c.hanger, tests.c.name)
@@ -180,7 +167,7 @@ def _of_baselines(connection: Connection, chosen: Sequence[Row[Any]]) -> set[int
     return {row.id for row in chosen if (row.hanger, row.name) in names}
 
 
-def _supersede_results(
+def supersede_results(
     connection: Connection, ids: Collection[int], stage: Stage, at: datetime
 ) -> tuple[int, int]:
     """How many posteriors and watches are superseded; those of baselines and selections stay."""
@@ -206,7 +193,7 @@ def _mark(
 def _send_back(
     connection: Connection, recording_id: int, ids: Collection[int], stage: Stage, at: datetime
 ) -> None:
-    before = _BEFORE[stage]
+    before = BEFORE[stage]
     connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=before))
     for test_id in ids:
         write_step(connection, recording_id, before, at, test_id)

@@ -25,9 +25,14 @@ class Upkeep(Database):
         more. How many rows that is.
         """
         with self.writing() as connection:
-            gone = [row for row in missing_rows(connection) if row.only_in_backup]
-            for row in gone:
-                write_event(connection, at, ACCEPTED, None, row.key, f"by {who}: {why}")
+            gone = [
+                row.key
+                for row in missing_rows(connection)
+                if row.only_in_backup
+                for _ in range(row.count)
+            ]
+            for key in gone:
+                write_event(connection, at, ACCEPTED, None, key, f"by {who}: {why}")
         return len(gone)
 
     def note_removed(self, recording: StoredRecording, copy_folder: str, at: datetime) -> None:

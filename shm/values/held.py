@@ -17,7 +17,8 @@ class Doubt:
     `state` says what is the matter and `action` what to do, both without a full stop; `why` is a
     sentence on how that was found. `check` names the check that raised it. `time_unknown`: the
     test's time is certainly wrong, and one that is confirmed without another counts from its
-    receipt.
+    receipt. `instead_of` are the numbers of recordings of which it holds more than they do: they
+    are to be discarded if it shall count.
     """
 
     check: str
@@ -25,6 +26,7 @@ class Doubt:
     action: str
     why: str
     time_unknown: bool = False
+    instead_of: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +47,13 @@ class Fingerprint:
 
 @dataclass(frozen=True, eq=False)
 class KnownSamples:
-    """An earlier recording, how to call it, and what its samples look like."""
+    """An earlier recording, how to call it, and what its samples look like.
+
+    `counts` is false of one that is held itself: it may be a copy, too.
+    """
 
     name: str
     hanger: int | None
     fingerprint: Fingerprint
+    recording_id: int = 0
+    counts: bool = True

@@ -81,8 +81,6 @@ def main() -> None:
         record = hammer_test(
             hanger, state, plan, rng, disturbances=DISTURBED[number % len(DISTURBED)]
         )
-        harder = replace(plan, peak_force_n=1.3 * plan.peak_force_n)
-        later = hammer_test(hanger, state, harder, rng)
         names = [channel.name for channel in record.accelerations]
         one, mass_kg = str(rng.choice(names)), apparent_mass_kg(record)
         masses.append(mass_kg / hanger.mass_per_length_kg_m / hanger.length_m)
@@ -97,9 +95,6 @@ def main() -> None:
             cases[f"one acceleration x {factor:g}"] = times(record, factor, one)
         for name, case in cases.items():
             found[name].append(bool(signal_doubts([case], hanger)))
-        found["right, by an earlier test"].append(bool(signal_doubts([later], hanger, [mass_kg])))
-        in_g = times(later, 1 / 9.81, *names)
-        found["g, by an earlier test"].append(bool(signal_doubts([in_g], hanger, [mass_kg])))
     for name, doubts in found.items():
         print(f"{name:38s} doubted {interval(sum(doubts), len(doubts))}")
     print(f"J/v over the hanger's mass: {min(masses):.2f} to {max(masses):.2f}")

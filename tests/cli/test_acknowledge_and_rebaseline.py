@@ -119,7 +119,7 @@ def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
     shm: Shm, workspace: Path
 ) -> None:
     told = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30").out
-    assert "Still open of it: alert 1." in told
+    assert "Take note of them: `shm alerts ack 1`." in told
     shown = shm("--workspace", workspace, "drift").out
     assert " ".join(shown.split()) == (
         "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "

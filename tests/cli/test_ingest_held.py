@@ -95,13 +95,60 @@ def test_what_is_confirmed_while_a_daemon_serves_is_left_to_it(shm: Shm, held: W
 
 
 def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspace) -> None:
-    ended = shm("--workspace", held.folder, "ingest", "--discard", 2, "--why", "wrong hanger")
+    say = ("--workspace", held.folder, "ingest")
+    ended = shm(*say, "--discard", 2, "--why", "wrong hanger")
     assert ended.code == 0
     assert "Its raw file stays in the archive." in ended.out
-    again = shm("--workspace", held.folder, "ingest", "--confirm", 2)
+    again = shm(*say, "--confirm", 2)
     assert again.code == 2
     assert "it was discarded by" in again.err
-    assert "drop the file again beside a sidecar" in " ".join(again.err.split())
+    assert "`shm ingest --confirm 2 --why TEXT`" in " ".join(again.err.split())
+    back = shm(*say, "--confirm", "lost", "--why", "it was right", "--time", "2026-06-01T10:00Z")
+    assert back.code == 0
+    assert "counts again from now on; it is done. Its time is 2026-06-01 10:00." in back.out
+
+
+def test_a_discarded_file_that_comes_again_is_told_in_one_line(
+    shm: Shm, held: Workspace, tmp_path: Path
+) -> None:
+    say = ("--workspace", held.folder, "ingest")
+    assert shm(*say, "--discard", 2, "--why", "wrong hanger.", "--who", "Ann").code == 0
+    (tmp_path / "resent.modes.json").write_text(epoch(held))
+    ended = shm(*say, tmp_path / "resent.modes.json")
+    assert ended.code == 0
+    (line,) = ended.err.splitlines()
+    today = f"{datetime.now(UTC):%Y-%m-%d}"
+    assert line == (
+        f"resent.modes.json: discarded before, on {today} by Ann, because: wrong hanger. Its raw "
+        "file stays in the archive. To let it count after all: `shm ingest --confirm 2 --why TEXT`."
+    )
+    (row,) = shm(*say, tmp_path / "resent.modes.json", "--json").document["files"]
+    assert (row["outcome"], row["stage"]) == ("discarded before", "refused")
+    assert shm(*say, "--held").out == "Nothing is held.\n"
+    of = ("--workspace", held.folder, "status", "--of")
+    assert "recording 2: lost.modes.json (also came as resent.modes.json)" in " ".join(
+        shm(*of, "resent").out.split()
+    )
+    assert shm(*of, "resent", "--json").document == shm(*of, "lost", "--json").document
+
+
+def test_what_counts_is_discarded_with_a_reason_and_taken_back(shm: Shm, held: Workspace) -> None:
+    say = ("--workspace", held.folder, "ingest")
+    refused = shm(*say, "--discard", "good")
+    assert refused.code == 2
+    assert "`shm ingest --discard 1 --why TEXT`" in " ".join(refused.err.split())
+    ended = shm(*say, "--discard", "good", "--why", "of hanger 4")
+    assert ended.code == 0
+    said = " ".join(ended.out.split())
+    assert "Recording 1 (good.modes.json): good is discarded and counts in nothing" in said
+    assert "`shm drift rebaseline --hanger 3 --since 2026-05-01 --why TEXT`" in said
+    assert "`shm ingest --confirm 1 --why TEXT`" in said
+    with held.store() as store:
+        assert store.tests(3) == ()
+    assert shm("--workspace", held.folder, "db", "check").code == 0
+    back = shm(*say, "--confirm", 1, "--why", "of hanger 3 after all", "--json").document
+    assert (back["decision"], back["stage"]) == ("reinstated", "done")
+    assert shm(*say, "--confirm", 1).code == shm(*say, "--confirm", 1, "--why", "x").code == 2
 
 
 def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Workspace) -> None:

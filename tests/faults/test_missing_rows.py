@@ -18,6 +18,7 @@ from shm.store import Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import check_store
 from shm.store.database import make_engine
+from shm.store.files import write_event
 from shm.store.missing import MissingRow, missing_rows
 from shm.store.numbering import NUMBERED, noted
 from shm.store.tables import metadata
@@ -28,7 +29,7 @@ from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import damage
 from tests.helpers.flows import threads
-from tests.helpers.histories import a_history
+from tests.helpers.histories import EPOCH, a_history
 from tests.helpers.postgres import Databases
 from tests.store.make_released_database import fill
 
@@ -199,6 +200,49 @@ def test_what_no_backup_has_is_accepted_and_no_more_than_that(
     with bridge.store() as store:
         accepted = {event.file_name: event.message for event in store.events("accepted")}
     assert accepted["tokens/1"].endswith(": taken out by hand")
+
+
+@pytest.mark.parametrize(
+    ("table", "recording", "which"),
+    [
+        ("events", 12, "kind = 'held'"),
+        ("events", 11, "kind = 'again'"),
+        ("events", 14, "kind = 'refused'"),
+        ("holds", 9, "decision IS NOT NULL"),
+        ("steps", 12, "stage = 'held' AND test_id IS NULL"),
+    ],
+)
+def test_what_was_accepted_stays_accepted_as_work_is_done_again(
+    bridge: Workspace, table: str, recording: int, which: str
+) -> None:
+    """It was called by a sentence with counts, which grew when the recording was held again."""
+    first = f"SELECT min(id) FROM {table} WHERE recording_id = {recording} AND {which}"
+    with unguarded(bridge.location) as connection:
+        id_ = connection.scalar(sa.text(first))
+    take_out(bridge.location, table, id_)
+    with bridge.store() as store:
+        assert store.accept_missing("Ann", "no backup", store.recording(1).received_at) > 0
+    assert checked(bridge) == ()
+    assert run(["--workspace", str(bridge.folder), "ingest", "--again", str(recording)]) in (0, 3)
+    assert checked(bridge) == ()
+    with bridge.store() as store, store.reading() as connection:
+        (newest,) = connection.execute(
+            sa.text(f"SELECT max(id) FROM {table} WHERE recording_id = {recording}")
+        ).one()
+    take_out(bridge.location, table, newest)
+    assert checked(bridge)  # what is lost after that is missed all the same
+
+
+def test_what_an_older_version_accepted_stays_accepted(bridge: Workspace) -> None:
+    take_out(bridge.location, "events", 2)
+    with bridge.store() as store:
+        with store.reading() as connection:
+            found = missing_rows(connection)
+        with store.writing() as connection:
+            for row in found:
+                name = f"{row.table}/{row.id}" if row.id else row.message
+                write_event(connection, EPOCH, "accepted", None, name, "by Ann")
+    assert checked(bridge) == ()
 
 
 @pytest.mark.parametrize(

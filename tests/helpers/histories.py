@@ -59,6 +59,7 @@ def a_history(folder: Path) -> Workspace:
         _held(workspace, clock)
         _refused(workspace, clock)
         _again(workspace, clock)
+        _taken_out(workspace, clock)
     with workspace.store() as store:
         _decide(store, clock)
         _keep(workspace, store, clock, folder)
@@ -113,6 +114,20 @@ def _again(workspace: Workspace, clock: Clock) -> None:
             clock.pass_by(60)
             store.again(store.recording_named(name)[0], stage, clock())
         _work(workspace, clock)
+
+
+def _taken_out(workspace: Workspace, clock: Clock) -> None:
+    """Two tests that counted are discarded, one of them is taken back."""
+    for number in (1, 2):
+        path = workspace.spool / f"out{number}.modes.json"
+        write_test(path, workspace, hanger=4, day=80 + number, tension=0.8)
+        _work(workspace, clock)
+    with workspace.store() as store:
+        for name in ("out2", "out1"):
+            clock.pass_by(60)
+            store.withdraw(store.recording_named(name)[0], "Ann", "a slip", clock())
+        store.reinstate(store.recording_named("out2")[0], "Ann", "no slip", clock())
+    _work(workspace, clock)
 
 
 def _decide(store: Store, clock: Clock) -> None:

@@ -14,8 +14,10 @@ from shm.modes_document import modes_document
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, Workspace
+from shm.store.checking import check_store
 from shm.values import ModalTest, Recording
 from tests.helpers.any_bar import take_any_bar
+from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test, put, write_test
@@ -142,20 +144,159 @@ def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
         recording = flow.store.recording(2)
         assert recording.stage is Stage.REFUSED
         assert recording.reason is not None
-        assert recording.reason["message"] == "discarded by Ann: wrong hanger"
+        assert recording.reason["message"] == (
+            f"discarded on {flow.clock():%Y-%m-%d} by Ann, because: wrong hanger."
+        )
+        assert "`shm ingest --confirm 2 --why TEXT`" in recording.reason["remedy"]
         assert held.archive.holds(recording.file)
         assert counted(flow.store) == ["good"]
         assert flow.store.holds() == ()
 
 
-def test_what_was_discarded_and_comes_again_is_held_again(held: Workspace) -> None:
+def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> None:
+    """It was held again, and asked again, each time that the crew sent its folder."""
+    with a_flow(held) as flow:
+        flow.store.discard(2, "Ann", "of another bridge", flow.clock())
+        spool(held, "lost", EPOCH, tension=0.9)
+        receipt = flow.receive(held.spool / "lost.modes.json")
+        flow.drain()
+        assert receipt.outcome is Outcome.DISCARDED
+        assert flow.store.recording(2).stage is Stage.REFUSED
+        assert len(flow.store.alerts()) == 1
+        assert list(held.spool.iterdir()) == []
+        with pytest.raises(UsageError, match=r"was discarded on .* because: of another bridge"):
+            flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+
+
+def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) -> None:
     with a_flow(held) as flow:
         flow.store.discard(2, "Ann", "", flow.clock())
+        put(held.spool / "lost.modes.toml", "temperature_c = 12.0\n")
         spool(held, "lost", EPOCH, tension=0.9)
-        receive_all(flow)
+        assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
         flow.drain()
         assert flow.store.recording(2).stage is Stage.HELD
-        assert len(flow.store.alerts()) == 2
+
+
+def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.discard(2, "Ann", "", flow.clock())
+        flow.store.refuse(2, {"message": "no rate."}, flow.clock())
+        spool(held, "lost", EPOCH, tension=0.9)
+        assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
+
+
+def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) -> None:
+    with a_flow(held) as flow:
+        flow.store.discard(2, "Ann", "", flow.clock())
+        hold = flow.store.reinstate(2, "Bob", "it was right", flow.clock(), day(30))
+        flow.drain()
+        assert (hold.decision, hold.who) == (Decision.REINSTATED, "Bob")
+        recording = flow.store.recording(2)
+        assert (recording.stage, recording.reason) == (Stage.DONE, None)
+        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
+        assert [drift.test for drift in flow.store.drifts(3)] == ["lost"]
+        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        flow.drain()
+        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
+        assert check_store(flow.store, quiet).troubles == ()
+
+
+@pytest.fixture
+def counting(workspace: Workspace) -> Workspace:
+    """Three good tests and a loss, each of a month: recordings 1 to 4."""
+    for number, tension in enumerate((1.0, 1.0, 0.8, 0.8)):
+        spool(workspace, f"t{number}", day(30 * number), tension)
+        ingest(workspace)
+    return workspace
+
+
+def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
+    """Nobody could take out the part that had come before its whole."""
+    with a_flow(counting) as flow:
+        store = flow.store
+        made = store.withdraw(3, "Ann", "of hanger 4", flow.clock())
+        assert (made.hold.decision, made.of_baseline, made.watched_again) == (
+            Decision.WITHDRAWN,
+            (),
+            1,
+        )
+        flow.drain()
+        assert counted(store) == ["t0", "t1", "t3"]
+        assert [watch.watched.test for watch in store.watches(3)] == ["t1", "t3"]
+        assert [watch.watched.change.called for watch in store.watches(3)] == [False, False]
+        assert {drift.test for drift in store.drifts(3)} == {"t1", "t3"}
+        assert [test.test.id for test, _ in store.history(3)] == ["t0", "t1", "t3"]
+        assert len(store.posteriors(3)) == 3
+        recording = store.recording(3)
+        assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
+        assert check_store(store, quiet).troubles == ()
+        with pytest.raises(UsageError, match="does not count: it is refused"):
+            store.withdraw(3, "Ann", "", flow.clock())
+        store.reinstate(3, "Ann", "it was of 3", flow.clock())
+        flow.drain()
+        assert counted(store) == ["t0", "t1", "t2", "t3"]
+        assert [watch.watched.change.called for watch in store.watches(3)] == [False, False, True]
+        assert check_store(store, quiet).troubles == ()
+        with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
+            store.reinstate(3, "Ann", "", flow.clock())
+
+
+def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_shown(
+    counting: Workspace,
+) -> None:
+    with counting.store() as store:
+        made = store.withdraw(1, "Ann", "a part", START)
+        assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 3)
+        assert store.baseline(3) is not None
+        assert len(store.posteriors(3)) == 3
+
+
+def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace) -> None:
+    tests = [modelled_test(name, workspace.bridge.hanger(3), n) for n, name in enumerate("abc")]
+    document = dump(modes_document(tests))
+    put(workspace.spool / "campaign.modes.json", document)
+    ingest(workspace)
+    with a_flow(workspace) as flow:
+        store = flow.store
+        store.withdraw(1, "Ann", "a slip", flow.clock(), "b")
+        flow.drain()
+        assert (counted(store), store.recording(1).stage) == (["a", "c"], Stage.DONE)
+        store.again(1, Stage.IDENTIFIED, flow.clock())
+        flow.drain()
+        assert counted(store) == ["a", "c"]
+        assert check_store(store, quiet).troubles == ()
+        store.reinstate(1, "Ann", "no slip", flow.clock(), test="b")
+        flow.drain()
+        assert counted(store) == ["a", "b", "c"]
+        assert check_store(store, quiet).troubles == ()
+
+
+def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
+    """The whole that came after a part of it was called the copy, and could not count alone."""
+    whole = a_recording()
+    cut = [replace(c, values=c.values[: len(c.values) * 2 // 3]) for c in whole.channels]
+    write(replace(whole, channels=tuple(cut)), workspace.spool / "part.npz")
+    ingest(workspace)
+    write(whole, workspace.spool / "whole.npz")
+    ingest(workspace)
+    with a_flow(workspace) as flow:
+        (hold,) = flow.store.holds()
+        assert "it holds all of part.npz (recording 1), 67 % of its own samples" in hold.message
+        assert (
+            "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
+            in hold.message
+        )
+        assert ".." not in hold.message
+        flow.store.withdraw(1, "Ann", "a part", flow.clock())
+        flow.store.confirm(2, "Ann", "the whole", flow.clock())
+        flow.drain()
+        assert counted(flow.store) == ["whole"]
+        write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
+        receive_all(flow)
+        flow.drain()
+        (hold,) = flow.store.holds()
+        assert "a part of whole.npz (recording 2), 67 % of that one, sent again" in hold.message
 
 
 def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:

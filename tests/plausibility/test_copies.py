@@ -10,14 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shm.plausibility import fingerprint_of
-from shm.plausibility.copies import is_copy
+from shm.plausibility import Candidate, fingerprint_of
+from shm.plausibility.copies import copied, is_copy
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store.blobs import pack
-from shm.values import Channel, Fingerprint, FrequencyResponse, Recording, ResponsePoint
+from shm.values import (
+    Channel,
+    Fingerprint,
+    FrequencyResponse,
+    KnownSamples,
+    Recording,
+    ResponsePoint,
+)
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.workspaces import START
+from tests.helpers.workspaces import START, modelled_test
 
+PLAIN = Candidate(
+    HANGER_3, modelled_test("t", HANGER_3), START + timedelta(days=1), timedelta(days=1)
+)
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 
 
@@ -89,6 +99,83 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
     assert copy is not None
     assert is_copy(copy, own)
     assert is_copy(own, copy)
+
+
+def candidate(own: Recording, *known: KnownSamples) -> Candidate:
+    return replace(PLAIN, fingerprint=fingerprint_of([own]), copies=known)
+
+
+def known(number: int, recording: Recording, counts: bool = True) -> KnownSamples:
+    print_ = fingerprint_of([recording])
+    assert print_ is not None
+    return KnownSamples(f"f{number} (recording {number})", 3, print_, number, counts)
+
+
+def state_of(own: Recording, *others: KnownSamples) -> tuple[str, tuple[int, ...]]:
+    doubt = copied(candidate(own, *others))
+    assert doubt is not None
+    return doubt.state, doubt.instead_of
+
+
+def test_which_of_two_is_the_part_and_what_share_it_is() -> None:
+    """The whole that came after a part of it was called the copy, without a word on lengths."""
+    whole = a_recording()
+    first = part(whole, 0, 0.38 * duration_s(whole))
+    assert state_of(whole, known(1, first)) == (
+        "it holds all of f1 (recording 1), 38 % of its own samples",
+        (1,),
+    )
+    assert state_of(first, known(1, whole)) == (
+        "it is a part of f1 (recording 1), 38 % of that one, sent again",
+        (),
+    )
+    assert state_of(whole, known(1, COPIES["cut"](whole))) == (
+        "it holds the samples of f1 (recording 1) again",
+        (),
+    )
+    early, late = part(whole, 0, 40), part(whole, 20, 60)
+    longer, shorter = part(whole, 0, 50), late
+    assert state_of(early, known(1, late))[0].startswith("50 % of its samples are in f1")
+    assert state_of(shorter, known(1, longer)) == (
+        "75 % of its samples are in f1 (recording 1), 60 % of that one",
+        (),
+    )
+    assert state_of(longer, known(1, shorter)) == (
+        "it holds 75 % of f1 (recording 1), 60 % of its own samples",
+        (1,),
+    )
+
+
+def test_a_channel_that_is_left_out_is_a_share_too() -> None:
+    whole = a_recording()
+    less = COPIES["one sensor left out"](whole)  # of four
+    assert state_of(whole, known(1, less)) == (
+        "it holds all of f1 (recording 1), 75 % of its own samples",
+        (1,),
+    )
+
+
+def test_the_whole_of_several_parts_names_them_all() -> None:
+    whole = a_recording()
+    parts = [known(n, part(whole, 10 * n, 10 * n + 10)) for n in range(5)]
+    state, instead_of = state_of(whole, *parts)
+    assert instead_of == (0, 1, 2, 3, 4)
+    assert state.count("all of f") == 3
+    assert state.endswith("and of 2 more recordings")
+
+
+def test_what_counts_is_named_before_what_is_held_and_what_has_most_before_the_rest() -> None:
+    """A part matched an earlier copy, too, and that was named in place of the original."""
+    whole = a_recording()
+    half, third = part(whole, 0, 30), part(whole, 0, 20)
+    copy, original = known(1, whole, counts=False), known(2, whole)
+    assert "f2" in state_of(half, copy, original)[0]
+    assert "f2" in state_of(half, known(1, third), original)[0]
+    assert "f1" in state_of(half, copy)[0]
+    assert state_of(whole, known(1, half, counts=False), known(2, third)) == (
+        "it holds all of f2 (recording 2), 33 % of its own samples",
+        (2,),
+    )
 
 
 @pytest.mark.parametrize("noise_m_s2", [0.002, 2e-5])

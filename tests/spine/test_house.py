@@ -46,6 +46,36 @@ def test_an_error_says_where_and_what_to_do() -> None:
     assert str(error) == "a.csv, line 7, channel acc_1: NaN. Check the cable."
 
 
+def test_what_an_error_quotes_does_not_end_it_twice() -> None:
+    """Of a full stop in the quoted text and our own, one stays."""
+    assert errors.BadInput(f"cannot be read: {errors.ShmError('no line 3.')}.").message == (
+        "cannot be read: no line 3."
+    )
+    assert [errors.sentence(text) for text in ("a", "a.", "a..", "a?")] == ["a.", "a.", "a.", "a?"]
+
+
+def test_no_command_in_a_message_has_a_placeholder_for_what_shm_knows() -> None:
+    """What was damaged, held or is still open has a name; docstrings may say ID."""
+    unknown = re.compile(r"`shm [^`]*(--(again|confirm|discard|of|hanger)|ack|fetch) ([A-Z]+)\b")
+    found = [
+        f"{path.name}: {node.value}"
+        for path in SOURCES
+        for tree in [ast.parse(path.read_text())]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if unknown.search(node.value) and not _is_docstring(node, tree)
+    ]
+    assert not found
+
+
+def _is_docstring(node: ast.Constant, tree: ast.Module) -> bool:
+    return any(isinstance(each, ast.Expr) and each.value is node for each in ast.walk(tree))
+
+
+def test_a_full_disk_is_told_by_its_codes_in_one_place() -> None:
+    assert [p.name for p in SOURCES if "errno.ENOSPC" in p.read_text()] == ["errors.py"]
+
+
 def test_packaged_files_are_found() -> None:
     assert (migrations_folder() / "env.py").is_file()
     assert default_config().is_file()

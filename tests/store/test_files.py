@@ -160,3 +160,14 @@ def test_every_stage_is_counted(store: Store) -> None:
 def test_an_unknown_recording_is_nothing_there(store: Store) -> None:
     with pytest.raises(NothingThere, match="no recording 9"):
         store.recording(9)
+
+
+def test_the_events_of_one_recording_or_name_are_read_alone(store: Store) -> None:
+    """Each refusal read all events of the store to find those of its own recording."""
+    for number in (1, 2):
+        for arrival in ("first", "again"):
+            store.receive(a_file(number, arrival=arrival), NOW)
+    assert len(store.events("duplicate")) == 2
+    (own,) = store.events("duplicate", recording_id=2)
+    assert own.recording_id == 2
+    assert [each.recording_id for each in store.events(file_name="h3-1.csv")] == [1]

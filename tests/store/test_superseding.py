@@ -145,6 +145,44 @@ def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Stor
         store.recording_named("t1")
 
 
+def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
+    """With another sidecar, as a duplicate, or after its refusal: `--of` lost the old name."""
+    test = identified(store, 1)  # of h3-1.csv
+    sent = a_file(1, file_name="crew/new.uff", arrival="again", sidecar_as="22/2.toml")
+    recording = store.receive(sent, LATER).recording
+    assert recording.file.file_name == "crew/new.uff"
+    store.identified(recording.id, [IdentifiedTest(a_test("new"))], NEW, LATER)
+    store.receive(a_file(1, file_name="copy.csv", arrival="third"), LATER)
+    names = ("t1", "h3-1.csv", "h3-1", "crew/new.uff", "new.uff", "copy", "copy.csv")
+    assert {store.recording_named(name) for name in names} == {(test.recording_id, None)}
+    assert store.recording_named("new") == (test.recording_id, "new")
+    assert store.names_of(recording.id) == ("crew/new.uff", "h3-1.csv", "copy.csv")
+    with pytest.raises(NothingThere):
+        store.recording_named("h3")
+    refused = store.receive(a_file(2), NOW).recording
+    store.refuse(refused.id, {"message": "no rate."}, NOW)
+    store.receive(a_file(2, file_name="retry.csv", arrival="again"), LATER)
+    assert store.recording_named("h3-2") == store.recording_named("retry") == (refused.id, None)
+
+
+def test_a_name_that_several_files_had_is_told_with_their_numbers(store: Store) -> None:
+    for number in (1, 2):
+        store.receive(a_file(number, file_name="same.csv"), NOW)
+    with pytest.raises(UsageError, match="2 recordings were called 'same'") as caught:
+        store.recording_named("same")
+    assert "1, 2" in caught.value.remedy
+
+
+def test_a_row_finds_its_recording(store: Store) -> None:
+    baseline = with_baseline(store)
+    watched(store, second := identified(store, 2), baseline)
+    rows = (f"tests/{second.id}", "watches/1", "drifts/1", "posteriors/2")
+    assert {store.recording_named(row) for row in rows} == {(second.recording_id, None)}
+    for row in ("watches/9", "alerts/1", "watches/x"):
+        with pytest.raises(NothingThere):
+            store.recording_named(row)
+
+
 def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)

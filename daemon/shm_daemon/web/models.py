@@ -24,9 +24,9 @@ class Uploaded(BaseModel):
     sha256: str
     size_bytes: int
     file_name: str = Field(description="The name in the spool; another where that was taken.")
-    outcome: Literal["new", "duplicate", "reopened"] = Field(
+    outcome: Literal["new", "duplicate", "reopened", "discarded before"] = Field(
         description="`duplicate`: these bytes are stored already. `reopened`: they were refused "
-        "before and are tried again."
+        "before and are tried again. `discarded before`: a person has discarded them; they stay so."
     )
     status_url: str = Field(description="Says how far it has come, once the daemon has taken it.")
 

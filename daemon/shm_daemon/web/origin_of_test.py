@@ -33,7 +33,7 @@ def origin(view: TestView) -> Table:
 def _now(view: TestView) -> str:
     if view.order.terms == view.stored.lineage:
         return "as they are now"
-    return "have changed since: `shm ingest --again NAME` identifies it anew"
+    return f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
 
 
 def steps_of(view: TestView) -> tuple[Step, ...]:

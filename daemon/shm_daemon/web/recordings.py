@@ -204,7 +204,9 @@ def _outcome(store: Store, landed: Landed) -> Any:
     known = store.recording_of(landed.sha256)
     if known is None:
         return "new"
-    return "reopened" if known.stage is Stage.REFUSED else "duplicate"
+    if known.stage is not Stage.REFUSED:
+        return "duplicate"
+    return "reopened" if store.discarded(known.id) is None else "discarded before"
 
 
 def _recording(store: Store, key: str) -> StoredRecording:

@@ -1,0 +1,232 @@
+"""Taking a test that counts out again, and taking back what was discarded.
+
+Nothing is deleted: the raw file, the test and what was made of it stay, as of work done again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import UsageError, sentence
+from shm.store.database import Database, insert
+from shm.store.files import by_id, counts, in_force, write_event
+from shm.store.hold_rows import Decision, HeldTest, Hold
+from shm.store.holding import confirmed_values, discarded_reason, holds_of, taking_back
+from shm.store.judging import reason_of
+from shm.store.queries import WEIGHED
+from shm.store.results import advance_recordings
+from shm.store.rows import Stage
+from shm.store.stepping import write_step
+from shm.store.superseding import BEFORE, of_baselines, supersede_results
+from shm.store.tables import holds, recordings, tests, watch_states, watches
+
+
+@dataclass(frozen=True)
+class Withdrawal:
+    """What came of taking tests out: the decision, the names of those a baseline was made from and
+    since when it is, and how many later tests are watched again without them."""
+
+    hold: Hold
+    of_baseline: tuple[str, ...]
+    since: datetime
+    watched_again: int
+
+
+class Withdrawing(Database):
+    """The part of the store that takes out and takes back."""
+
+    def withdraw(
+        self, recording_id: int, who: str, why: str, at: datetime, test: str | None = None
+    ) -> Withdrawal:
+        """From now on the tests of a recording, or one of them, count in nothing.
+
+        Their posteriors and watches are superseded, and the later tests of the hanger are watched
+        again; baselines stay as they were made. Raises NothingThere where there is no such
+        recording, UsageError where none of it counts.
+        """
+        with self.writing() as connection:
+            recording = by_id(connection, recording_id)
+            chosen = _chosen(connection, recording_id, counts(tests), test)
+            if not chosen or recording.stage == Stage.RECEIVED:
+                raise UsageError(
+                    f"recording {recording_id} does not count: it is {recording.stage}.",
+                    remedy="See `shm ingest --held`.",
+                )
+            own = of_baselines(connection, chosen)
+            weighed = _weighed(connection, chosen)
+            ids = [row.id for row in chosen]
+            connection.execute(
+                sa.update(tests).where(tests.c.id.in_(ids)).values(stage=Stage.REFUSED)
+            )
+            for id_ in ids:
+                write_step(connection, recording_id, Stage.REFUSED, at, id_)
+            supersede_results(connection, ids, Stage.IDENTIFIED, at)
+            again = _watch_again(connection, chosen, weighed, at)
+            held = [HeldTest(row.position, row.name, ()) for row in chosen]
+            hold = _decide(connection, recording, held, (Decision.WITHDRAWN, who, why, at, None))
+            if not connection.scalar(_left(recording_id)):
+                reason = reason_of(recording, discarded_reason(hold), at, taking_back(hold))
+                _end(connection, recording_id, reason, at)
+            names = tuple(sorted(row.name for row in chosen if row.id in own))
+            return Withdrawal(hold, names, min(row.time for row in chosen), again)
+
+    def reinstate(
+        self,
+        recording_id: int,
+        who: str,
+        why: str,
+        at: datetime,
+        time: datetime | None = None,
+        test: str | None = None,
+    ) -> Hold:
+        """What was discarded of a recording, or one test of it, counts again; with its true `time`
+        where that is given.
+
+        Raises NothingThere where there is no such recording, UsageError where nothing of it, or not
+        that test, was discarded.
+        """
+        with self.writing() as connection:
+            recording = by_id(connection, recording_id)
+            refused = _chosen(connection, recording_id, tests.c.stage == Stage.REFUSED, test)
+            past = _decided_with(connection, recording_id, recording.sidecar_as)
+            chosen = [row for row in refused if row.position in past and past[row.position].is_out]
+            if not chosen:
+                raise UsageError(
+                    f"nothing of recording {recording_id} is held or discarded: it is "
+                    f"{recording.stage}.",
+                    remedy="See `shm ingest --held`.",
+                )
+            former = [past[row.position] for row in chosen]
+            held = [
+                each
+                for row, hold in zip(chosen, former, strict=True)
+                for each in hold.tests
+                if each.position == row.position
+            ]
+            record = (Decision.REINSTATED, who, why, at, time or former[-1].time)
+            hold = _decide(connection, recording, held, record)
+            for row in chosen:
+                values = confirmed_values(connection, row, hold, hold.time, who)
+                this = sa.update(tests).where(tests.c.id == row.id)
+                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
+                write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
+            by_number = sa.update(recordings).where(
+                recordings.c.id == recording_id, recordings.c.stage == Stage.REFUSED
+            )
+            connection.execute(by_number.values(stage=Stage.RECEIVED, reason=None))
+            advance_recordings(connection, [recording_id], at)
+            _watch_again(connection, chosen, _weighed(connection, chosen), at)
+            return hold
+
+    def decided(self, recording_id: int, sidecar_as: str | None) -> Mapping[int, Hold]:
+        """The newest decision on each test of a recording, by its place in the file, among those
+        that were made on it with one sidecar."""
+        with self.reading() as connection:
+            return _decided_with(connection, recording_id, sidecar_as)
+
+
+def _decided_with(
+    connection: Connection, recording_id: int, sidecar_as: str | None
+) -> dict[int, Hold]:
+    return {
+        test.position: hold
+        for hold in holds_of(connection, recording_id)
+        if hold.sidecar_as == sidecar_as and (hold.is_in or hold.is_out)
+        for test in hold.tests
+    }
+
+
+def _chosen(
+    connection: Connection, recording_id: int, which: sa.ColumnElement[bool], test: str | None
+) -> Sequence[Row[Any]]:
+    query = sa.select(tests, recordings.c.received_at).join(recordings)
+    query = query.where(tests.c.recording_id == recording_id, in_force(tests), which)
+    if test is not None:
+        query = query.where(tests.c.name == test)
+    return connection.execute(query.order_by(tests.c.id)).all()
+
+
+def _left(recording_id: int) -> sa.Select[Any]:
+    """How many tests of a recording count or are held."""
+    own = (tests.c.recording_id == recording_id) & in_force(tests)
+    return sa.select(sa.func.count()).where(own, tests.c.stage != Stage.REFUSED)
+
+
+def _end(
+    connection: Connection, recording_id: int, reason: Mapping[str, Any], at: datetime
+) -> None:
+    own = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(own.values(stage=Stage.REFUSED, reason=dict(reason)))
+    write_step(connection, recording_id, Stage.REFUSED, at)
+
+
+def _decide(
+    connection: Connection,
+    recording: Row[Any],
+    held: Sequence[HeldTest],
+    record: tuple[Decision, str, str, datetime, datetime | None],
+) -> Hold:
+    """Notes a decision that no hold came before; told of in no alert.
+
+    `record` is which, by whom, why, when, and the time that the test is given.
+    """
+    decision, who, why, at, time = record
+    names = ", ".join(test.name for test in held)
+    message = sentence(f"{decision} by {who}: {names}" + (f": {why}" if why else ""))
+    document = {
+        "message": message,
+        "sidecar_as": recording.sidecar_as,
+        "tests": [asdict(test) for test in held],
+    }
+    row = {"recording_id": recording.id, "held_at": at, "document": document}
+    made = {"decision": decision, "decided_at": at, "who": who, "why": why, "time": time}
+    insert(connection, holds, {**row, **made})
+    write_event(connection, at, str(decision), recording.id, recording.file_name, message)
+    return holds_of(connection, recording.id)[-1]
+
+
+def _weighed(connection: Connection, chosen: Sequence[Row[Any]]) -> bool:
+    """Whether the tension was read at one of the tests, which taught later ones."""
+    query = sa.select(tests.c.id).where(tests.c.id.in_([row.id for row in chosen]), WEIGHED)
+    return connection.execute(query).first() is not None
+
+
+def _watch_again(
+    connection: Connection, chosen: Sequence[Row[Any]], weighed: bool, at: datetime
+) -> int:
+    """Sends the later tests of the hangers back, to be watched with what counts now.
+
+    To be updated, where they learnt from a tension that was read. How many that are.
+    """
+    stage = Stage.UPDATED if weighed else Stage.WATCHED
+    ids = [row.id for row in chosen]
+    again: dict[int, int] = {}
+    for hanger in {row.hanger for row in chosen}:
+        since = min(row.time for row in chosen if row.hanger == hanger)
+        later = (
+            sa.select(tests.c.id, tests.c.recording_id)
+            .join(watches)
+            .where(watches.c.hanger == hanger, watches.c.time >= since, in_force(watches))
+            .where(tests.c.stage == Stage.WATCHED, in_force(tests), tests.c.id.not_in(ids))
+        )
+        again |= {row.id: row.recording_id for row in connection.execute(later)}
+        connection.execute(sa.delete(watch_states).where(watch_states.c.hanger == hanger))
+    supersede_results(connection, list(again), stage, at)
+    _send_back(connection, again, BEFORE[stage], at)
+    return len(again)
+
+
+def _send_back(
+    connection: Connection, again: Mapping[int, int], stage: Stage, at: datetime
+) -> None:
+    ids: Collection[int] = list(again)
+    connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=stage))
+    for test_id, recording_id in again.items():
+        write_step(connection, recording_id, stage, at, test_id)
+    advance_recordings(connection, sorted(set(again.values())), at)
