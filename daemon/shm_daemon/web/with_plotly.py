@@ -53,7 +53,12 @@ class _Drawing:
     def __init__(self, figure: Specification) -> None:
         self.figure = figure
         self.traces: list[dict[str, Any]] = []
-        self.layout: dict[str, Any] = {"annotations": [], "shapes": [], "hovermode": "closest"}
+        self.layout: dict[str, Any] = {
+            "annotations": [],
+            "shapes": [],
+            "hovermode": "closest",
+            "barmode": "overlay",
+        }
         self.named: set[str] = set()
         self.overlays = 0
 
@@ -260,8 +265,8 @@ def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
         y = np.asarray(mark.y, float)
         trace["error_y"] = {
             "type": "data", "symmetric": False, "array": numbers(np.asarray(mark.high) - y),
-            "arrayminus": numbers(y - np.asarray(mark.low)), "thickness": 1.5, "width": 2,
-            "color": plotting.colour(mark.colour, 0.8),
+            "arrayminus": numbers(y - np.asarray(mark.low)), "thickness": 1.5,
+            "width": 2 if mark.caps else 0, "color": plotting.colour(mark.colour, 0.8),
         }  # fmt: skip
     if not len(mark.labels):
         return [trace]
@@ -292,7 +297,8 @@ def _bars(mark: Bars, colour: str) -> list[dict[str, Any]]:
             "type": "bar", "orientation": "h" if mark.lying else "v", "base": numbers(mark.base),
             "x": y if mark.lying else x, "y": x if mark.lying else y, "width": mark.width,
             "marker": {"color": plotting.colour(mark.colour, mark.opacity), "line": {"width": 0}},
-            "textposition": "none",
+            "textposition": "auto" if len(mark.labels) else "none", "textangle": 0,
+            "cliponaxis": False, **({"text": list(mark.labels)} if len(mark.labels) else {}),
         }
     ]  # fmt: skip
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, TypeAlias
 
+import numpy as np
+
 from shm.values import Plane
 
 Values: TypeAlias = Any
@@ -62,6 +64,7 @@ class Points(Mark):
     symbol: Symbol = "circle"
     filled: bool = True
     size: float = 4.5
+    caps: bool = True
     labels: Sequence[str] = ()
     label_side: Side = "right"
 
@@ -77,13 +80,17 @@ class Band(Mark):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bars(Mark):
-    """Upright bars from `base` to `base` + `y`; from the left to the right where `lying`."""
+    """Upright bars from `base` to `base` + `y`; from the left to the right where `lying`.
+
+    `labels` stand at their ends.
+    """
 
     x: Values
     y: Values
     base: Values = 0.0
-    width: Any = 0.8
+    width: float = 0.8
     lying: bool = False
+    labels: Sequence[str] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,7 +131,7 @@ class Panel:
     """Axes and what is on them, drawn in the order of `marks`.
 
     Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
-    has the vertical axis of the first panel.
+    has the vertical axis of the first panel. `has_own_legend`: on paper, apart from the others'.
     """
 
     y: Axis
@@ -136,6 +143,7 @@ class Panel:
     height: float = 1.0
     width: float = 1.0
     shares_y: bool = False
+    has_own_legend: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,6 +171,14 @@ def stacked(
     """Panels one below the other."""
     rows = tuple((panel,) for panel in panels)
     return Specification(rows=rows, height_inches=height_inches, legend_columns=legend_columns)
+
+
+def limits(*values: Values, room: float = 0.06) -> tuple[float, float]:
+    """From the least known value to the largest, with a little room."""
+    known = np.concatenate([np.asarray(each, np.float64) for each in values])
+    low, high = float(np.nanmin(known)), float(np.nanmax(known))
+    margin = room * max(high - low, 1e-3 * abs(high))
+    return low - margin, high + margin
 
 
 def log_axis(label: str, low: float, high: float) -> Axis:

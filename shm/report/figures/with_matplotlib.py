@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
-from matplotlib.ticker import NullFormatter, NullLocator
+from matplotlib.ticker import NullFormatter, NullLocator, ScalarFormatter
 
 from shm.report.figures import style
 from shm.report.figures.specification import (
@@ -52,7 +52,8 @@ def draw(figure: Specification) -> Figure:
             figure.x_label, fontsize=style.TINY + 1, color=style.INK, y=0.06 / figure.height_inches
         )
     where = "upper left" if figure.is_grid else "outside upper left"
-    style.legend_of_figure(made, [axes for axes, _ in places], figure.legend_columns, where)
+    shared = [axes for axes, panel in places if not panel.has_own_legend]
+    style.legend_of_figure(made, shared, figure.legend_columns, where)
     return made
 
 
@@ -109,6 +110,8 @@ def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
     _scale(axes, "y", panel.y)
     if panel.x is not None:
         _scale(axes, "x", panel.x)
+    if panel.has_own_legend:
+        style.legend_above(axes, columns=2)
 
 
 def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
@@ -119,9 +122,11 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
     if wanted.scale == "date":
         locator = AutoDateLocator(tz=UTC, minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
         axis.set_major_locator(locator)
-        formatter = ConciseDateFormatter(locator, tz=UTC)  # type: ignore[no-untyped-call]
-        axis.set_major_formatter(formatter)
+        concise = ConciseDateFormatter(locator, tz=UTC)  # type: ignore[no-untyped-call]
+        axis.set_major_formatter(concise)
         axis.get_offset_text().set_color(style.INK)
+    if isinstance(formatter := axis.get_major_formatter(), ScalarFormatter):
+        formatter.set_useOffset(False)
     if wanted.range is not None:
         (axes.set_xlim if letter == "x" else axes.set_ylim)(*wanted.range)  # type: ignore[arg-type]
     if wanted.ticks is not None:
@@ -155,7 +160,8 @@ def _points(axes: Axes, mark: Points) -> None:
         y = np.asarray(mark.y, float)
         reach = np.maximum([y - mark.low, np.asarray(mark.high) - y], 0.0)
         axes.errorbar(
-            mark.x, y, yerr=reach, elinewidth=1.1, capsize=0.55 * mark.size, **look
+            mark.x, y, yerr=reach, elinewidth=1.1, capsize=0.55 * mark.size * mark.caps,
+            **look,
         )  # fmt: skip
     for x, y, label in zip(mark.x, mark.y, mark.labels, strict=False):
         if not label:

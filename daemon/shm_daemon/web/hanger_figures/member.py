@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from shm.report.figures.specification import Specification
+from shm_daemon.web import with_plotly
 from shm_daemon.web.hanger_view import HangerView
 
 
@@ -23,7 +25,7 @@ class HangerFigure:
     title: str
     part: str
     is_there: Callable[[HangerView], bool]
-    draw: Callable[[HangerView], dict[str, Any]]
+    draw: Callable[[HangerView], Any]
     caption: Callable[[HangerView], str]
     alt: Callable[[HangerView], str]
     height_px: int = 360
@@ -32,4 +34,6 @@ class HangerFigure:
 
     def document(self, view: HangerView) -> dict[str, Any]:
         """The plotly document with its words."""
-        return {**self.draw(view), "caption": self.caption(view), "alt": self.alt(view)}
+        found = self.draw(view)
+        drawn = with_plotly.document(found) if isinstance(found, Specification) else found
+        return {**drawn, "caption": self.caption(view), "alt": self.alt(view)}
