@@ -25,7 +25,7 @@ from shm.report.figures.specification import (
 from shm.values import FloatArray
 from shm_daemon.web import plotting
 
-_GAP, _GAP_NUMBERED, _GAP_BESIDE, _GAP_GRID = 0.045, 0.13, 0.08, 0.04
+_GAP, _GAP_NUMBERED, _GAP_BESIDE, _GAP_GRID = 0.045, 0.13, 0.08, 0.03
 """Between two panels, as shares of the figure: over one horizontal axis, over one each, side by
 side, of a grid."""
 _SHARE_OF_ROW = 0.74
@@ -61,6 +61,8 @@ class _Drawing:
         }
         self.named: set[str] = set()
         self.overlays = 0
+        self.first = "y"
+        """The vertical axis of the first panel of a row, or of the row above."""
 
     def document(self, layout: dict[str, Any]) -> dict[str, Any]:
         upright, number, across = _heights(self.figure), 0, 1
@@ -68,7 +70,7 @@ class _Drawing:
             for column, (panel, width) in enumerate(zip(row, self._widths(row), strict=True)):
                 number += 1
                 x, y = _axis("x", across), _axis("y", number)
-                self._place(panel, x, y, domain)
+                self._place(panel, (x, y), (width, domain), column)
                 if panel.x is not None:
                     self.layout[_key(x)] = {**_axis_of(panel.x), "anchor": y, "domain": width}
                     across += 1
@@ -76,6 +78,10 @@ class _Drawing:
                     rows = self.figure.rows
                     is_last = line == len(rows) - 1 or column >= len(rows[line + 1])
                     self._quieten(x, y, column == 0, is_last)
+                    if panel.words:
+                        self.layout[_key(x)]["visible"] = False
+                    elif line > 0 and column < line:
+                        self.layout[_key(x)]["matches"] = _axis("x", column + 1)
                 for mark in panel.marks:
                     self._draw(mark, panel, x, y)
         if self.figure.x_label:
@@ -96,13 +102,25 @@ class _Drawing:
         columns = max(len(each) for each in self.figure.rows)
         return _shares([1.0] * columns, [_GAP_GRID] * (columns - 1))[: len(row)]
 
-    def _place(self, panel: Panel, x: str, y: str, domain: list[float]) -> None:
+    def _place(
+        self, panel: Panel, axes: tuple[str, str], domains: tuple[list[float], ...], column: int
+    ) -> None:
+        """The vertical axis of a panel, its title and its words."""
+        (x, y), (width, domain) = axes, domains
         upright = {**_axis_of(panel.y), "domain": domain, "anchor": x}
-        if panel.shares_y and y != "y":
-            upright["matches"] = "y"
+        if panel.shares_y:
+            upright["matches"] = self.first
+        elif column == 0:
+            self.first = y
         if len(self.figure.rows) > 1 and panel.y.ticks is None and panel.y.scale == "linear":
             upright["nticks"] = 5
         self.layout[_key(y)] = upright
+        if panel.words:
+            upright["visible"] = False
+            self.layout["annotations"].append({
+                "text": panel.words, "xref": "paper", "yref": "paper", "x": sum(width) / 2,
+                "y": sum(domain) / 2, "xanchor": "center", "yanchor": "middle", "showarrow": False,
+            })  # fmt: skip
         if panel.title:
             at_right = panel.title_side == "right"
             size = 11 if at_right or self.figure.is_grid else 13
@@ -114,9 +132,11 @@ class _Drawing:
             })  # fmt: skip
 
     def _quieten(self, x: str, y: str, is_first: bool, is_last: bool) -> None:
-        quiet = {"tickfont": {"size": 10}, "fixedrange": True}
-        self.layout[_key(x)] |= {**quiet, "showticklabels": is_last}
-        self.layout[_key(y)] |= {**quiet, "showticklabels": is_first, "zeroline": True}
+        for axis, has_numbers in ((x, is_last), (y, is_first)):
+            found = self.layout[_key(axis)]
+            found |= {"tickfont": {"size": 10}, "showticklabels": has_numbers}
+            found["title"] |= {"font": {"size": 11}, "standoff": 6}
+            found["fixedrange"] = "tickvals" in found  # which would not follow
 
     def _overlay(self, y: str) -> str:
         """An axis from 0 to 1 without numbers over the panel of the axis `y`."""
@@ -130,6 +150,12 @@ class _Drawing:
         return key.replace("yaxis", "y")
 
     def _draw(self, mark: Mark, panel: Panel, x: str, y: str) -> None:
+        if isinstance(mark, Rule) and mark.hover:
+            ends = _extent(panel)
+            mark = Line(
+                x=ends, y=[mark.at] * 2, width=mark.width, dash=mark.dash, colour=mark.colour,
+                opacity=mark.opacity, name=mark.name, hover=mark.hover,
+            )  # fmt: skip
         if isinstance(mark, Rule | Span):
             self._shape(mark, x, y)
             return
@@ -164,9 +190,14 @@ class _Drawing:
         else:
             shape |= {"type": "rect", "fillcolor": plotting.colour(mark.colour, mark.opacity)}
             shape["line"] = {"width": 0}
-            place = {"textposition": "top left"}
+            place = {"textposition": f"top {mark.label_side}"}
         if mark.label:
-            shape["label"] = {"text": mark.label, "font": {"color": colour, "size": 11}, **place}
+            lower = 0 if isinstance(mark, Rule) else mark.label_line
+            shape["label"] = {
+                "text": "<br>" * lower + escaped(mark.label),
+                "font": {"color": colour, "size": 11},
+                **place,
+            }
         if mark.name:
             self._legend_of_shape(mark, shape)
         self.layout["shapes"].append(shape)
@@ -177,13 +208,20 @@ class _Drawing:
         self.named.add(mark.name)
 
 
+def _extent(panel: Panel) -> list[Any]:
+    """From the first place to the last of what a panel shows: a level reaches as far."""
+    found = [x for mark in panel.marks if hasattr(mark, "x") for x in mark.x]
+    return [min(found), max(found)]
+
+
 def _heights(figure: Specification) -> list[list[float]]:
     """From the uppermost row to the lowest: where each begins and ends."""
     rows = figure.rows
     if figure.is_grid:
         each = 1 / len(rows)
         tops = [1 - each * (i + 1) for i in range(len(rows))]
-        return [[top, top + _SHARE_OF_ROW * each] for top in tops]
+        share = _SHARE_OF_ROW if any(panel.title for panel in figure.panels) else 1 - _GAP_GRID
+        return [[top, top + share * each] for top in tops]
     gaps = [_GAP if row[0].x is None else _GAP_NUMBERED for row in rows[:-1]]
     gaps = [gap + _GAP * _begins_left(row) for gap, row in zip(gaps, rows[1:], strict=True)]
     found = _shares([row[0].height for row in rows], gaps)
@@ -220,6 +258,8 @@ def _axis_of(axis: Axis) -> dict[str, Any]:
     if axis.range is not None:
         log = axis.scale == "log"
         found["range"] = [math.log10(end) if log else _one(end) for end in axis.range]  # type: ignore[arg-type]
+    if axis.most_ticks is not None:
+        found |= {"nticks": axis.most_ticks, "tickangle": 0}
     if axis.ticks is not None:
         found["tickvals"] = list(axis.ticks)
         if axis.tick_labels is not None:

@@ -55,7 +55,10 @@ class Line(Mark):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Points(Mark):
-    """Symbols, with bars from `low` to `high` where these are given, and `labels` beside them."""
+    """Symbols, with bars from `low` to `high` where these are given, and `labels` beside them.
+
+    Unless `clipped`, those at the edge of the panel are whole.
+    """
 
     x: Values
     y: Values
@@ -65,6 +68,7 @@ class Points(Mark):
     filled: bool = True
     size: float = 4.5
     caps: bool = True
+    clipped: bool = True
     labels: Sequence[str] = ()
     label_side: Side = "right"
 
@@ -106,12 +110,17 @@ class Rule(Mark):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Span(Mark):
-    """All of a panel between two values of an axis, with words at its top."""
+    """All of a panel between two values of an axis.
+
+    With a label at its top, so many lines down, that begins on its `left` or ends on its `right`.
+    """
 
     low: Place
     high: Place
     axis: Literal["x", "y"] = "x"
     label: str = ""
+    label_side: Literal["left", "right"] = "left"
+    label_line: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +132,7 @@ class Axis:
     scale: Literal["linear", "log", "date"] = "linear"
     ticks: Sequence[float] | None = None
     tick_labels: Sequence[str] | None = None
+    most_ticks: int | None = None
     grid: bool = True
 
 
@@ -131,7 +141,8 @@ class Panel:
     """Axes and what is on them, drawn in the order of `marks`.
 
     Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
-    has the vertical axis of the first panel. `has_own_legend`: on paper, apart from the others'.
+    has the vertical axis of the first panel of its row, or of the row above where it is the first.
+    `has_own_legend`: on paper, apart from the others'. `words` stand in the place of axes.
     """
 
     y: Axis
@@ -144,13 +155,15 @@ class Panel:
     width: float = 1.0
     shares_y: bool = False
     has_own_legend: bool = False
+    words: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Specification:
     """Panels row by row, with the height on paper.
 
-    `is_grid`: many small panels of one size, which share the outermost numbers and `x_label`.
+    `is_grid`: many small panels of one size, which share the outermost numbers and `x_label`, and
+    column by column the horizontal axis.
     """
 
     rows: Sequence[Sequence[Panel]]
@@ -173,7 +186,7 @@ def stacked(
     return Specification(rows=rows, height_inches=height_inches, legend_columns=legend_columns)
 
 
-def limits(*values: Values, room: float = 0.06) -> tuple[float, float]:
+def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
     """From the least known value to the largest, with a little room."""
     known = np.concatenate([np.asarray(each, np.float64) for each in values])
     low, high = float(np.nanmin(known)), float(np.nanmax(known))

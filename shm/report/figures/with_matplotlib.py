@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from datetime import UTC
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
-from matplotlib.ticker import NullFormatter, NullLocator, ScalarFormatter
+from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from shm.report.figures import style
 from shm.report.figures.specification import (
@@ -22,6 +22,7 @@ from shm.report.figures.specification import (
     Line,
     Mark,
     Panel,
+    Place,
     Points,
     Rule,
     Span,
@@ -64,13 +65,15 @@ def _placed(made: Figure, figure: Specification) -> Iterable[tuple[Axes, Panel]]
         # Twenty-four panels by constrained layout take seconds; these are all of one size.
         made.set_layout_engine("none")
         columns = max(len(row) for row in rows)
+        labelled = any(panel.y.label for panel in figure.panels)
         grid = made.add_gridspec(
-            len(rows), columns, left=0.065, right=0.99, bottom=0.5 / height,
-            top=1 - 0.45 / height, hspace=0.5, wspace=0.14,
+            len(rows), columns, left=0.11 if labelled else 0.065, right=0.99, bottom=0.5 / height,
+            top=1 - (0.1 if labelled else 0.45) / height, hspace=0.14 if labelled else 0.5,
+            wspace=0.14,
         )  # fmt: skip
     else:
         grid = made.add_gridspec(len(rows), 1, height_ratios=[row[0].height for row in rows])
-    first: Axes | None = None
+    first: Axes | None = None  # of the row, or of the row above
     above: Axes | None = None
     for number, row in enumerate(rows):
         is_whole = len(row) == 1 or figure.is_grid
@@ -81,7 +84,7 @@ def _placed(made: Figure, figure: Specification) -> Iterable[tuple[Axes, Panel]]
         )
         for column, (cell, panel) in enumerate(zip(cells, row, strict=True)):
             axes = made.add_subplot(cell, sharex=above, sharey=first if panel.shares_y else None)
-            first = first or axes
+            first = axes if column == 0 and not panel.shares_y else first
             above = (above or axes) if panel.x is None else None
             if figure.is_grid:
                 is_last = number == len(rows) - 1 or column >= len(rows[number + 1])
@@ -98,6 +101,13 @@ def _beside(grid: GridSpec, number: int, row: Any) -> list[Any]:
 
 
 def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
+    if panel.words:
+        axes.set_axis_off()
+        axes.text(
+            0.5, 0.5, panel.words, transform=axes.transAxes, ha="center", va="center",
+            color=style.INK, fontsize=style.TINY + 1.5,
+        )  # fmt: skip
+        return
     style.dress(axes, panel.x.label if panel.x else "", panel.y.label)
     for mark in panel.marks:
         _DRAWN[type(mark)](axes, mark)
@@ -107,6 +117,8 @@ def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
         axes.set_title(panel.title, fontsize=size, color=colour, loc=panel.title_side, pad=2)
     if figure.is_grid:
         axes.tick_params(labelsize=style.TINY - 0.5, length=2, pad=1.5)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.label.set_fontsize(style.TINY)
     _scale(axes, "y", panel.y)
     if panel.x is not None:
         _scale(axes, "x", panel.x)
@@ -129,6 +141,8 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
         formatter.set_useOffset(False)
     if wanted.range is not None:
         (axes.set_xlim if letter == "x" else axes.set_ylim)(*wanted.range)  # type: ignore[arg-type]
+    if wanted.most_ticks is not None:
+        axis.set_major_locator(MaxNLocator(wanted.most_ticks - 1))
     if wanted.ticks is not None:
         axis.set_ticks(list(wanted.ticks), wanted.tick_labels)
         axis.set_minor_locator(NullLocator())
@@ -152,7 +166,8 @@ def _line(axes: Axes, mark: Line) -> None:
 def _points(axes: Axes, mark: Points) -> None:
     look = {
         **_look(axes, mark), "marker": _SYMBOLS[mark.symbol], "markersize": mark.size,
-        "linestyle": "none", "markerfacecolor": None if mark.filled else "none",
+        "markerfacecolor": None if mark.filled else "none", "linestyle": "none",
+        "clip_on": mark.clipped,
     }  # fmt: skip
     if mark.low is None or mark.high is None:
         axes.plot(mark.x, mark.y, **look)
@@ -168,7 +183,7 @@ def _points(axes: Axes, mark: Points) -> None:
             continue
         top = mark.label_side == "top"
         axes.annotate(
-            label, (x, y), xycoords=look.get("transform", axes.transData),
+            label, (_place(x), y), xycoords=look.get("transform", axes.transData),
             xytext={"top": (0, 4), "left": (-7, 0), "right": (3.2, 0)}[mark.label_side],
             textcoords="offset points", va="bottom" if top else "center",
             ha={"top": "center", "left": "right", "right": "left"}[mark.label_side],
@@ -194,8 +209,9 @@ def _rule(axes: Axes, mark: Rule) -> None:
     draw_it(mark.at, **look)  # type: ignore[arg-type]
     if mark.label:
         axes.annotate(
-            mark.label, (0.01, mark.at), xycoords=axes.get_yaxis_transform(), xytext=(0, -2),
-            textcoords="offset points", va="top", fontsize=style.TINY, color=look["color"],
+            mark.label, (0.01, _place(mark.at)), xycoords=axes.get_yaxis_transform(),
+            xytext=(0, -2), textcoords="offset points", va="top", fontsize=style.TINY,
+            color=look["color"],
         )  # fmt: skip
 
 
@@ -203,11 +219,18 @@ def _span(axes: Axes, mark: Span) -> None:
     draw_it = axes.axvspan if mark.axis == "x" else axes.axhspan
     draw_it(mark.low, mark.high, linewidth=0, **_look(axes, mark))  # type: ignore[arg-type]
     if mark.label:
+        is_left = mark.label_side == "left"
         axes.annotate(
-            mark.label, (mark.low, 1), xycoords=axes.get_xaxis_transform(), xytext=(2, -2),
-            textcoords="offset points", va="top", fontsize=style.TINY,
-            color=style.PALETTE[mark.colour],
+            mark.label,
+            (_place(mark.low if is_left else mark.high), 1),
+            xycoords=axes.get_xaxis_transform(), ha=mark.label_side, va="top",
+            xytext=(2 if is_left else -2, -1 - 10 * mark.label_line), textcoords="offset points",
+            fontsize=style.TINY + 0.5, color=style.PALETTE[mark.colour],
         )  # fmt: skip
+
+
+def _place(value: Place) -> float:
+    return float(date2num(value)) if isinstance(value, datetime) else value  # type: ignore[no-untyped-call]
 
 
 _DRAWN: dict[type[Mark], Any] = {

@@ -1,10 +1,11 @@
-"""The figures of the model: how its frequencies fit, which class it is."""
+"""The figures of the model: how its frequencies fit, what is open, which class it is."""
 
 from __future__ import annotations
 
 from shm.report import HangerReport, words
 from shm.report.figures.frequencies import FIGURE as OF_REPORT
 from shm.report.figures.frequencies import compared_modes
+from shm.report.figures.pairs import FIGURE as OF_PAIRS
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_figures.probabilities import probability_bars
 from shm_daemon.web.hanger_view import HangerView
@@ -25,6 +26,19 @@ FREQUENCIES = HangerFigure(
     lambda view: OF_REPORT.caption(report_of(view)),
     lambda view: OF_REPORT.alt(report_of(view)),
     height_px=380,
+)
+
+
+PAIRS = HangerFigure(
+    "pairs",
+    OF_PAIRS.title,
+    "model",
+    lambda view: view.report is not None and len(view.report.posterior.names) > 1,
+    lambda view: OF_PAIRS.draw(report_of(view)),
+    lambda view: OF_PAIRS.caption(report_of(view)),
+    lambda view: OF_PAIRS.alt(report_of(view)),
+    height_px=760,
+    is_wide=True,
 )
 
 

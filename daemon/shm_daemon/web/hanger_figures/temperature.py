@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from shm.report import words
+from shm.report import Interval, words
+from shm.report.figures.over_time import bounds_of, part, places, tests, thinned_words
+from shm.report.figures.specification import Axis, Panel, Specification, stacked
 from shm.store import TrendPoint
-from shm.values.force_units import ForceUnit
-from shm_daemon.web.hanger_figures import over_time
+from shm.values.force_units import ForceUnit, force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
-from shm_daemon.web.plotting import colour, figure
 
 _FEWEST = 2
+
+
+def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
+    """The one unit of the tensions of a hanger's tests."""
+    return force_unit(*(point.tension_n.mean for point in points))
 
 
 def _known(view: HangerView) -> list[TrendPoint]:
@@ -23,34 +29,25 @@ def _known(view: HangerView) -> list[TrendPoint]:
     return [point for point in view.trend if math.isfinite(point.temperature_c)]
 
 
-def _shown(view: HangerView) -> list[TrendPoint]:
-    """Those that are drawn: thinned by their tension where there are very many."""
-    known = _known(view)
-    means = np.array([point.tension_n.mean for point in known])
+def _specify(view: HangerView) -> Specification:
+    """Thinned by tension and temperature where there are very many."""
+    known, unit = _known(view), tension_unit(view.trend)
+    bounds = bounds_of([Interval.of_summary(point.tension_n) for point in known])
     temperatures = np.array([point.temperature_c for point in known])
-    return [known[i] for i in over_time.places(means, temperatures).tolist()] if known else []
-
-
-def _draw(view: HangerView) -> dict[str, Any]:
-    known = _shown(view)
-    parts = (
-        (known[:-1], "earlier tests", "blue", "circle"),
-        (known[-1:], "latest", "orange", "diamond"),
-    )
-    unit = over_time.tension_unit(view.trend)
-    traces = [_trace(*part, unit) for part in parts]
-    label = f"tension ({unit.name})"
-    return figure(traces, "temperature (°C)", label, hovermode="closest")
-
-
-def _trace(
-    points: list[TrendPoint], name: str, hue: str, symbol: str, unit: ForceUnit
-) -> over_time.Trace:
-    band = over_time.in_unit(over_time.band_of([point.tension_n for point in points]), unit)
-    labels = [f"{point.test}, {point.time:%Y-%m-%d}" for point in points]
-    made = over_time.dots_trace([point.time for point in points], band, labels, name, hue)
-    marker = {"color": colour(hue), "size": 8, "symbol": symbol}
-    return {**made, "x": [point.temperature_c for point in points], "marker": marker}
+    chosen = places(bounds.middle, temperatures)
+    shown = part(bounds, chosen, 1 / unit.newtons)
+    names = [f"{known[i].test}, {known[i].time:%Y-%m-%d}" for i in chosen.tolist()]
+    earlier, latest = np.arange(len(chosen) - 1), np.array([len(chosen) - 1])
+    x = temperatures[chosen]
+    marks = [
+        tests(x[earlier], part(shown, earlier), names[:-1], "blue", "earlier tests", 4.8),
+        replace(
+            tests(x[latest], part(shown, latest), names[-1:], "orange", "latest", 4.8),
+            symbol="diamond",
+        ),
+    ]
+    axis = Axis(label=f"tension ({unit.name})")
+    return stacked([Panel(y=axis, marks=marks, x=Axis(label="temperature (°C)"))], 3.4)
 
 
 def _caption(view: HangerView) -> str:
@@ -60,14 +57,14 @@ def _caption(view: HangerView) -> str:
     return (
         "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
         f"is lies along one line; what leaves it has another reason than the weather.{left}"
-        f"{over_time.thinned_words(known)}"
+        f"{thinned_words(known)}"
     )
 
 
 def _alt(view: HangerView) -> str:
     known = _known(view)
     temperatures = [point.temperature_c for point in known]
-    means_n, unit = [point.tension_n.mean for point in known], over_time.tension_unit(view.trend)
+    means_n, unit = [point.tension_n.mean for point in known], tension_unit(view.trend)
     low, high = (
         f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
     )
@@ -82,7 +79,7 @@ FIGURE = HangerFigure(
     "Tension and temperature",
     "trends",
     lambda view: len(_known(view)) >= _FEWEST,
-    _draw,
+    _specify,
     _caption,
     _alt,
 )
