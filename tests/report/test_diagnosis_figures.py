@@ -66,7 +66,7 @@ def test_causes_alike_are_bracketed_with_their_sum(
 ) -> None:
     (axes,) = drawn["alike"]["causes"].figure.axes
     assert "not told apart:\n0.900 together" in [text.get_text() for text in axes.texts]
-    (bracket,) = axes.lines
+    (bracket,) = [line for line in axes.lines if len(line.get_xdata()) == 4]
     assert min(np.asarray(bracket.get_ydata())) == pytest.approx(-0.3)
     assert max(np.asarray(bracket.get_ydata())) == pytest.approx(2.3)
 

@@ -42,9 +42,9 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def document(figure: Specification, **layout: Any) -> dict[str, Any]:
-    """The plotly document `{"data", "layout"}`; `layout` adds to what the figure says itself."""
-    return _Drawing(figure).document(layout)
+def document(figure: Specification) -> dict[str, Any]:
+    """The plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown."""
+    return _Drawing(figure).document()
 
 
 class _Drawing:
@@ -63,8 +63,10 @@ class _Drawing:
         self.overlays = 0
         self.first = "y"
         """The vertical axis of the first panel of a row, or of the row above."""
+        self.columns: dict[int, str] = {}
+        """The horizontal axis that the panels of a grid's column share."""
 
-    def document(self, layout: dict[str, Any]) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         upright, number, across = _heights(self.figure), 0, 1
         for line, (row, domain) in enumerate(zip(self.figure.rows, upright, strict=True)):
             for column, (panel, width) in enumerate(zip(row, self._widths(row), strict=True)):
@@ -80,8 +82,8 @@ class _Drawing:
                     self._quieten(x, y, column == 0, is_last)
                     if panel.words:
                         self.layout[_key(x)]["visible"] = False
-                    elif line > 0 and column < line:
-                        self.layout[_key(x)]["matches"] = _axis("x", column + 1)
+                    elif self.columns.setdefault(column, x) != x:
+                        self.layout[_key(x)]["matches"] = self.columns[column]
                 for mark in panel.marks:
                     self._draw(mark, panel, x, y)
         if self.figure.x_label:
@@ -94,7 +96,7 @@ class _Drawing:
         elif not self.figure.is_grid and _begins_left(self.figure.rows[0]):
             self.layout["legend"] = {"y": 1, "yref": "container", "yanchor": "top"}
             self.layout["margin"] = {"t": _ABOVE_PX}
-        return plotting.figure(self.traces, "", "", **{**self.layout, **layout})
+        return {"data": self.traces, "layout": plotting.plain(self.layout)}
 
     def _widths(self, row: Sequence[Panel]) -> list[list[float]]:
         if not self.figure.is_grid:
@@ -267,7 +269,7 @@ def _axis_of(axis: Axis) -> dict[str, Any]:
     elif axis.scale == "log":
         found |= {"exponentformat": "power", "dtick": 1}
     if not axis.grid:
-        found["showgrid"] = False
+        found |= {"showgrid": False, "zeroline": False}
     return found
 
 

@@ -105,7 +105,7 @@ def spans(bounds: Bounds) -> list[str]:
     return [f"{middle:.4g} (90 %: {low:.4g} to {high:.4g})" for low, middle, high in rows]
 
 
-def tests(
+def single_tests(
     x: Values, bounds: Bounds, names: Sequence[str], colour: str,
     name: str = "test by itself", size: float = 3.6,
 ) -> Points:  # fmt: skip

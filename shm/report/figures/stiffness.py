@@ -65,7 +65,7 @@ def _panel(course: Course, reach: float, is_on_screen: bool) -> Panel:
             if state is None
             else over_time.band(when, state, "purple", "state, 90 % band")
         ),
-        over_time.tests(when, shown, names, "purple" if state is None else "quiet"),
+        over_time.single_tests(when, shown, names, "purple" if state is None else "quiet"),
     ]
     levels = ((0.0, "baseline", "green"), (reach, "threshold", "red"), (-reach, "threshold", "red"))
     if not math.isnan(course.baseline):

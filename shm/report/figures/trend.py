@@ -84,7 +84,7 @@ def specify(course: Course) -> Specification | None:
     names = [course.names[place] for place in chosen.tolist()]
     marks = [
         *(_state(course, scale) or over_time.band(when, shown, "blue")),
-        over_time.tests(when, shown, names, "quiet" if course.state else "blue"),
+        over_time.single_tests(when, shown, names, "quiet" if course.state else "blue"),
         *_levels(course, scale),
         *_alerts(course, scale),
         *_deeds(course),

@@ -148,6 +148,7 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
         axis.set_minor_locator(NullLocator())
     if not wanted.grid:
         axis.grid(False)
+        axes.tick_params("y", length=0 if letter == "y" else None)
 
 
 def _look(axes: Axes, mark: Mark) -> dict[str, Any]:
@@ -198,9 +199,11 @@ def _band(axes: Axes, mark: Band) -> None:
 def _bars(axes: Axes, mark: Bars) -> None:
     look = {**_look(axes, mark), "linewidth": 0}
     if mark.lying:
-        axes.barh(mark.x, mark.y, height=mark.width, left=mark.base, **look)
+        bars = axes.barh(mark.x, mark.y, height=mark.width, left=mark.base, **look)
     else:
-        axes.bar(mark.x, mark.y, width=mark.width, bottom=mark.base, **look)
+        bars = axes.bar(mark.x, mark.y, width=mark.width, bottom=mark.base, **look)
+    if len(mark.labels):
+        axes.bar_label(bars, mark.labels, padding=5, fontsize=style.TINY + 0.5, color=style.INK)
 
 
 def _rule(axes: Axes, mark: Rule) -> None:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from shm_daemon.web.hanger_figures.gap import BEFORE_AND_AFTER, CAUSES, GAP_MAP, GAP_PLACES
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_figures.model import FREQUENCIES, MODELS, PAIRS
-from shm_daemon.web.hanger_figures.stiffness import FIGURE as STIFFNESS
-from shm_daemon.web.hanger_figures.temperature import FIGURE as TEMPERATURE
-from shm_daemon.web.hanger_figures.trend import FIGURE as TREND
+from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
 
 __all__ = ["FIGURES", "HangerFigure"]
 

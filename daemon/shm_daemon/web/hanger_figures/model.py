@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from shm.report import HangerReport, words
+from shm.report.diagnosis.figures.causes import Bar, probability_bars
 from shm.report.figures.frequencies import FIGURE as OF_REPORT
 from shm.report.figures.frequencies import compared_modes
 from shm.report.figures.pairs import FIGURE as OF_PAIRS
 from shm_daemon.web.hanger_figures.member import HangerFigure
-from shm_daemon.web.hanger_figures.probabilities import probability_bars
 from shm_daemon.web.hanger_view import HangerView
 
 
@@ -68,7 +68,7 @@ MODELS = HangerFigure(
     "model",
     lambda view: len(_rows(view)) > 1,
     lambda view: probability_bars(
-        [(name, p, "blue" if name == _chosen(view) else "quiet") for name, p in _rows(view)]
+        [Bar(name, p, "blue" if name == _chosen(view) else "quiet") for name, p in _rows(view)]
     ),
     lambda view: (
         "Probability of each model class given the tests on which they were compared, all equally "

@@ -11,13 +11,6 @@ import numpy as np
 from shm.report import words
 from shm.report.content import NORMAL_90
 from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.figures.below_map import (
-    CLEAR_SD,
-    goes_with,
-    known,
-    local,
-    profiles,
-)
 from shm.report.diagnosis.figures.modes import aside, by_plane, kept, measured, planes
 from shm.report.diagnosis.phrases import title
 from shm.report.figures.member import Member
@@ -25,18 +18,33 @@ from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
     Axis,
+    Band,
+    Bars,
+    Dash,
+    Line,
     Mark,
+    Panel,
     Points,
+    Rule,
     Specification,
     Symbol,
     limits,
 )
-from shm.values import Plane, Residual
+from shm.values import GapPlace, Plane, Residual, Trend
 
 _SPREAD = 0.62
 """Width over which the tests of one mode stand side by side, in orders."""
 _ROOM, _EDGE = 0.06, 0.16
 """Above and below the map, as a share of its height: as it is, and for what lies beyond it."""
+_CLEAR_SD = 2.0
+"""Standard deviations beyond which a gap or a trend is drawn as clear."""
+_FEW_PLACES = 4
+_LOOKS: tuple[tuple[str, Dash], ...] = (
+    ("purple", "solid"),
+    ("green", "dash"),
+    ("ink", "dashdot"),
+    ("red", "dot"),
+)
 _MAP_INCHES = 2.7
 _BELOW_INCHES = 2.2
 
@@ -74,8 +82,8 @@ def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) ->
     """A mark for each test beside the others of its mode, filled where the gap is clear."""
     own = PLANE_SYMBOLS[plane]
     kinds: tuple[tuple[list[Residual], Symbol, bool, str], ...] = (
-        ([r for r in residuals if abs(r.z) >= CLEAR_SD], own, True, "beyond 2 sd"),
-        ([r for r in residuals if abs(r.z) < CLEAR_SD], own, False, "within 2 sd"),
+        ([r for r in residuals if abs(r.z) >= _CLEAR_SD], own, True, "beyond 2 sd"),
+        ([r for r in residuals if abs(r.z) < _CLEAR_SD], own, False, "within 2 sd"),
         ([r for r in residuals if math.isnan(r.z)], "thin cross", True, "sd not known"),
     )
     found: list[Mark] = []
@@ -127,6 +135,70 @@ def _offset(test: str, tests: Sequence[str]) -> float:
 def _sd_percent(residual: Residual) -> float:
     """The standard deviation that the z-score was counted in."""
     return abs(residual.residual_percent / residual.z) if residual.z else math.nan
+
+
+def local(sheet: DiagnosisSheet) -> list[GapPlace]:
+    """Places with a profile, those that explain most first."""
+    found = [place for place in sheet.diagnosis.places if len(place.profile) > 1]
+    return sorted(found, key=lambda place: -place.share)[: len(_LOOKS)]
+
+
+def profiles(sheet: DiagnosisSheet) -> Panel:
+    """The density of the place along the hanger of each kind of local cause, largest 1."""
+    looks = zip(local(sheet), _LOOKS, strict=False)
+    return Panel(
+        y=Axis(label="density, largest 1", range=(0, 1.08), ticks=(0, 0.5, 1)),
+        marks=[mark for place, look in looks for mark in _profile(place, *look)],
+        x=Axis(label="position from the deck end (m)", range=(0, sheet.hanger.length_m)),
+        width=1.6, has_own_legend=True,
+    )  # fmt: skip
+
+
+def _profile(place: GapPlace, colour: str, dash: Dash) -> list[Mark]:
+    """One kind of cause as a curve, or as bars where it may only sit at a few places."""
+    x_m, density = np.array(place.profile).T
+    density = density / max(float(np.nanmax(density)), 1e-300)
+    name, hover = f"{title(place.kind)} ({_share(place)})", "%{x:.2f} m"
+    if len(x_m) <= _FEW_PLACES:
+        return [Bars(x=x_m, y=density, width=0.12, colour=colour, name=name, hover=hover)]
+    found: list[Mark] = [
+        Band(x=x_m, low=np.zeros(len(x_m)), high=density, colour=colour, opacity=0.1),
+        Line(x=x_m, y=density, colour=colour, dash=dash, width=1.4, name=name, hover=hover),
+    ]
+    if math.isfinite(place.x_m):
+        at = Points(x=[place.x_m], y=[0], symbol="triangle", size=6, colour=colour, hover=hover)
+        found.append(at)
+    return found
+
+
+def _share(place: GapPlace) -> str:
+    return f"{100 * place.share:.0f} %" if math.isfinite(place.share) else "share not known"
+
+
+def known(sheet: DiagnosisSheet) -> list[Trend]:
+    return [trend for trend in sheet.diagnosis.trends if math.isfinite(trend.slope_percent)]
+
+
+def goes_with(sheet: DiagnosisSheet) -> Panel:
+    """How the mean residual changes over the range of each condition."""
+    found = known(sheet)
+    rows = np.arange(len(found))
+    slope = np.array([trend.slope_percent for trend in found])
+    sd = np.nan_to_num([trend.slope_sd_percent for trend in found])
+    clear = np.abs(slope) >= _CLEAR_SD * np.array([trend.slope_sd_percent for trend in found])
+    ends = np.column_stack([slope - NORMAL_90 * sd, slope + NORMAL_90 * sd, [np.nan] * len(found)])
+    marks: list[Mark] = [Rule(at=0, axis="x", width=0.8), Line(x=ends.ravel(), y=rows.repeat(3))]
+    for chosen, filled in ((clear, True), (~clear, False)):
+        look = {"symbol": "diamond", "filled": filled}
+        marks.append(Points(x=slope[chosen], y=rows[chosen], **look))  # type: ignore[arg-type]
+    return Panel(
+        y=Axis(
+            range=(len(found) - 0.4, -0.6), ticks=rows.tolist(), grid=False,
+            tick_labels=[trend.condition for trend in found],
+        ),
+        marks=marks, x=Axis(label="change over its range (%)"), title="goes with",
+        title_side="left",
+    )  # fmt: skip
 
 
 def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:

@@ -1,0 +1,193 @@
+"""The figures of a hanger's tests over time and over temperature, from what the store knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shm.report import Interval, words
+from shm.report.figures import stiffness, trend
+from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
+from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
+from shm.report.states import CalledChange, called_words
+from shm.store import EventKind, TrendPoint
+from shm.values import TENSION
+from shm.values.force_units import ForceUnit, force_unit
+from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm_daemon.web.hanger_view import HangerView
+
+_FEWEST = 2
+_HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
+    EventKind.BASELINE: ("baseline set", "square", True, "green"),
+    EventKind.ADOPTED: ("effect adopted", "diamond", True, "purple"),
+    EventKind.UNDONE: ("adoption undone", "diamond", False, "purple"),
+}
+"""What people did: name, symbol, whether it is filled, colour."""
+
+
+def _course(view: HangerView) -> trend.Course:
+    """All that the figure shows; without the state over time where that is still worked out."""
+    states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
+    found = [] if states is None else [q for q in states.quantities if q.name == TENSION]
+    raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
+    changes = [call.watched.change for call in view.calls]
+    return trend.Course(
+        times=[point.time for point in view.trend],
+        names=[point.test for point in view.trend],
+        tensions_n=[Interval.of_summary(point.tension_n) for point in view.trend],
+        nominal_n=view.hanger.nominal_tension_n,
+        baseline_n=view.baseline.tension_n.mean if view.baseline else None,
+        reach=view.hanger.thresholds.tension_shift_fraction,
+        alerts={at[event.at]: event.why for event in raised},
+        state=found[0] if found else None,
+        state_times=states.times if states else (),
+        reference_temperature_c=states.reference_temperature_c if states else math.nan,
+        changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
+        deeds=[
+            trend.Deed(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
+            for kind in _HANDS
+            for event in view.events
+            if event.kind is kind
+        ],
+        remark=_remark(view),
+    )
+
+
+def _remark(view: HangerView) -> str:
+    undated = sum(point.taken_at is None for point in view.trend)
+    told = (
+        f"{words.counted(undated, 'test')} without a time drawn at the receipt." if undated else "",
+        "The state over time is being worked out." if view.states is None else "",
+    )
+    return " ".join(filter(None, told))
+
+
+TREND = HangerFigure(
+    "trend",
+    "Tension over time",
+    "trends",
+    lambda view: bool(view.trend),
+    lambda view: trend.specify(_course(view)),
+    lambda view: trend.caption(_course(view)),
+    lambda view: trend.alt(_course(view)),
+    height_px=440,
+    shows_states=True,
+)
+
+
+def _courses(view: HangerView) -> list[stiffness.Course]:
+    states, named = view.states, {point.time: point.test for point in view.trend}
+    watched = [] if states is None else [q for q in states.quantities if not q.is_tension]
+    if states is None or not watched:
+        return [_by_tests(view, name) for name in _names(view)]
+    tests = [named.get(time, "test") for time in states.times]
+    return [
+        stiffness.Course(each.title, states.times, tests, each.read, each.baseline, each.filtered)
+        for each in watched
+    ]
+
+
+def _names(view: HangerView) -> list[str]:
+    return stiffness.names_of(point.stiffness for point in view.trend)
+
+
+def _by_tests(view: HangerView, name: str) -> stiffness.Course:
+    base = view.baseline.stiffness.get(name) if view.baseline else None
+    found = [point.stiffness.get(name) for point in view.trend]
+    return stiffness.Course(
+        words.quantity(name),
+        [point.time for point in view.trend],
+        [point.test for point in view.trend],
+        bounds_of([Interval.of_summary(each) if each else None for each in found]),
+        base.mean if base else math.nan,
+    )
+
+
+def _reach(view: HangerView) -> float:
+    return view.hanger.thresholds.stiffness_shift_decades
+
+
+STIFFNESS = HangerFigure(
+    "stiffness",
+    "End stiffness over time",
+    "trends",
+    lambda view: bool(_names(view)),
+    lambda view: stiffness.specify(_courses(view), _reach(view), is_on_screen=True),
+    lambda view: stiffness.caption(
+        _courses(view),
+        _reach(view),
+        " The state over time is being worked out." if view.states is None else "",
+    ),
+    lambda view: stiffness.alt(_courses(view)),
+    height_px=520,
+    shows_states=True,
+)
+
+
+def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
+    """The one unit of the tensions of a hanger's tests."""
+    return force_unit(*(point.tension_n.mean for point in points))
+
+
+def _with_temperature(view: HangerView) -> list[TrendPoint]:
+    """Tests with a temperature."""
+    return [point for point in view.trend if math.isfinite(point.temperature_c)]
+
+
+def _over_temperature(view: HangerView) -> Specification:
+    """Thinned by tension and temperature where there are very many."""
+    known, unit = _with_temperature(view), tension_unit(view.trend)
+    bounds = bounds_of([Interval.of_summary(point.tension_n) for point in known])
+    temperatures = np.array([point.temperature_c for point in known])
+    chosen = places(bounds.middle, temperatures)
+    shown = part(bounds, chosen, 1 / unit.newtons)
+    names = [f"{known[i].test}, {known[i].time:%Y-%m-%d}" for i in chosen.tolist()]
+    earlier, latest = np.arange(len(chosen) - 1), np.array([len(chosen) - 1])
+    x = temperatures[chosen]
+    marks = [
+        single_tests(x[earlier], part(shown, earlier), names[:-1], "blue", "earlier tests", 4.8),
+        replace(
+            single_tests(x[latest], part(shown, latest), names[-1:], "orange", "latest", 4.8),
+            symbol="diamond",
+        ),
+    ]
+    axis = Axis(label=f"tension ({unit.name})")
+    return stacked([Panel(y=axis, marks=marks, x=Axis(label="temperature (°C)"))], 3.4)
+
+
+def _caption_of_temperature(view: HangerView) -> str:
+    known = len(_with_temperature(view))
+    without = len(view.trend) - known
+    left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
+    return (
+        "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
+        f"is lies along one line; what leaves it has another reason than the weather.{left}"
+        f"{thinned_words(known)}"
+    )
+
+
+def _alt_of_temperature(view: HangerView) -> str:
+    known = _with_temperature(view)
+    temperatures = [point.temperature_c for point in known]
+    means_n, unit = [point.tension_n.mean for point in known], tension_unit(view.trend)
+    low, high = (
+        f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
+    )
+    return (
+        f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
+        f"{max(temperatures):.1f} °C: {low} to {high} {unit.name}."
+    )
+
+
+TEMPERATURE = HangerFigure(
+    "temperature",
+    "Tension and temperature",
+    "trends",
+    lambda view: len(_with_temperature(view)) >= _FEWEST,
+    _over_temperature,
+    _caption_of_temperature,
+    _alt_of_temperature,
+)
