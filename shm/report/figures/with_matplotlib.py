@@ -148,7 +148,8 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
         axis.set_minor_locator(NullLocator())
     if not wanted.grid:
         axis.grid(False)
-        axes.tick_params("y", length=0 if letter == "y" else None)
+        if letter == "y":
+            axes.tick_params("y", length=0)
 
 
 def _look(axes: Axes, mark: Mark) -> dict[str, Any]:
