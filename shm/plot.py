@@ -30,6 +30,7 @@ from shm.report.figures.trend import FIGURE as TREND
 from shm.report.sheet.figures.response import FIGURE as RESPONSE
 from shm.report.sheet.figures.shapes import FIGURE as SHAPES
 from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
+from shm.report.sheet.spectra import Shown
 from shm.values import Diagnosis, Hanger, ModalTest, Posterior
 
 __all__ = [
@@ -122,7 +123,7 @@ def frequency_response(test: Identification, hanger: Hanger | None = None) -> Fi
         >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
         >>> figure = shm.plot.frequency_response(test)
     """
-    return _drawn(RESPONSE, TestSheet(test, hanger=hanger))
+    return _drawn(RESPONSE, Shown.of(TestSheet(test, hanger=hanger)))
 
 
 def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
@@ -131,7 +132,7 @@ def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
     Example:
         >>> figure = shm.plot.stabilisation(test)
     """
-    return _drawn(STABILISATION, TestSheet(test, hanger=hanger))
+    return _drawn(STABILISATION, Shown.of(TestSheet(test, hanger=hanger)))
 
 
 def shapes(test: Identification, hanger: Hanger) -> Figure:
@@ -140,7 +141,7 @@ def shapes(test: Identification, hanger: Hanger) -> Figure:
     Example:
         >>> figure = shm.plot.shapes(test, hanger)
     """
-    return _drawn(SHAPES, TestSheet(test, hanger=hanger))
+    return _drawn(SHAPES, Shown.of(TestSheet(test, hanger=hanger)))
 
 
 def gap(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
@@ -162,7 +163,7 @@ def causes(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
 
 
 def _drawn(member: Member[Data], data: Data) -> Figure:
-    figure = member.draw(data)
+    figure = member.figure(data)
     if figure is None:
         raise NothingThere(
             f"these data do not hold what the figure {member.title!r} shows.",

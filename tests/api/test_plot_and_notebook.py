@@ -21,7 +21,7 @@ UNITS = {
     "tension": "tension (kN)",
     "trend": "tension (kN)",
     "frequencies": "predicted / measured frequency",
-    "pairs": "theta_F",
+    "pairs": "tension (kN)",
     "frequency_response": "accelerance (m/s²/N)",
     "stabilisation": "frequency (Hz)",
     "shapes": "position from the deck end (m)",

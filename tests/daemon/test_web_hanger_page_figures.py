@@ -12,14 +12,12 @@ import numpy as np
 import plotly.graph_objects as plotly
 import pytest
 
+from shm.report.figures.over_time import MOST_POINTS, places
 from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
 from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
 from shm.values import NAN, Averaged, FloatArray, Summary
 from shm.watch.history import Band
-from shm_daemon.web.hanger_figures.over_time import MOST_POINTS, places
-from shm_daemon.web.hanger_figures.stiffness import FIGURE as STIFFNESS
-from shm_daemon.web.hanger_figures.temperature import FIGURE as TEMPERATURE
-from shm_daemon.web.hanger_figures.trend import FIGURE as TREND
+from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
 from shm_daemon.web.hanger_view import HangerView
 from tests.helpers.workspaces import START
 from tests.report.diagnoses import HANGER
@@ -148,10 +146,9 @@ def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None
     dots = trace(document, "test by itself")
     assert len(dots["x"]) <= 1.05 * MOST_POINTS
     assert min(dots["y"]) == 500.0
-    assert f"t{BLUNDER}" in dots["text"]
-    assert "t4321" in dots["text"]
-    assert dots["text"][0] == "t0"
-    assert dots["text"][-1] == f"t{8 * MOST_POINTS - 1}"
+    names = [text.split(":")[0] for text in dots["text"]]
+    assert {f"t{BLUNDER}", "t4321"} <= set(names)
+    assert (names[0], names[-1]) == ("t0", f"t{8 * MOST_POINTS - 1}")
     for figure in (TREND, STIFFNESS, TEMPERATURE):
         assert "keep every extreme; enlarging brings no more" in drawn(view, figure)["caption"]
 

@@ -26,7 +26,7 @@ from shm.store import Stage, Workspace
 from shm_daemon.web.address_of_test import name_in
 from shm_daemon.web.address_of_test import test_json as document_of
 from shm_daemon.web.address_of_test import test_page as page_of
-from shm_daemon.web.figures_of_test.registry import FIGURES, FROM_RECORDS
+from shm_daemon.web.figures_of_test import FIGURES, FROM_RECORDS
 from shm_daemon.web.working_out import Workshop
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served
@@ -139,11 +139,12 @@ def test_a_time_history_keeps_the_extremes_and_marks_each_hit(
 ) -> None:
     answer = at_last(client, f"{document_of(3, site.odd)}/figures/time_history")
     traces = answer.json()["data"]
-    force = next(trace for trace in traces if trace["name"] == "force")
+    force = next(trace for trace in traces if trace["mode"] == "lines" and trace["yaxis"] == "y")
     hits = client.get(f"{document_of(3, site.odd)}/hits").json()["hits"]
     drawn_n = [value for value in force["y"] if value is not None]
     assert max(drawn_n) == pytest.approx(site.largest_force_n, rel=1e-4)
-    marks = {trace["name"]: trace["x"] for trace in traces if "hit" in trace["name"]}
+    named = {trace["name"]: trace["x"] for trace in traces if "name" in trace}
+    marks = {name: times_s for name, times_s in named.items() if "hit" in name}
     assert set(marks) == {"3 hits used", "1 hit dropped: double hit"}
     marked_s = [at_s for times_s in marks.values() for at_s in times_s]
     assert sorted(marked_s) == pytest.approx([hit["start_s"] for hit in hits], rel=1e-3)

@@ -149,7 +149,7 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     kept: dict[tuple[int, str], tuple[object, Illustration | None]] = {}
 
     def shared(of: Member[object], data: object) -> Illustration | None:
-        key = (id(data), of.name)
+        key = (id(getattr(data, "sheet", data)), of.name)
         if key not in kept:
             kept[key] = (data, illustration(of, data))
         return kept[key][1]

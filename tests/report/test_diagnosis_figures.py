@@ -66,7 +66,7 @@ def test_causes_alike_are_bracketed_with_their_sum(
 ) -> None:
     (axes,) = drawn["alike"]["causes"].figure.axes
     assert "not told apart:\n0.900 together" in [text.get_text() for text in axes.texts]
-    (bracket,) = axes.lines
+    (bracket,) = [line for line in axes.lines if len(line.get_xdata()) == 4]
     assert min(np.asarray(bracket.get_ydata())) == pytest.approx(-0.3)
     assert max(np.asarray(bracket.get_ydata())) == pytest.approx(2.3)
 
@@ -113,12 +113,12 @@ def test_before_and_after_shows_held_out_modes_apart(
     drawn: dict[str, dict[str, Illustration]],
 ) -> None:
     upper = drawn["led"]["before_and_after"].figure.axes[0]
-    labels = [line.get_label() for line in upper.lines]
-    assert labels[1:] == ["baseline", "with the cause", "with the cause, held out"]
+    labels = [series.get_label() for series in upper.containers]
+    assert labels == ["baseline", "with the cause", "with the cause, held out"]
     unheld = tuple(replace(r, held_out_after_percent=float("nan")) for r in LED.where)
     item = report.diagnosis_figures(DiagnosisSheet(replace(LED, where=unheld), HANGER))[2]
     assert "Nothing was held out" in item.caption
-    assert len(item.figure.axes[0].lines) == 3
+    assert len(item.figure.axes[0].containers) == 2
 
 
 def test_tensions_are_drawn_in_kilonewtons(drawn: dict[str, dict[str, Illustration]]) -> None:

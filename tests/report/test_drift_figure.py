@@ -61,7 +61,7 @@ def data() -> StatesOverTime:
 
 
 def drawn(data: StatesOverTime) -> Figure:
-    figure = STATES.draw(data)
+    figure = STATES.figure(data)
     assert figure is not None
     figure.draw_without_rendering()
     return figure

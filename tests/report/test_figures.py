@@ -105,7 +105,8 @@ def test_the_thresholds_stand_either_side_of_the_baseline(
 ) -> None:
     assert season.baseline is not None
     (axes,) = drawn["trend"].figure.axes
-    levels = [float(np.asarray(line.get_ydata())[0]) for line in axes.lines[2:5]]
+    named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
+    levels = [float(np.asarray(line.get_ydata())[0]) for line in named]
     baseline = season.baseline.tension_n.mean() / 1e3
     assert levels == pytest.approx([baseline, baseline * 1.05, baseline * 0.95])
 
@@ -150,7 +151,7 @@ def test_of_many_responses_the_first_four_are_drawn_and_that_is_said(
 def test_tests_without_a_time_are_left_out_of_the_trend_and_counted(season: HangerReport) -> None:
     undated = replace(season.trend[0], time=None)
     item = illustrations(replace(season, trend=(undated, *season.trend[1:])))[0]
-    assert "1 tests without a time are left out" in item.caption
+    assert "1 test without a time left out" in item.caption
 
 
 def test_a_lone_test_stands_in_the_middle_of_a_narrow_trend(season: HangerReport) -> None:

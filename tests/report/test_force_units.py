@@ -140,7 +140,7 @@ def test_states_over_time_are_drawn_in_that_unit(tension_n: float, unit: str) ->
     )
     times = (NOW, NOW.replace(day=2), NOW.replace(day=3))
     data = StatesOverTime(times, np.full(3, nan), nan, np.zeros(3, bool), (quantity,))
-    figure = STATES.draw(data)
+    figure = STATES.figure(data)
     assert figure is not None
     assert figure.axes[0].get_ylabel() == f"tension ({unit})"
     assert f" {unit}), baseline " in STATES.alt(data)

@@ -1,12 +1,12 @@
-"""Figures as plotly documents: plain dictionaries that the browser draws.
+"""What documents for the browser are made of: plain values, and the colours of the reports.
 
-The colours are those of the reports; `static/charts.js` turns them for a dark screen.
+`static/charts.js` turns the colours for a dark screen.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from enum import Enum
 from typing import Any
@@ -15,24 +15,6 @@ import numpy as np
 from fastapi.responses import JSONResponse
 
 from shm.report.figures.style import PALETTE
-
-
-def figure(
-    traces: Sequence[Mapping[str, Any]], x_label: str, y_label: str, **layout: Any
-) -> dict[str, Any]:
-    """A plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown.
-
-    Labels carry their units. `layout` adds to the layout; its `xaxis` and `yaxis` add to the
-    labelled axes.
-    """
-    axes = {
-        "xaxis": {"title": {"text": x_label}, **layout.pop("xaxis", {})},
-        "yaxis": {"title": {"text": y_label}, **layout.pop("yaxis", {})},
-    }
-    return {
-        "data": [plain(dict(trace)) for trace in traces],
-        "layout": plain({**axes, **layout}),
-    }
 
 
 def answer(document: dict[str, Any], status: int = 200) -> JSONResponse:

@@ -20,7 +20,7 @@ from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import name_in
 from shm_daemon.web.faults import answers
-from shm_daemon.web.figures_of_test.registry import FIGURES
+from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
 from shm_daemon.web.origin_of_test import formers_of, steps_of
 from shm_daemon.web.view_of_test import AT_WORK, TestView, as_bytes

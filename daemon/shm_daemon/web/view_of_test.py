@@ -20,14 +20,13 @@ from shm.identify import Identification, Poles
 from shm.pipeline.reporting import test_sheet
 from shm.pipeline.terms import identify_lineage
 from shm.report import TestSheet
-from shm.report.sheet.spectra import Spectrum, spectrum
+from shm.report.sheet.spectra import Shown, Spectrum
 from shm.report.sheet.summary import advice, summary, trust
 from shm.report.sheet.tables import conditions, dropped, hits
 from shm.report.table import Table
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
-from shm_daemon.web.figures_of_test.contract import Shown, TestFigure
-from shm_daemon.web.figures_of_test.registry import FROM_RECORDS, MEMBERS
+from shm_daemon.web.figures_of_test import FROM_RECORDS, MEMBERS, TestFigure
 from shm_daemon.web.hangers import described
 from shm_daemon.web.working_out import Workshop
 
@@ -124,14 +123,14 @@ class TestView:
         """What figures are drawn from, without any record."""
         if self.worked:
             return Shown(self.worked.sheet, self.worked.spectrum, point)
-        return Shown(self.as_stored, spectrum(self.as_stored), point)
+        return Shown.of(self.as_stored, point)
 
     def figures(self) -> tuple[TestFigure, ...]:
         """Those that this test has, or may have once its raw file is identified once more."""
         if not self.missing:
             return MEMBERS
         shown = self.shown()
-        return tuple(each for each in MEMBERS if each.source != "file" and each.draw(shown))
+        return tuple(each for each in MEMBERS if each.source != "file" and each.member.draw(shown))
 
     def figure(self, figure: TestFigure, point: int) -> Figure:
         """A figure at the response of index `point`; raises as `whole`, and NothingThere."""
@@ -221,7 +220,7 @@ def order_of(workspace: Workspace, recording: StoredRecording, stored: StoredTes
 
 def worked_out(sheet: TestSheet) -> WorkedOut:
     """The sheet with all that needs its records made of them."""
-    whole = Shown.of(sheet)
+    whole = Shown.of(sheet, point=0)
     documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
     return WorkedOut(
         sheet=replace(sheet, records=()),

@@ -3,80 +3,94 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import words
 from shm.report.content import NORMAL_90, HangerReport, Interval
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Axis,
+    Bars,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Span,
+    Specification,
+    limits,
+    stacked,
+)
 from shm.report.summary import residuals_percent
-from shm.values import PLANES, Plane, PredictedFrequency
+from shm.values import PLANES, Mode, Plane, PredictedFrequency
 
-_OFFSET = {"transverse": -0.12, "longitudinal": 0.12}
+_BESIDE = {"transverse": -0.12, "longitudinal": 0.12}
 
 
-def _draw(data: HangerReport) -> Figure | None:
-    compared = _compared(data)
+def specify(data: HangerReport) -> Specification | None:
+    compared = compared_modes(data)
     if not compared:
         return None
-    figure = style.new_figure()
-    axes = figure.subplots()
-    style.dress(axes, "mode number in its plane", "predicted / measured frequency")
-    axes.ticklabel_format(axis="y", useOffset=False)
-    axes.use_sticky_edges = False
-    axes.axhline(1.0, color=style.INK, linewidth=1)
     half = NORMAL_90 * _sigma(data).mean
-    axes.axhspan(1 - half, 1 + half, color=style.INK, alpha=0.07, linewidth=0, label="model error")
-    for plane in PLANES:
-        _points(axes, plane, [mode for mode in compared if mode.plane == plane])
-    _measurement(axes, data)
+    known = [mode for mode in data.latest.modes if math.isfinite(mode.frequency_sd_hz)]
+    points = [p for plane in PLANES if (p := _points(plane, compared))]
+    marks: list[Mark] = [
+        Span(low=1 - half, high=1 + half, axis="y", opacity=0.07, name="model error"),
+        Rule(at=1.0),
+        *([_measurement(known)] if known else []),
+        *points,
+    ]
     highest = max(mode.order for mode in compared)
-    axes.set_xticks(range(1, highest + 1))
-    axes.set_xlim(0.5, highest + 0.5)
-    style.legend_above(axes)
-    return figure
+    ends = [end for each in points for end in (each.low, each.high)]
+    step = 1 if highest <= 16 else 2
+    panel = Panel(
+        y=Axis(
+            label="predicted / measured frequency",
+            range=limits([1 - half, 1 + half], *ends),
+        ),
+        marks=marks,
+        x=Axis(
+            label="mode number in its plane", range=(0.5, highest + 0.5), grid=False,
+            ticks=range(1, highest + 1, step),
+        ),
+    )  # fmt: skip
+    return stacked([panel], 3.4)
 
 
-def _compared(data: HangerReport) -> list[PredictedFrequency]:
+def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
+    """Those that were predicted and measured."""
     return [mode for mode in data.predicted if math.isfinite(mode.measured_hz)]
 
 
-def _points(axes: Axes, plane: Plane, modes: list[PredictedFrequency]) -> None:
+def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> Points | None:
+    modes = [mode for mode in compared if mode.plane == plane]
     if not modes:
-        return
+        return None
     measured = np.array([mode.measured_hz for mode in modes])
-    axes.errorbar(
-        np.array([mode.order for mode in modes]) + _OFFSET[plane],
-        np.array([mode.mean_hz for mode in modes]) / measured,
-        yerr=NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured,
-        color=style.PLANE_COLOURS[plane],
-        marker=style.PLANE_MARKERS[plane],
-        linestyle="none",
-        markersize=5,
-        capsize=3,
-        label=plane,
-    )
+    ratio = np.array([mode.mean_hz for mode in modes]) / measured
+    half = NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured
+    return Points(
+        x=[mode.order + _BESIDE[plane] for mode in modes], y=ratio, low=ratio - half,
+        high=ratio + half, symbol=PLANE_SYMBOLS[plane], colour=PLANE_HUES[plane], size=5,
+        name=plane,
+        texts=[
+            f"{plane} {mode.order}: predicted {mode.mean_hz:.3f} ± {mode.sd_hz:.3f} Hz, measured "
+            f"{mode.measured_hz:.3f} Hz"
+            for mode in modes
+        ],
+    )  # fmt: skip
 
 
-def _measurement(axes: Axes, data: HangerReport) -> None:
+def _measurement(known: Sequence[Mode]) -> Bars:
     """The measurement's own 90 % interval around 1, where its standard deviation is known."""
-    known = [mode for mode in data.latest.modes if math.isfinite(mode.frequency_sd_hz)]
-    if not known:
-        return
-    half = [NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known]
-    axes.bar(
-        [mode.order + _OFFSET[mode.plane] for mode in known],
-        [2 * width for width in half],
-        bottom=[1 - width for width in half],
-        width=0.2,
-        color=style.INK,
-        alpha=0.25,
-        linewidth=0,
-        label="measurement, 90 %",
-    )
+    half = np.array([NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known])
+    return Bars(
+        x=[mode.order + _BESIDE[mode.plane] for mode in known], y=2 * half, base=1 - half,
+        width=0.2, opacity=0.25, name="measurement, 90 %",
+    )  # fmt: skip
 
 
 def _sigma(data: HangerReport) -> Interval:
@@ -105,4 +119,4 @@ def _alt(data: HangerReport) -> str:
     )
 
 
-FIGURE = Member("frequencies", "Predicted over measured frequencies", _draw, _caption, _alt)
+FIGURE = Member("frequencies", "Predicted over measured frequencies", specify, _caption, _alt)

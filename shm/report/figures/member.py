@@ -14,6 +14,8 @@ from typing import Generic, TypeVar
 
 from matplotlib.figure import Figure
 
+from shm.report.figures import with_matplotlib
+from shm.report.figures.specification import Specification
 from shm.report.figures.style import PALETTE
 
 Data = TypeVar("Data")
@@ -22,13 +24,18 @@ Data = TypeVar("Data")
 @dataclass(frozen=True)
 class Member(Generic[Data]):
     """A figure: `draw` gives None where `Data` lacks what it shows; `caption` explains what is
-    seen, `alt` says what a blind reader needs."""
+    seen, `alt` says what a blind reader needs. What only paper shows may be drawn at once."""
 
     name: str
     title: str
-    draw: Callable[[Data], Figure | None]
+    draw: Callable[[Data], Specification | Figure | None]
     caption: Callable[[Data], str]
     alt: Callable[[Data], str]
+
+    def figure(self, data: Data) -> Figure | None:
+        """The figure on paper."""
+        found = self.draw(data)
+        return with_matplotlib.draw(found) if isinstance(found, Specification) else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +65,7 @@ def drawn(members: Sequence[Member[Data]], data: Data) -> tuple[Illustration, ..
 
 def illustration(member: Member[Data], data: Data) -> Illustration | None:
     """The figure with its words; None where `data` lacks what it shows."""
-    figure = member.draw(data)
+    figure = member.figure(data)
     if figure is None:
         return None
     return Illustration(member.name, member.title, member.caption(data), member.alt(data), figure)

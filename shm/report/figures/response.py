@@ -3,73 +3,70 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report.content import HangerReport
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Specification,
+    plane_colour,
+    stacked,
+)
 from shm.values import PLANES, FloatArray, FrequencyResponse, Mode, ResponsePoint
 
 _POINTS_SHOWN = 4
 _HEADROOM = 1.12
+_ROWS = {"transverse": 0.98, "longitudinal": 0.93}
 _LONGEST_NAME = 14
 
 
-def _draw(data: HangerReport) -> Figure | None:
+def specify(data: HangerReport) -> Specification | None:
     response = data.frequency_response
     if response is None or not response.points:
         return None
     shown = _shown(response, data.latest.modes)
-    magnitude = np.abs(response.accelerance[:, shown])
+    frequency_hz = response.frequency_hz[shown]
+    across = Axis(
+        label="frequency (Hz)", range=(float(frequency_hz[0]), float(frequency_hz[-1]))
+    )  # fmt: skip
+    curves = _curves(response, shown, np.abs(response.accelerance))
+    magnitude = Axis(label="accelerance (m/s²/N)", scale="log")
+    marks = [*curves, *_marks(data.latest.modes)]
     if response.coherence is None:
-        figure = style.new_figure(3.6)
-        _magnitude(figure.subplots(), response, shown, magnitude, data.latest.modes)
-        return figure
-    figure = style.new_figure(4.8)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    _magnitude(upper, response, shown, magnitude, data.latest.modes)
-    _curves(lower, response, shown, response.coherence[:, shown])
-    upper.set_xlabel("")
-    style.dress(lower, "frequency (Hz)", "coherence")
-    lower.set_ylim(0, 1.05)
-    return figure
+        return stacked([Panel(y=magnitude, marks=marks, x=across)], 3.6, legend_columns=3)
+    below = Panel(
+        y=Axis(label="coherence", range=(0, 1.05)), x=across,
+        marks=_curves(response, shown, response.coherence),
+    )  # fmt: skip
+    return stacked([Panel(y=magnitude, marks=marks, height=3), below], 4.8, legend_columns=3)
 
 
-def _shown(response: FrequencyResponse, modes: tuple[Mode, ...]) -> slice:
+def _shown(response: FrequencyResponse, modes: Sequence[Mode]) -> slice:
     """The lines above 0 Hz and a little past the highest identified mode."""
     highest = max((mode.frequency_hz for mode in modes), default=np.inf)
     stop = int(np.searchsorted(response.frequency_hz, _HEADROOM * highest))
     return slice(1, max(stop, 3))
 
 
-def _magnitude(
-    axes: Axes,
-    response: FrequencyResponse,
-    shown: slice,
-    magnitude: FloatArray,
-    modes: tuple[Mode, ...],
-) -> None:
-    style.dress(axes, "frequency (Hz)", "accelerance (m/s²/N)")
-    _curves(axes, response, shown, magnitude)
-    axes.set_yscale("log")
-    _marks(axes, modes)
-    axes.set_xlim(response.frequency_hz[shown][0], response.frequency_hz[shown][-1])
-    style.legend_above(axes, columns=3)
-
-
-def _curves(axes: Axes, response: FrequencyResponse, shown: slice, values: FloatArray) -> None:
-    for index, point in enumerate(response.points[:_POINTS_SHOWN]):
-        axes.plot(
-            response.frequency_hz[shown],
-            values[index],
-            color=style.PLANE_COLOURS[point.plane] if point.plane else style.PURPLE,
-            linestyle="-" if index < 2 else "--",
-            linewidth=0.9,
-            label=_label(point),
+def _curves(response: FrequencyResponse, shown: slice, values: FloatArray) -> list[Mark]:
+    return [
+        Line(
+            x=response.frequency_hz[shown], y=values[index, shown], width=0.9, name=_label(point),
+            colour=plane_colour(point.plane), dash="solid" if index < 2 else "dash",
         )
+        for index, point in enumerate(response.points[:_POINTS_SHOWN])
+    ]  # fmt: skip
 
 
 def _label(point: ResponsePoint) -> str:
@@ -77,24 +74,18 @@ def _label(point: ResponsePoint) -> str:
     return name if np.isnan(point.x_m) else f"{name} at {point.x_m:.2f} m"
 
 
-def _marks(axes: Axes, modes: tuple[Mode, ...]) -> None:
+def _marks(modes: Sequence[Mode]) -> list[Mark]:
     """A mark above the curves at each identified mode, a row for each plane."""
-    for plane, height in zip(PLANES, (0.98, 0.93), strict=True):
-        found = [mode.frequency_hz for mode in modes if mode.plane == plane]
-        if not found:
-            continue
-        axes.plot(
-            found,
-            [height] * len(found),
-            transform=axes.get_xaxis_transform(),
-            linestyle="none",
-            marker=style.PLANE_MARKERS[plane],
-            markersize=4.5,
-            color=style.PLANE_COLOURS[plane],
-            label=f"{plane} mode",
-        )
-        for frequency_hz in found:
-            axes.axvline(frequency_hz, color=style.PLANE_COLOURS[plane], linewidth=0.5, alpha=0.6)
+    found: list[Mark] = []
+    for plane in PLANES:
+        at = [mode.frequency_hz for mode in modes if mode.plane == plane]
+        look: dict[str, Any] = {"colour": PLANE_HUES[plane]}
+        found += [Rule(at=each, axis="x", width=0.5, opacity=0.6, **look) for each in at]
+        if at:
+            rows = [_ROWS[plane]] * len(at)
+            symbol, name = PLANE_SYMBOLS[plane], f"{plane} mode"
+            found.append(Points(x=at, y=rows, in_shares=True, symbol=symbol, name=name, **look))
+    return found
 
 
 def _caption(data: HangerReport) -> str:
@@ -118,4 +109,4 @@ def _alt(data: HangerReport) -> str:
     return f"Frequency response with {len(modes)} identified modes: {listed}."
 
 
-FIGURE = Member("response", "Frequency response and identified modes", _draw, _caption, _alt)
+FIGURE = Member("response", "Frequency response and identified modes", specify, _caption, _alt)

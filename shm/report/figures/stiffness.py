@@ -1,73 +1,153 @@
-"""Trend of the end stiffness of each plane, for model classes that have springs."""
+"""End stiffness over time, of each plane or, where frequencies tell the ends apart, of each end."""
 
 from __future__ import annotations
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+import numpy as np
 
 from shm.report import words
 from shm.report.content import HangerReport
-from shm.report.figures import style, timeline
+from shm.report.figures import over_time
 from shm.report.figures.member import Member
+from shm.report.figures.specification import Axis, Mark, Panel, Specification, limits, stacked
+from shm.values import FloatArray
 from shm.watch import end_stiffness
+from shm.watch.history import Band as Bounds
 
 
-def _draw(data: HangerReport) -> Figure | None:
-    names = _planes(data)
-    if not names:
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One stiffness over time, log10 of N m/rad, or of N/m a node for a solid class.
+
+    `baseline` is NaN where there is none; `state` is what all tests up to each say together.
+    """
+
+    title: str
+    times: Sequence[datetime]
+    tests: Sequence[str]
+    alone: Bounds
+    baseline: float
+    state: Bounds | None = None
+
+
+def specify(
+    courses: Sequence[Course], reach_decades: float, is_on_screen: bool = False
+) -> Specification | None:
+    """Side by side on paper, one below the other on a screen, which may be narrow."""
+    if not courses:
         return None
-    figure = style.new_figure(3.0)
-    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    for name, axes in zip(names, panels, strict=True):
-        style.dress(axes, "time of the test (UTC)", "")
-        axes.set_title(words.quantity(name), fontsize=9, color=style.INK, loc="left")
-        _trend(axes, data, name)
-        _levels(axes, data, name)
-    panels[0].set_ylabel("log10 of stiffness in N m/rad", fontsize=9, color=style.INK)
-    return figure
-
-
-def _planes(data: HangerReport) -> list[str]:
-    return sorted({name for dated in timeline.dated(data) for name in dated.row.stiffness})[::-1]
-
-
-def _trend(axes: Axes, data: HangerReport, name: str) -> None:
-    points = [
-        (dated.time, dated.row.stiffness[name])
-        for dated in timeline.dated(data)
-        if name in dated.row.stiffness
+    panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
+    if is_on_screen:
+        return stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
+    label = Axis(label="log10 of stiffness in N m/rad")
+    ends = [end for panel in panels for end in panel.y.range or ()]
+    shared = [
+        replace(each, y=Axis(range=(min(ends), max(ends))), shares_y=place > 0)
+        for place, each in enumerate(panels)
     ]
-    timeline.band(axes, points, style.PURPLE, name)
-    timeline.dress_time(axes, [time for time, _ in points])
+    shared[0] = replace(shared[0], y=replace(shared[0].y, label=label.label))
+    return Specification(rows=[shared], height_inches=3.0)
 
 
-def _levels(axes: Axes, data: HangerReport, name: str) -> None:
-    baseline = end_stiffness(data.baseline, data.hanger).get(name) if data.baseline else None
-    if baseline is None:
-        return
-    level, reach = float(baseline.mean()), data.hanger.thresholds.stiffness_shift_decades
-    axes.axhline(level, color=style.GREEN, linestyle="--")
-    for limit in (level - reach, level + reach):
-        axes.axhline(limit, color=style.RED, linestyle="-.", linewidth=1)
+def _panel(course: Course, reach: float, is_on_screen: bool) -> Panel:
+    alone = course.alone
+    chosen = over_time.places(alone.middle, alone.low, alone.high)
+    when = [course.times[place] for place in chosen.tolist()]
+    shown, names = over_time.part(alone, chosen), [course.tests[i] for i in chosen.tolist()]
+    state = None if course.state is None else over_time.part(course.state, chosen)
+    marks: list[Mark] = [
+        *(
+            over_time.band(when, shown, "purple")
+            if state is None
+            else over_time.band(when, state, "purple", "state, 90 % band")
+        ),
+        over_time.single_tests(when, shown, names, "purple" if state is None else "quiet"),
+    ]
+    levels = ((0.0, "baseline", "green"), (reach, "threshold", "red"), (-reach, "threshold", "red"))
+    if not math.isnan(course.baseline):
+        marks += [
+            over_time.level(
+                course.baseline + shift, name, hue, "dash" if shift == 0 else "dashdot"
+            )
+            for shift, name, hue in levels
+        ]  # fmt: skip
+    # The baseline with its thresholds, and what is near them of tests and state.
+    bounds = course.alone if course.state is None else course.state
+    seen: list[FloatArray] = [over_time.inner(each) for each in (bounds.low, bounds.high)]
+    seen += [over_time.inner(alone.middle), course.baseline + np.array([-reach, reach])]
+    return Panel(
+        y=Axis(label="log10 of stiffness", range=limits(*seen)), marks=marks,
+        x=over_time.time_axis(course.times), title=course.title, title_side="left",
+    )  # fmt: skip
 
 
-def _caption(data: HangerReport) -> str:
-    reach = data.hanger.thresholds.stiffness_shift_decades
+def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -> str:
+    what = (
+        "Stiffness of the ends, log10 of N m/rad (of N/m per node for a solid class), by each test "
+        "and as a state from all tests up to each, with 90 % intervals; the ends stand apart where "
+        "the frequencies tell them apart."
+        if any(course.state for course in courses)
+        else "Rotational stiffness of the ends by each test, log10 of N m/rad, "
+        "2/(1/k_deck + 1/k_arch) in each plane, because frequencies alone cannot tell the ends "
+        "apart: mean and 90 % credible band."
+    )
+    levels = (
+        f" Dashed: baseline; dash-dotted: thresholds, {reach_decades:.3g} decades either side."
+        if any(math.isfinite(course.baseline) for course in courses)
+        else ""
+    )
+    fewer = over_time.thinned_words(max((len(course.times) for course in courses), default=0))
     return (
-        "Rotational stiffness of the ends by each test, 2/(1/k_deck + 1/k_arch) in each plane, "
-        "because frequencies alone cannot tell the ends apart: mean and 90 % credible band. "
-        f"Dashed: baseline; dash-dotted: thresholds, {reach:.3g} decades either side. A wide band "
-        "means that the measured modes hardly feel the stiffness."
+        f"{what}{levels} A wide band means that the measured modes hardly feel the stiffness."
+        f"{fewer}{remark}"
     )
 
 
-def _alt(data: HangerReport) -> str:
-    latest = timeline.dated(data)[-1].row.stiffness
-    values = [
-        f"{words.quantity(name)} {words.mean(interval)} ({words.span(interval)})"
-        for name, interval in latest.items()
+def alt(courses: Sequence[Course]) -> str:
+    told = "; ".join(_last(course) for course in courses)
+    return f"End stiffness over time, log10; at last: {told}."
+
+
+def _last(course: Course) -> str:
+    bounds = course.alone if course.state is None else course.state
+    low, middle, high = (float(each[-1]) for each in (bounds.low, bounds.middle, bounds.high))
+    if math.isnan(middle):
+        return f"{course.title} not known"
+    return f"{course.title} {middle:.2f} ({low:.2f} to {high:.2f})"
+
+
+def _courses(data: HangerReport) -> list[Course]:
+    rows = over_time.dated(data)
+    base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
+    return [
+        Course(
+            words.quantity(name),
+            [row.time for row in rows],
+            [row.row.test for row in rows],
+            over_time.bounds_of([row.row.stiffness.get(name) for row in rows]),
+            float(base[name].mean()) if name in base else math.nan,
+        )
+        for name in names_of(row.row.stiffness for row in rows)
     ]
-    return "End stiffness over time, log10; at last: " + "; ".join(values or ["not estimated"])
 
 
-FIGURE = Member("stiffness", "Trend of the end stiffness", _draw, _caption, _alt)
+def names_of(rows: Iterable[Mapping[str, object]]) -> list[str]:
+    """`transverse_end_stiffness` first."""
+    return sorted({name for row in rows for name in row})[::-1]
+
+
+def _reach(data: HangerReport) -> float:
+    return data.hanger.thresholds.stiffness_shift_decades
+
+
+FIGURE = Member[HangerReport](
+    "stiffness",
+    "Trend of the end stiffness",
+    lambda data: specify(_courses(data), _reach(data)),
+    lambda data: caption(_courses(data), _reach(data)),
+    lambda data: alt(_courses(data)),
+)

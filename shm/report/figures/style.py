@@ -78,7 +78,9 @@ def legend_above(axes: Axes, columns: int = 4) -> Legend:
     )
 
 
-def legend_of_figure(figure: FigureBase, axes: Sequence[Axes], columns: int = 4) -> None:
+def legend_of_figure(
+    figure: FigureBase, axes: Sequence[Axes], columns: int = 4, where: str = "outside upper left"
+) -> None:
     """One legend over the whole figure for all `axes`, each name once; none where nothing has."""
     named: dict[str, Artist] = {}
     for each in axes:
@@ -88,7 +90,7 @@ def legend_of_figure(figure: FigureBase, axes: Sequence[Axes], columns: int = 4)
         figure.legend(
             list(named.values()),
             list(named),
-            loc="outside upper left",
+            loc=where,  # type: ignore[call-overload]
             ncols=columns,
             fontsize=TINY + 1,
             labelcolor=INK,

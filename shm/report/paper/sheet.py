@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from shm.report.figures.member import drawn
 from shm.report.paper.content import Paper, Part
 from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import PAGE_MEMBERS
+from shm.report.sheet.figures import page_figures
 from shm.report.sheet.page import CLOSING, STYLES, facts
 from shm.report.sheet.summary import HEADLINES, name, summary
 from shm.report.sheet.tables import details, results
@@ -23,7 +22,7 @@ def test_paper(sheet: TestSheet) -> Paper:
         parts=(
             Part("In short", summary(sheet), facts(sheet)),
             Part("Modes and quality", tables=results(sheet)),
-            Part("Figures", illustrations=drawn(PAGE_MEMBERS, sheet)),
+            Part("Figures", illustrations=page_figures(sheet)),
             Part("How it came about", tables=details(sheet)),
         ),
         generated_at=sheet.generated_at,

@@ -5,9 +5,8 @@ from __future__ import annotations
 from markupsafe import Markup
 
 from shm.report import words
-from shm.report.figures.member import drawn
 from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import PAGE_MEMBERS
+from shm.report.sheet.figures import page_figures
 from shm.report.sheet.summary import HEADLINES, name, summary
 from shm.report.sheet.tables import details, results
 from shm.report.template import ENVIRONMENT
@@ -26,7 +25,7 @@ STYLES: dict[Verdict, str] = {
 def test_page(sheet: TestSheet) -> str:
     """The sheet of one test: readable on screen (light or dark), on paper, by ear."""
     verdict = overall(sheet.identification.quality)
-    figures = drawn(PAGE_MEMBERS, sheet)
+    figures = page_figures(sheet)
     return ENVIRONMENT.get_template("sheet.html.j2").render(
         title=name(sheet),
         verdict=HEADLINES[verdict],

@@ -43,6 +43,27 @@ def spectrum(sheet: TestSheet) -> Spectrum | None:
     return None
 
 
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A sheet, the curve its modes are peaks of, and on screen which response of it is asked for.
+
+    `point` is an index into the points of `spectrum`; None on paper, where several are shown.
+    """
+
+    sheet: TestSheet
+    spectrum: Spectrum | None
+    point: int | None = None
+
+    @classmethod
+    def of(cls, sheet: TestSheet, point: int | None = None) -> Shown:
+        """With the curve worked out from the sheet, whose records must be there."""
+        return cls(sheet, spectrum(sheet), point)
+
+    @property
+    def is_on_screen(self) -> bool:
+        return self.point is not None
+
+
 def _density(records: Sequence[Recording]) -> Spectrum | None:
     """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
     first = records[0]

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from shm.report.figures.specification import Specification
+from shm_daemon.web import with_plotly
 from shm_daemon.web.hanger_view import HangerView
 
 
@@ -14,7 +16,7 @@ class HangerFigure:
     """A figure, and where on the page it stands (`part`).
 
     `is_there` says whether the hanger has what it shows and costs next to nothing beside the page;
-    `draw` gives the plotly document, `caption` explains what is seen, `alt` says what a blind
+    `draw` gives its specification, `caption` explains what is seen, `alt` says what a blind
     reader needs. What `shows_states` is not whole while the states over time are worked out; what
     `is_wide` scrolls on a phone.
     """
@@ -23,7 +25,7 @@ class HangerFigure:
     title: str
     part: str
     is_there: Callable[[HangerView], bool]
-    draw: Callable[[HangerView], dict[str, Any]]
+    draw: Callable[[HangerView], object]
     caption: Callable[[HangerView], str]
     alt: Callable[[HangerView], str]
     height_px: int = 360
@@ -32,4 +34,7 @@ class HangerFigure:
 
     def document(self, view: HangerView) -> dict[str, Any]:
         """The plotly document with its words."""
-        return {**self.draw(view), "caption": self.caption(view), "alt": self.alt(view)}
+        found = self.draw(view)
+        assert isinstance(found, Specification)
+        words = {"caption": self.caption(view), "alt": self.alt(view)}
+        return {**with_plotly.document(found), **words}

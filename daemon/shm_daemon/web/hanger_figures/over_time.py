@@ -1,58 +1,130 @@
-"""What is drawn over time: bands, single tests with their intervals, levels, fewer points."""
+"""The figures of a hanger's tests over time and over temperature, from what the store knows."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from datetime import UTC, datetime
-from typing import Any
+import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from shm.report.sheet.thinning import envelope_places
-from shm.store import TrendPoint
-from shm.values import FloatArray, IntArray, Summary
+from shm.report import Interval, words
+from shm.report.figures import stiffness, trend
+from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
+from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
+from shm.report.states import CalledChange, called_words
+from shm.store import EventKind, TrendPoint
+from shm.values import TENSION
 from shm.values.force_units import ForceUnit, force_unit
-from shm.watch.history import Band
-from shm_daemon.web.plotting import colour
+from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm_daemon.web.hanger_view import HangerView
 
-Trace = Mapping[str, Any]
-MOST_POINTS = 1_000
-"""Of which a figure is thinned: a hanger with a test a day for three years is drawn whole."""
-_BINS = MOST_POINTS // 6
-_ROOM = 0.08
-
-
-def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
-    """Indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
-
-    The first, the last and those of `always` stay whatever they are.
-    """
-    count = len(curves[0])
-    if count <= MOST_POINTS:
-        return np.arange(count)
-    chosen = [envelope_places(curve, _BINS) for curve in curves]
-    kept = np.array(sorted({0, count - 1, *always}), dtype=np.int64)
-    return np.unique(np.concatenate([*chosen, kept]))
+_FEWEST = 2
+_HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
+    EventKind.BASELINE: ("baseline set", "square", True, "green"),
+    EventKind.ADOPTED: ("effect adopted", "diamond", True, "purple"),
+    EventKind.UNDONE: ("adoption undone", "diamond", False, "purple"),
+}
+"""What people did: name, symbol, whether it is filled, colour."""
 
 
-def thinned_words(count: int) -> str:
-    """What a caption says, after a space, of a figure of so many tests that shows only some."""
-    if count <= MOST_POINTS:
-        return ""
-    return f" Of {count} tests those are drawn that keep every extreme; enlarging brings no more."
+def _course(view: HangerView) -> trend.Course:
+    """All that the figure shows; without the state over time where that is still worked out."""
+    states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
+    found = [] if states is None else [q for q in states.quantities if q.name == TENSION]
+    raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
+    changes = [call.watched.change for call in view.calls]
+    return trend.Course(
+        times=[point.time for point in view.trend],
+        names=[point.test for point in view.trend],
+        tensions_n=[Interval.of_summary(point.tension_n) for point in view.trend],
+        nominal_n=view.hanger.nominal_tension_n,
+        baseline_n=view.baseline.tension_n.mean if view.baseline else None,
+        reach=view.hanger.thresholds.tension_shift_fraction,
+        alerts={at[event.at]: event.why for event in raised},
+        state=found[0] if found else None,
+        state_times=states.times if states else (),
+        reference_temperature_c=states.reference_temperature_c if states else math.nan,
+        changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
+        deeds=[
+            trend.Deed(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
+            for kind in _HANDS
+            for event in view.events
+            if event.kind is kind
+        ],
+        remark=_remark(view),
+    )
 
 
-def tests_at(points: Sequence[TrendPoint], named: Collection[str]) -> list[int]:
-    """The places of the tests with these names."""
-    return [place for place, point in enumerate(points) if point.test in named]
+def _remark(view: HangerView) -> str:
+    undated = sum(point.taken_at is None for point in view.trend)
+    told = (
+        f"{words.counted(undated, 'test')} without a time drawn at the receipt." if undated else "",
+        "The state over time is being worked out." if view.states is None else "",
+    )
+    return " ".join(filter(None, told))
 
 
-def band_of(summaries: Sequence[Summary | None]) -> Band:
-    """Means with their 90 % intervals, NaN where there is none."""
-    rows = np.array(
-        [(s.q05, s.mean, s.q95) if s else (np.nan,) * 3 for s in summaries], dtype=np.float64
-    ).reshape(-1, 3)
-    return Band(*rows.T)
+TREND = HangerFigure(
+    "trend",
+    "Tension over time",
+    "trends",
+    lambda view: bool(view.trend),
+    lambda view: trend.specify(_course(view)),
+    lambda view: trend.caption(_course(view)),
+    lambda view: trend.alt(_course(view)),
+    height_px=440,
+    shows_states=True,
+)
+
+
+def _courses(view: HangerView) -> list[stiffness.Course]:
+    states, named = view.states, {point.time: point.test for point in view.trend}
+    watched = [] if states is None else [q for q in states.quantities if not q.is_tension]
+    if states is None or not watched:
+        return [_by_tests(view, name) for name in _names(view)]
+    tests = [named.get(time, "test") for time in states.times]
+    return [
+        stiffness.Course(each.title, states.times, tests, each.read, each.baseline, each.filtered)
+        for each in watched
+    ]
+
+
+def _names(view: HangerView) -> list[str]:
+    return stiffness.names_of(point.stiffness for point in view.trend)
+
+
+def _by_tests(view: HangerView, name: str) -> stiffness.Course:
+    base = view.baseline.stiffness.get(name) if view.baseline else None
+    found = [point.stiffness.get(name) for point in view.trend]
+    return stiffness.Course(
+        words.quantity(name),
+        [point.time for point in view.trend],
+        [point.test for point in view.trend],
+        bounds_of([Interval.of_summary(each) if each else None for each in found]),
+        base.mean if base else math.nan,
+    )
+
+
+def _reach(view: HangerView) -> float:
+    return view.hanger.thresholds.stiffness_shift_decades
+
+
+STIFFNESS = HangerFigure(
+    "stiffness",
+    "End stiffness over time",
+    "trends",
+    lambda view: bool(_names(view)),
+    lambda view: stiffness.specify(_courses(view), _reach(view), is_on_screen=True),
+    lambda view: stiffness.caption(
+        _courses(view),
+        _reach(view),
+        " The state over time is being worked out." if view.states is None else "",
+    ),
+    lambda view: stiffness.alt(_courses(view)),
+    height_px=520,
+    shows_states=True,
+)
 
 
 def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
@@ -60,84 +132,62 @@ def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
     return force_unit(*(point.tension_n.mean for point in points))
 
 
-def in_unit(band: Band, unit: ForceUnit) -> Band:
-    """A band of forces in N in another unit."""
-    return Band(unit.of(band.low), unit.of(band.middle), unit.of(band.high))
+def _with_temperature(view: HangerView) -> list[TrendPoint]:
+    """Tests with a temperature."""
+    return [point for point in view.trend if math.isfinite(point.temperature_c)]
 
 
-def band_traces(
-    times: Sequence[datetime], band: Band, name: str, hue: str, **more: Any
-) -> list[Trace]:
-    """A line and its band; the band stands in the legend with its line."""
-    clock = stamps(times)
-    edge = {
-        "type": "scatter", "x": clock, "mode": "lines", "line": {"width": 0},
-        "hoverinfo": "skip", "showlegend": False, "legendgroup": name, **more,
-    }  # fmt: skip
-    return [
-        {**edge, "y": band.low},
-        {**edge, "y": band.high, "fill": "tonexty", "fillcolor": colour(hue, 0.2)},
-        {
-            "type": "scatter", "x": clock, "y": band.middle, "mode": "lines", "name": name,
-            "legendgroup": name, "line": {"color": colour(hue), "width": 2},
-            "customdata": np.column_stack([band.low, band.high]),
-            "hovertemplate": "%{y:.4g} (90 %: %{customdata[0]:.4g} to %{customdata[1]:.4g})",
-            **more,
-        },
-    ]  # fmt: skip
+def _over_temperature(view: HangerView) -> Specification:
+    """Thinned by tension and temperature where there are very many."""
+    known, unit = _with_temperature(view), tension_unit(view.trend)
+    bounds = bounds_of([Interval.of_summary(point.tension_n) for point in known])
+    temperatures = np.array([point.temperature_c for point in known])
+    chosen = places(bounds.middle, temperatures)
+    shown = part(bounds, chosen, 1 / unit.newtons)
+    names = [f"{known[i].test}, {known[i].time:%Y-%m-%d}" for i in chosen.tolist()]
+    earlier, latest = np.arange(len(chosen) - 1), np.array([len(chosen) - 1])
+    x = temperatures[chosen]
+    marks = [
+        single_tests(x[earlier], part(shown, earlier), names[:-1], "blue", "earlier tests", 4.8),
+        replace(
+            single_tests(x[latest], part(shown, latest), names[-1:], "orange", "latest", 4.8),
+            symbol="diamond",
+        ),
+    ]
+    axis = Axis(label=f"tension ({unit.name})")
+    return stacked([Panel(y=axis, marks=marks, x=Axis(label="temperature (°C)"))], 3.4)
 
 
-def dots_trace(
-    times: Sequence[datetime],
-    band: Band,
-    names: Sequence[str],
-    label: str,
-    hue: str = "quiet",
-    **more: Any,
-) -> Trace:
-    """Single tests as marks with their 90 % intervals."""
-    return {
-        "type": "scatter", "x": stamps(times), "y": band.middle, "mode": "markers", "name": label,
-        "marker": {"color": colour(hue), "size": 6},
-        "error_y": {
-            "type": "data", "symmetric": False, "array": band.high - band.middle,
-            "arrayminus": band.middle - band.low, "color": colour(hue, 0.55), "thickness": 1.2,
-            "width": 0,
-        },
-        "text": list(names),
-        "customdata": np.column_stack([band.low, band.high]),
-        "hovertemplate": "%{text}: %{y:.4g} (90 %: %{customdata[0]:.4g} to "
-        "%{customdata[1]:.4g})<extra></extra>",
-        **more,
-    }  # fmt: skip
+def _caption_of_temperature(view: HangerView) -> str:
+    known = len(_with_temperature(view))
+    without = len(view.trend) - known
+    left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
+    return (
+        "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
+        f"is lies along one line; what leaves it has another reason than the weather.{left}"
+        f"{thinned_words(known)}"
+    )
 
 
-def level_trace(
-    times: Sequence[datetime], value: float, name: str, hue: str, dash: str, **more: Any
-) -> Trace:
-    """A level from the first time to the last."""
-    return {
-        "type": "scatter", "x": stamps([times[0], times[-1]]), "y": [value, value],
-        "mode": "lines", "name": name, "line": {"color": colour(hue), "dash": dash, "width": 1.5},
-        "hovertemplate": "%{y:.4g}", **more,
-    }  # fmt: skip
+def _alt_of_temperature(view: HangerView) -> str:
+    known = _with_temperature(view)
+    temperatures = [point.temperature_c for point in known]
+    means_n, unit = [point.tension_n.mean for point in known], tension_unit(view.trend)
+    low, high = (
+        f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
+    )
+    return (
+        f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
+        f"{max(temperatures):.1f} °C: {low} to {high} {unit.name}."
+    )
 
 
-def limits(values: FloatArray) -> list[float]:
-    """An axis that shows all known values, with a little room."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    margin = _ROOM * max(high - low, 1e-3 * abs(high))
-    return [low - margin, high + margin]
-
-
-def stamps(times: Sequence[datetime]) -> list[str]:
-    """As plotly takes them: in UTC, without the zone, which it would ignore."""
-    return [f"{time.astimezone(UTC):%Y-%m-%d %H:%M:%S}" for time in times]
-
-
-def picked(times: Sequence[datetime], chosen: IntArray) -> list[datetime]:
-    return [times[place] for place in chosen.tolist()]
-
-
-def of(band: Band, chosen: IntArray) -> Band:
-    return Band(band.low[chosen], band.middle[chosen], band.high[chosen])
+TEMPERATURE = HangerFigure(
+    "temperature",
+    "Tension and temperature",
+    "trends",
+    lambda view: len(_with_temperature(view)) >= _FEWEST,
+    _over_temperature,
+    _caption_of_temperature,
+    _alt_of_temperature,
+)

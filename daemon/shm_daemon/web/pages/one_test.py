@@ -12,6 +12,7 @@ from shm.errors import NothingThere
 from shm.report import words
 from shm.report.content import Interval
 from shm.report.sheet import tables
+from shm.report.sheet.figures.response import point_name
 from shm.report.sheet.spectra import shown_points
 from shm.report.sheet.summary import HEADLINES, name
 from shm.report.table import Table
@@ -20,8 +21,7 @@ from shm.values import ResponsePoint, Verdict
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address_of_test import test_json, test_page
-from shm_daemon.web.figures_of_test.contract import TestFigure
-from shm_daemon.web.figures_of_test.response import point_name
+from shm_daemon.web.figures_of_test import TestFigure
 from shm_daemon.web.frame import page
 from shm_daemon.web.origin_of_test import origin, steps, superseded
 from shm_daemon.web.tests import RETRY_AFTER, View

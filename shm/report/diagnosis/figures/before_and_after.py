@@ -7,50 +7,61 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import words
 from shm.report.diagnosis.content import DiagnosisSheet, claimed
-from shm.report.diagnosis.figures.modes import kept, orders, panels, planes
+from shm.report.diagnosis.figures.modes import by_plane, kept, orders, planes
 from shm.report.diagnosis.phrases import label
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    Axis,
+    Points,
+    Specification,
+    Symbol,
+    limits,
+)
 from shm.values import Plane, Residual
 
 
 @dataclass(frozen=True)
 class _Series:
-    """One of the residuals of a mode: the field that holds it, how it looks, where it stands."""
+    """One of the residuals of a mode; an empty colour is that of the plane."""
 
     field: str
     label: str
-    marker: str
+    symbol: Symbol
     filled: bool
+    colour: str
     offset: float
 
 
 _SERIES = (
-    _Series("residual_percent", "baseline", "o", False, -0.2),
-    _Series("after_percent", "with the cause", "o", True, 0.0),
-    _Series("held_out_after_percent", "with the cause, held out", "D", True, 0.2),
+    _Series("residual_percent", "baseline", "circle", False, "quiet", -0.2),
+    _Series("after_percent", "with the cause", "circle", True, "", 0.0),
+    _Series("held_out_after_percent", "with the cause, held out", "diamond", True, "green", 0.2),
 )
 
 
-def _draw(sheet: DiagnosisSheet) -> Figure | None:
+def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification | None:
     residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
     if not residuals or claimed(sheet.diagnosis) is None:
         return None
-    figure = style.new_figure(3.0)
-    made = panels(figure, residuals, "measured / predicted - 1 (%)")
-    for plane, axes in made.items():
-        for series in _SERIES:
-            _points(axes, [r for r in residuals if r.plane == plane], plane, series)
-    style.legend_of_figure(figure, list(made.values())[:1], columns=3)
-    return figure
+    made = {
+        plane: [
+            points
+            for series in _SERIES
+            if (points := _points([r for r in residuals if r.plane == plane], plane, series))
+        ]
+        for plane in planes(residuals)
+    }
+    label = "gap (%)" if is_on_screen else "measured / predicted - 1 (%)"
+    ends = [end for marks in made.values() for each in marks for end in (each.low, each.high)]
+    rows = by_plane(made, residuals, Axis(label=label, range=limits(*ends)), is_on_screen)
+    return Specification(rows=rows, height_inches=3.0, legend_columns=3)
 
 
-def _points(axes: Axes, residuals: Sequence[Residual], plane: Plane, series: _Series) -> None:
+def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Points | None:
     """The mean over the tests with a line from the least to the largest."""
     there = [
         (order, values)
@@ -58,29 +69,20 @@ def _points(axes: Axes, residuals: Sequence[Residual], plane: Plane, series: _Se
         if len(values := _values(residuals, order, series.field))
     ]
     if not there:
-        return
-    x = np.array([order + series.offset for order, _ in there])
-    colour = _colour(plane, series)
-    axes.vlines(
-        x, [min(v) for _, v in there], [max(v) for _, v in there], color=colour, linewidth=1.0,
-        alpha=0.6,
-    )  # fmt: skip
-    axes.plot(
-        x, [float(np.mean(v)) for _, v in there], linestyle="none", marker=series.marker,
-        markersize=5 if series.marker == "o" else 4, color=colour,
-        markerfacecolor=colour if series.filled else "none", label=series.label,
+        return None
+    return Points(
+        x=[order + series.offset for order, _ in there],
+        y=[float(np.mean(values)) for _, values in there],
+        low=[min(values) for _, values in there], high=[max(values) for _, values in there],
+        caps=False, symbol=series.symbol, filled=series.filled, name=series.label,
+        colour=series.colour or PLANE_HUES[plane],
+        hover=f"{plane}, {series.label}: %{{y:.2f}} %",
     )  # fmt: skip
 
 
 def _values(residuals: Sequence[Residual], order: int, field: str) -> list[float]:
     found = [getattr(r, field) for r in residuals if r.order == order]
     return [value for value in found if math.isfinite(value)]
-
-
-def _colour(plane: Plane, series: _Series) -> str:
-    if series.field == "residual_percent":
-        return style.QUIET
-    return style.GREEN if series.marker == "D" else style.PLANE_COLOURS[plane]
 
 
 def _caption(sheet: DiagnosisSheet) -> str:
@@ -118,4 +120,4 @@ def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
     return f"{words.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
 
 
-FIGURE = Member("before_and_after", "The gap before and after by mode", _draw, _caption, _alt)
+FIGURE = Member("before_and_after", "The gap before and after by mode", specify, _caption, _alt)

@@ -3,31 +3,39 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import words
 from shm.report.diagnosis.content import Claim, DiagnosisSheet, claims
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import verdict
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    Axis,
+    Bars,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Side,
+    Specification,
+    stacked,
+)
 from shm.values import Cause, Diagnosis
 
-_MOST = 10
+_MOST, _MOST_ON_SCREEN = 10, 8
 _ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
 _LEAST_SHOWN = 0.0005
-_LABEL = 40
-_NOTE = style.TINY + 0.5
+_LABEL, _LABEL_ON_SCREEN = 40, 30
+"""Longest line of a label, in letters: a phone shows the bars too."""
 _BRACKET_TEXT = 0.42
 """Room for the words beside a bracket and the column of Bayes factors."""
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 @dataclass(frozen=True)
-class _Bar:
+class Bar:
     """One row of the figure; `claim` is the group that it belongs to, None for a lone one."""
 
     label: str
@@ -37,51 +45,80 @@ class _Bar:
     claim: Claim | None = None
 
 
-def _draw(sheet: DiagnosisSheet) -> Figure | None:
+def specify(sheet: DiagnosisSheet) -> Specification | None:
+    """With the Bayes factors, and brackets around causes that the data cannot tell apart."""
     bars = _bars(sheet.diagnosis)
     if not any(bar.probability > 0 for bar in bars):
         return None
-    labels = [textwrap.fill(bar.label, _LABEL) for bar in bars]
-    is_tall = any(label.count("\n") > 1 for label in labels)
-    figure = style.new_figure((_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
-    axes = figure.subplots()
-    style.dress(axes, "probability", "")
-    axes.barh(
-        range(len(bars)),
-        [bar.probability for bar in bars],
-        height=0.62,
-        color=[bar.colour for bar in bars],
-        linewidth=0,
-    )
-    for row, bar in enumerate(bars):
-        _write(axes, row, bar)
-    right = _brackets(axes, bars)
-    axes.set_yticks(range(len(bars)), labels)
-    axes.tick_params(axis="y", length=0, labelsize=style.TINY + 1)
-    axes.grid(False, axis="y")
-    axes.set_ylim(len(bars) - 0.45, -1.2)
-    axes.set_xlim(0, max(1.3, right + _BRACKET_TEXT))
-    axes.set_xticks(np.arange(0, 1.01, 0.2))
-    _beside(axes, -0.85, "log Bayes factor")
-    return figure
+    brackets, outermost = _brackets(bars)
+    right = max(1.3, outermost + _BRACKET_TEXT)
+    beside = [(-0.85, "log Bayes factor"), *enumerate(bar.beside for bar in bars)]
+    column = _notes([right] * len(beside), [row for row, _ in beside], [told for _, told in beside])
+    return probability_bars(bars, _LABEL, (-1.2, right), [*brackets, column])
 
 
-def _bars(diagnosis: Diagnosis) -> list[_Bar]:
-    shown = _shown(diagnosis)
+def specify_on_screen(sheet: DiagnosisSheet) -> Specification:
+    """Where those alike share a letter, and fewer are shown."""
+    pairs = [(claim, cause) for claim in claims(sheet.diagnosis) for cause in claim.causes]
     bars = [
-        _Bar(
-            label(cause),
-            cause.probability,
-            style.BLUE,
-            words.number(cause.log_bayes_factor, "+z.1f"),
-            claim if len(claim.causes) > 1 else None,
-        )
-        for claim, cause in shown
+        Bar(label(cause) + _letter(cause.group), cause.probability, "blue")
+        for _, cause in pairs[:_MOST_ON_SCREEN]
     ]
-    rest = diagnosis.unexplained_probability
-    bars.append(_Bar("something not in the catalogue", rest, style.ORANGE))
-    bars.append(_Bar("no gap", diagnosis.no_gap_probability, style.GREEN))
-    return bars
+    return probability_bars([*bars, *_others(sheet.diagnosis)], _LABEL_ON_SCREEN)
+
+
+def _letter(group: int | None) -> str:
+    return "" if group is None else f" [{_LETTERS[group % len(_LETTERS)]}]"
+
+
+def probability_bars(
+    bars: Sequence[Bar], longest: int = _LABEL_ON_SCREEN,
+    ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[Mark] = (),
+) -> Specification:  # fmt: skip
+    """Bars one below the other, their labels in lines of at most so many letters.
+
+    `ends` are the upper end of the one axis and the right one of the other.
+    """
+    labels = [textwrap.fill(bar.label, longest) for bar in bars]
+    is_tall = any(label.count("\n") > 1 for label in labels)
+    drawn = [
+        Bars(
+            x=[row], y=[bar.probability], lying=True, width=0.62, colour=bar.colour,
+            labels=[words.probability(bar.probability)],
+            texts=[f"{bar.label}: {words.probability(bar.probability)}"],
+        )
+        for row, bar in enumerate(bars)
+    ]  # fmt: skip
+    panel = Panel(
+        y=Axis(
+            range=(len(bars) - 0.45, ends[0]), ticks=range(len(bars)), tick_labels=labels,
+            grid=False,
+        ),
+        x=Axis(label="probability", range=(0, ends[1]), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
+        marks=[*drawn, *marks],
+    )  # fmt: skip
+    return stacked([panel], (_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
+
+
+def _bars(diagnosis: Diagnosis) -> list[Bar]:
+    return [
+        *(
+            Bar(
+                label(cause),
+                cause.probability,
+                "blue",
+                words.number(cause.log_bayes_factor, "+z.1f"),
+                claim if len(claim.causes) > 1 else None,
+            )
+            for claim, cause in _shown(diagnosis)
+        ),
+        *_others(diagnosis),
+    ]
+
+
+def _others(diagnosis: Diagnosis) -> tuple[Bar, Bar]:
+    rest = Bar("something not in the catalogue", diagnosis.unexplained_probability, "orange")
+    return rest, Bar("no gap", diagnosis.no_gap_probability, "green")
 
 
 def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
@@ -91,33 +128,13 @@ def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
     return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
 
 
-def _write(axes: Axes, row: int, bar: _Bar) -> None:
-    """The probability behind the bar, the Bayes factor in a column on the right."""
-    axes.annotate(
-        words.probability(bar.probability),
-        (max(bar.probability, 0.0), row),
-        xytext=(5, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=_NOTE,
-        color=style.INK,
-    )
-    _beside(axes, row, bar.beside)
-
-
-def _beside(axes: Axes, row: float, told: str) -> None:
-    place = axes.get_yaxis_transform()
-    axes.text(
-        1.0, row, told, transform=place, va="center", ha="right", fontsize=_NOTE, color=style.QUIET
-    )
-
-
-def _brackets(axes: Axes, bars: list[_Bar]) -> float:
+def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
     """A bracket around causes that the data cannot tell apart, with what they have together.
 
-    Gives the place of the outermost bracket.
+    And the place of the outermost bracket.
     """
     outermost = 0.0
+    marks: list[Mark] = []
     found: dict[int, tuple[Claim, list[int]]] = {}
     for row, bar in enumerate(bars):
         if bar.claim is not None:
@@ -125,36 +142,38 @@ def _brackets(axes: Axes, bars: list[_Bar]) -> float:
     for claim, rows in found.values():
         x = max(bars[row].probability for row in rows) + 0.13
         top, bottom = rows[0] - 0.3, rows[-1] + 0.3
-        axes.plot(
-            [x - 0.012, x, x, x - 0.012],
-            [top, top, bottom, bottom],
-            color=style.PURPLE,
-            linewidth=1.4,
-        )
-        axes.text(
-            x + 0.015,
-            (top + bottom) / 2,
-            f"not told apart:\n{words.probability(claim.probability)} together",
-            va="center",
-            fontsize=_NOTE,
-            color=style.PURPLE,
-        )
+        sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
+        told = f"not told apart:\n{words.probability(claim.probability)} together"
+        marks += [
+            Line(x=sides, y=heights, colour="purple", width=1.4),
+            _notes([x + 0.01], [(top + bottom) / 2], [told], "purple", "right"),
+        ]
         outermost = max(outermost, x)
-    return outermost
+    return marks, outermost
 
 
-def _caption(sheet: DiagnosisSheet) -> str:
+def _notes(
+    x: Sequence[float], y: Sequence[float], told: Sequence[str], colour: str = "quiet",
+    side: Side = "left",
+) -> Points:  # fmt: skip
+    """Words alone."""
+    return Points(x=x, y=y, size=0, labels=told, label_side=side, colour=colour)
+
+
+def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     diagnosis = sheet.diagnosis
-    left = len(diagnosis.causes) - len(_shown(diagnosis))
-    more = f" {words.counted(left, 'less probable cause')} {_are(left)} not drawn." if left else ""
-    groups = (
-        " A bracket holds causes that these data cannot tell apart; what counts is their sum."
-        if diagnosis.groups
-        else ""
+    shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
+    left = len(diagnosis.causes) - shown
+    more = f" {words.counted(left, 'less probable cause')} {_are(left)} not drawn."
+    alike = (
+        "Causes with the same letter cannot be told apart with these data"
+        if is_on_screen
+        else "A bracket holds causes that these data cannot tell apart"
     )
+    groups = f" {alike}; what counts is their sum." if diagnosis.groups else ""
     return (
         "Probability of each cause, of something that the catalogue does not hold, and of no gap; "
-        f"all add to 1.{groups}{more}"
+        f"all add to 1.{groups}{more if left > 0 else ''}"
     )
 
 
@@ -167,4 +186,4 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{verdict(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
-FIGURE = Member("causes", "What causes the gap", _draw, _caption, _alt)
+FIGURE = Member("causes", "What causes the gap", specify, caption, _alt)

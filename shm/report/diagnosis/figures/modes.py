@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-
-from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from shm.report.diagnosis.content import DiagnosisSheet, is_set_aside
-from shm.report.figures import style
+from shm.report.figures.specification import PLANE_HUES, Axis, Mark, Panel, Rule
 from shm.values import PLANES, Plane, Residual
-
-ZERO_WIDTH = 0.8
 
 
 def measured(sheet: DiagnosisSheet) -> list[Residual]:
@@ -38,17 +34,32 @@ def orders(residuals: Sequence[Residual], plane: Plane) -> list[int]:
     return sorted({r.order for r in residuals if r.plane == plane})
 
 
-def panels(figure: FigureBase, residuals: Sequence[Residual], y_label: str) -> dict[Plane, Axes]:
-    """A panel for each plane that was measured, over its orders, with one vertical axis."""
-    found = planes(residuals)
-    made = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
-    for plane, axes in zip(found, made, strict=True):
+def by_plane(
+    made: Mapping[Plane, Sequence[Mark]],
+    residuals: Sequence[Residual],
+    y: Axis,
+    is_on_screen: bool,
+) -> list[list[Panel]]:
+    """A panel of marks for each plane over its orders, with one vertical axis.
+
+    They stand side by side on paper, one below the other on a screen, which may be narrow."""
+    panels: list[Panel] = []
+    for plane, marks in made.items():
         there = orders(residuals, plane)
-        style.dress(axes, "order of the mode", y_label if axes is made[0] else "")
-        axes.axhline(0, color=style.INK, linewidth=ZERO_WIDTH)
-        axes.set_xlim(there[0] - 0.6, there[-1] + 0.6)
-        axes.set_xticks(there if len(there) <= 12 else there[:: math.ceil(len(there) / 12)])
-        axes.grid(False, axis="x")
-        colour = style.PLANE_COLOURS[plane]
-        axes.set_title(f"{plane} plane", fontsize=9, color=colour, loc="left")
-    return dict(zip(found, made, strict=True))
+        if is_on_screen:
+            there = sorted({r.order for r in residuals})
+        is_alone = is_on_screen or not panels
+        panels.append(
+            Panel(
+                y=y if is_alone else replace(y, label=""), marks=[Rule(at=0, width=0.8), *marks],
+                x=Axis(
+                    label="order of the mode", range=(there[0] - 0.6, there[-1] + 0.6), grid=False,
+                    ticks=there[:: math.ceil(len(there) / 12)],
+                ),
+                title=f"{plane} plane", title_colour=PLANE_HUES[plane], title_side="left",
+                shares_y=bool(panels),
+            )
+        )  # fmt: skip
+    if not is_on_screen:
+        return [panels]
+    return [[replace(panel, x=None)] for panel in panels[:-1]] + [panels[-1:]]

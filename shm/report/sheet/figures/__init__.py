@@ -11,8 +11,9 @@ from shm.report.sheet.figures.response import FIGURE as RESPONSE
 from shm.report.sheet.figures.shapes import FIGURE as SHAPES
 from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
 from shm.report.sheet.figures.time_history import FIGURE as TIME_HISTORY
+from shm.report.sheet.spectra import Shown
 
-MEMBERS: tuple[Member[TestSheet], ...] = (
+MEMBERS: tuple[Member[Shown], ...] = (
     QUALITY,
     TIME_HISTORY,
     HITS,
@@ -22,9 +23,14 @@ MEMBERS: tuple[Member[TestSheet], ...] = (
     DAMPING,
 )
 # The quality stands there as a table of words, which can be searched and read aloud.
-PAGE_MEMBERS = tuple(member for member in MEMBERS if member is not QUALITY)
+_PAGE_MEMBERS = tuple(member for member in MEMBERS if member is not QUALITY)
 
 
 def test_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
     """Every figure of one hammer test that its records and modes allow, in reading order."""
-    return drawn(MEMBERS, sheet)
+    return drawn(MEMBERS, Shown.of(sheet))
+
+
+def page_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+    """Those of them that are no table."""
+    return drawn(_PAGE_MEMBERS, Shown.of(sheet))

@@ -3,86 +3,78 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+import numpy as np
 
-from shm.report import words
 from shm.report.content import NORMAL_90
-from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.spectra import shown_range
-from shm.values import PLANES, Mode, Plane
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Axis,
+    Mark,
+    Panel,
+    Points,
+    Specification,
+    log_axis,
+    stacked,
+)
+from shm.report.sheet.spectra import Shown, shown_range
+from shm.values import PLANES, FloatArray, Mode
 
 _LEAST_SPAN = 30.0
 """Of the axis of intervals: equal ones shall look equal."""
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    if not sheet.modes:
-        return None
-    sure = any(math.isfinite(mode.frequency_sd_hz) for mode in sheet.modes)
-    figure = style.new_figure(4.6 if sure else 2.9)
-    panels = style.stacked(figure, [1.0] * (1 + sure))
-    low, high = shown_range(sheet)
-    panels[0].set_xlim(low, high)
-    _damping(panels[0], sheet)
+def _draw(shown: Shown) -> Specification | None:
+    damped = [m for m in shown.sheet.modes if math.isfinite(m.damping_ratio)]
+    sure = [m for m in shown.sheet.modes if m.frequency_sd_hz > 0]
+    across = Axis(label="frequency (Hz)", range=shown_range(shown.sheet))
+    panels = []
+    if damped:
+        panels.append(_damping(damped, None if sure else across))
     if sure:
-        _uncertainty(panels[1], sheet)
-    style.dress(panels[-1], "frequency (Hz)", panels[-1].get_ylabel())
-    style.legend_of_figure(figure, panels[:1])
-    return figure
+        panels.append(_uncertainty(sure, across))
+    return stacked(panels, 4.6 if sure else 2.9) if panels else None
 
 
-def _of(sheet: TestSheet, plane: Plane) -> list[Mode]:
-    return [mode for mode in sheet.modes if mode.plane == plane]
+def _damping(modes: Sequence[Mode], across: Axis | None) -> Panel:
+    value = np.array([100 * mode.damping_ratio for mode in modes])
+    half = np.nan_to_num([100 * NORMAL_90 * mode.damping_sd for mode in modes])
+    axis = Axis(label="damping ratio (%)", range=(0, 1.1 * float(max(value + half))))
+    return Panel(y=axis, marks=_marks(modes, value, half), x=across)
 
 
-def _damping(axes: Axes, sheet: TestSheet) -> None:
-    style.dress(axes, "", "damping ratio (%)")
+def _uncertainty(modes: Sequence[Mode], across: Axis) -> Panel:
+    """Half the 90 % interval of each frequency, in percent of it."""
+    value = np.array([100 * NORMAL_90 * m.frequency_sd_hz / m.frequency_hz for m in modes])
+    low, high = float(min(value)), float(max(value))
+    room = max(1.3, math.sqrt(_LEAST_SPAN * low / high))
+    axis = log_axis("90 % interval of\nthe frequency (± %)", low / room, high * room)
+    return Panel(y=axis, marks=_marks(modes, value), x=across)
+
+
+def _marks(modes: Sequence[Mode], value: FloatArray, half: FloatArray | None = None) -> list[Mark]:
+    found: list[Mark] = []
     for plane in PLANES:
-        modes = _of(sheet, plane)
-        if not modes:
-            continue
-        halves = [NORMAL_90 * mode.damping_sd for mode in modes]
-        axes.errorbar(
-            [mode.frequency_hz for mode in modes],
-            [100 * mode.damping_ratio for mode in modes],
-            yerr=[100 * half if math.isfinite(half) else 0.0 for half in halves],
-            fmt=style.PLANE_MARKERS[plane],
-            color=style.PLANE_COLOURS[plane],
-            markersize=4.5,
-            elinewidth=1.1,
-            capsize=2.5,
-            label=plane,
-        )
-    axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
+        own = [place for place, mode in enumerate(modes) if mode.plane == plane]
+        if own:
+            found.append(
+                Points(
+                    x=[modes[place].frequency_hz for place in own], y=value[own],
+                    low=None if half is None else (value - half)[own],
+                    high=None if half is None else (value + half)[own],
+                    symbol=PLANE_SYMBOLS[plane], colour=PLANE_HUES[plane], name=plane,
+                    texts=[f"{plane} {modes[place].order}" for place in own],
+                    hover="%{text}: %{x:.4g} Hz, %{y:.3g} %",
+                )
+            )  # fmt: skip
+    return found
 
 
-def _uncertainty(axes: Axes, sheet: TestSheet) -> None:
-    style.dress(axes, "", "90 % interval of\nthe frequency (± %)")
-    axes.set_yscale("log")
-    for plane in PLANES:
-        modes = [m for m in _of(sheet, plane) if m.frequency_sd_hz > 0]
-        axes.plot(
-            [mode.frequency_hz for mode in modes],
-            [100 * NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in modes],
-            linestyle="none",
-            marker=style.PLANE_MARKERS[plane],
-            markersize=4.5,
-            color=style.PLANE_COLOURS[plane],
-        )
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, high / _LEAST_SPAN), max(high, low * _LEAST_SPAN))
-    axes.yaxis.set_major_formatter(lambda value, _: words.plain(value))
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _caption(sheet: TestSheet) -> str:
-    known = any(math.isfinite(mode.damping_sd) for mode in sheet.modes)
+def _caption(shown: Shown) -> str:
+    known = any(math.isfinite(mode.damping_sd) for mode in shown.sheet.modes)
     bars = "bars are 90 % intervals" if known else "its uncertainty is not known"
     return (
         f"Damping of each mode, {bars}. A mode damped quite unlike its neighbours, or one whose "
@@ -90,8 +82,8 @@ def _caption(sheet: TestSheet) -> str:
     )
 
 
-def _alt(sheet: TestSheet) -> str:
-    percent = [100 * mode.damping_ratio for mode in sheet.modes]
+def _alt(shown: Shown) -> str:
+    percent = [100 * mode.damping_ratio for mode in shown.sheet.modes]
     return (
         f"Damping ratios of {len(percent)} modes between {min(percent):.2g} and "
         f"{max(percent):.2g} %, by frequency and plane."

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
 from shm.report import words
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    Axis,
+    Dash,
+    Line,
+    Panel,
+    Rule,
+    Span,
+    Specification,
+)
 from shm.report.sheet.blows import (
     CURVE_BINS,
     LOWEST_DB,
@@ -20,89 +27,105 @@ from shm.report.sheet.blows import (
     blow_name,
     shown_blows,
 )
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.spectra import searched_range
+from shm.report.sheet.spectra import Shown, searched_range
 from shm.report.sheet.thinning import envelope_places
 
-_COLOURS = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE)
-_DASHES = ("-", "--", ":")
-_DROPPED_DASHES = ((4, 1.5), (1, 1), (6, 1, 1, 1), (2, 2))
+_COLOURS = ("blue", "orange", "green", "purple")
+_DASHES: tuple[Dash, ...] = ("solid", "dash", "dot")
+_DROPPED_DASHES: tuple[Dash, ...] = ("dash", "dot", "dashdot", "longdash")
+_FADE_ROOM = 1.3
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    shown = shown_blows(sheet)
-    if not shown:
+def _draw(shown: Shown) -> Specification | None:
+    hits = shown_blows(shown.sheet)
+    if not hits:
         return None
-    figure = style.new_figure(5.4)
-    panels = figure.subplot_mosaic([["pulse", "spectrum"], ["fade", "fade"]])
-    _pulses(panels["pulse"], shown)
-    _spectra(panels["spectrum"], sheet, shown)
-    _fades(panels["fade"], shown)
-    columns = 6 if all(blow.hit.used for blow in shown) else 3
-    style.legend_of_figure(figure, [panels["pulse"]], columns)
-    return figure
+    panels = [_pulses(hits), _spectra(shown, hits), _fades(hits)]
+    rows = [[each] for each in panels] if shown.is_on_screen else [panels[:2], panels[2:]]
+    columns = 6 if all(blow.hit.used for blow in hits) else 3
+    return Specification(rows=rows, height_inches=5.4, legend_columns=columns)
 
 
-def _line(blow: Blow, place: int) -> dict[str, Any]:
-    """Colour and dashes of a hit: a dropped one is red."""
+def _look(blow: Blow, place: int) -> dict[str, Any]:
+    """Colour, dashes and name of a hit: a dropped one is red."""
+    name = blow_name(blow)
     if not blow.hit.used:
         dashes = _DROPPED_DASHES[place % len(_DROPPED_DASHES)]
-        return {"color": style.RED, "linestyle": (0, dashes), "linewidth": 1.1}
-    dashed = _DASHES[place // len(_COLOURS) % len(_DASHES)]
-    return {"color": _COLOURS[place % len(_COLOURS)], "linestyle": dashed, "linewidth": 0.9}
+        return {"name": name, "colour": "red", "dash": dashes, "width": 1.1}
+    dashes = _DASHES[place // len(_COLOURS) % len(_DASHES)]
+    colour = _COLOURS[place % len(_COLOURS)]
+    return {"name": name, "colour": colour, "dash": dashes, "width": 0.9}
 
 
-def _pulses(axes: Axes, shown: list[Blow]) -> None:
-    style.dress(axes, "time from the start of the hit (ms)", "force (N)")
-    spans = np.array([blow.near_s for blow in shown])
-    axes.set_xlim(1e3 * spans[:, 0].min(), 1e3 * spans[:, 1].max())
-    for place, blow in enumerate(shown):
-        places = envelope_places(blow.force_n, CURVE_BINS)
-        axes.plot(
-            1e3 * blow.time_s[places],
-            blow.force_n[places],
-            label=blow_name(blow),
-            **_line(blow, place),
-        )
+def _pulses(hits: Sequence[Blow]) -> Panel:
+    lines = []
+    for place, blow in enumerate(hits):
+        kept = envelope_places(blow.force_n, CURVE_BINS)
+        lines.append(
+            Line(
+                x=1e3 * blow.time_s[kept], y=blow.force_n[kept], hover="%{x:.1f} ms: %{y:.4g} N",
+                **_look(blow, place),
+            )
+        )  # fmt: skip
+    spans_ms = 1e3 * np.array([blow.near_s for blow in hits])
+    return Panel(
+        y=Axis(label="force (N)"), marks=lines,
+        x=Axis(
+            label="time from the start of the hit (ms)",
+            range=(float(spans_ms[:, 0].min()), float(spans_ms[:, 1].max())),
+        ),
+    )  # fmt: skip
 
 
-def _spectra(axes: Axes, sheet: TestSheet, shown: list[Blow]) -> None:
-    style.dress(axes, "frequency (Hz)", "force, relative (dB)")
-    highest = float(shown[0].spectrum_hz[-1])
-    low, high = searched_range(sheet)
+def _spectra(shown: Shown, hits: Sequence[Blow]) -> Panel:
+    highest = float(hits[0].spectrum_hz[-1])
+    low, high = searched_range(shown.sheet)
     high = min(high, highest)
     end = min(2 * high, highest)
-    for place, blow in enumerate(shown):
-        lines = blow.spectrum_hz <= end
-        spectrum_hz, spectrum_db = blow.spectrum_hz[lines], blow.spectrum_db[lines]
-        places = envelope_places(spectrum_db, CURVE_BINS)
-        axes.plot(spectrum_hz[places], spectrum_db[places], **_line(blow, place))
-    axes.axhline(REACH_DB, color=style.INK, linewidth=0.8, linestyle="-.")
-    axes.text(
-        0.01, REACH_DB - 0.6, "a tenth of the force", transform=axes.get_yaxis_transform(),
-        va="top", fontsize=style.TINY, color=style.INK,
+    lines = []
+    for place, blow in enumerate(hits):
+        # Far below the panel nothing is drawn, as lines to there would cross others outside it.
+        kept = (blow.spectrum_hz <= end) & (blow.spectrum_db > LOWEST_DB - 20)
+        found = np.where(kept, blow.spectrum_db, np.nan)
+        places = envelope_places(found, CURVE_BINS)
+        lines.append(
+            Line(
+                x=blow.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
+                **_look(blow, place),
+            )
+        )  # fmt: skip
+    level = Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
+    band = Span(low=low, high=high, colour="green", opacity=0.10)
+    what = "band" if shown.sheet.band_hz else "where modes were found"
+    return Panel(
+        y=Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)), marks=[*lines, level, band],
+        x=Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
     )  # fmt: skip
-    axes.axvspan(low, high, color=style.GREEN, alpha=0.10, linewidth=0)
-    axes.set_ylim(LOWEST_DB, 2)
-    axes.set_xlim(0, end)
-    band = "band" if sheet.band_hz else "where modes were found"
-    axes.set_title(
-        f"shaded: {band}", fontsize=style.TINY + 0.5, color=style.INK, loc="right", pad=2
-    )
 
 
-def _fades(axes: Axes, shown: list[Blow]) -> None:
-    style.dress(
-        axes, "time from the start of the hit (s)", "largest acceleration\nper peak force (m/s²/N)"
-    )
-    axes.set_yscale("log")
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    for place, blow in enumerate(shown):
-        axes.plot(blow.fade_s, blow.fade_m_s2_n, **_line(blow, place))
-    axes.set_xlim(0, max(float(blow.fade_s[-1]) for blow in shown))
+def _fades(hits: Sequence[Blow]) -> Panel:
+    values = np.concatenate([blow.fade_m_s2_n for blow in hits])
+    known = values[np.isfinite(values) & (values > 0)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.1, 1.0)
+    axis = Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
+    return Panel(
+        y=replace(axis, label="largest acceleration\nper peak force (m/s²/N)"),
+        marks=[
+            Line(
+                x=blow.fade_s, y=blow.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
+                **_look(blow, place),
+            )
+            for place, blow in enumerate(hits)
+        ],
+        x=Axis(
+            label="time from the start of the hit (s)",
+            range=(0, max(float(blow.fade_s[-1]) for blow in hits)),
+        ),
+    )  # fmt: skip
 
 
-def _caption(sheet: TestSheet) -> str:
+def _caption(shown: Shown) -> str:
+    sheet = shown.sheet
     some = words.some(len(shown_blows(sheet)), len(sheet.hits), "hits")
     return (
         "Above, the force of each hit and its spectrum, each relative to its largest value: it "
@@ -112,13 +135,13 @@ def _caption(sheet: TestSheet) -> str:
     )
 
 
-def _alt(sheet: TestSheet) -> str:
-    shown = shown_blows(sheet)
-    reaches = [b.reach_hz for b in shown if b.hit.used and np.isfinite(b.reach_hz)]
-    forces = [blow.hit.peak_force_n for blow in shown]
+def _alt(shown: Shown) -> str:
+    hits = shown_blows(shown.sheet)
+    reaches = [b.reach_hz for b in hits if b.hit.used and np.isfinite(b.reach_hz)]
+    forces = [blow.hit.peak_force_n for blow in hits]
     reach = f" A tenth of the force is left at {np.median(reaches):.0f} Hz." if reaches else ""
     return (
-        f"{words.counted(len(shown), 'hit')} of {words.plain(min(forces))} to "
+        f"{words.counted(len(hits), 'hit')} of {words.plain(min(forces))} to "
         f"{words.plain(max(forces))} N laid over each other.{reach}"
     )
 

@@ -5,92 +5,73 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from matplotlib.axes import Axes
+import numpy as np
 
-from shm.report.figures import style
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Dash,
+    Line,
+    Mark,
+    Points,
+    Symbol,
+)
 from shm.report.sheet.content import TestSheet
-from shm.values import PLANES, Mode
+from shm.values import PLANES
 
-_ROWS = {"transverse": 0.93, "longitudinal": 0.82}
-_SET_ASIDE_ROW = 0.71
+_ROWS = {"transverse": 0.94, "longitudinal": 0.83}
+_SET_ASIDE_ROW = 0.72
 _ROOM = 0.026
 """Least distance of two numbers, as a share of the axis."""
-HEADROOM = 0.36
+_HEADROOM = 0.36
 """Share of the axes' height that the marks take."""
 
 
-def mark_modes(axes: Axes, sheet: TestSheet) -> None:
-    """A marker and a line at each mode, a row for each plane, orders where there is room."""
-    low, high = axes.get_xlim()
+def mode_marks(sheet: TestSheet, low_hz: float, high_hz: float) -> list[Mark]:
+    """A symbol and a line at each mode within the axis, a row for each plane, orders where there is
+    room."""
+    found: list[Mark] = []
     for plane in PLANES:
-        modes = [m for m in sheet.modes if m.plane == plane and low <= m.frequency_hz <= high]
-        if not modes:
-            continue
-        colour = style.PLANE_COLOURS[plane]
-        _markers(
-            axes,
-            [mode.frequency_hz for mode in modes],
-            _ROWS[plane],
-            marker=style.PLANE_MARKERS[plane],
-            colour=colour,
-            label=f"{plane} mode",
+        modes = sorted(
+            (m for m in sheet.modes if m.plane == plane and low_hz <= m.frequency_hz <= high_hz),
+            key=lambda mode: mode.frequency_hz,
         )
-        for mode in _last_of_each_crowd(modes, _ROOM * (high - low)):
-            _number(axes, mode, _ROWS[plane], colour)
-    _mark_set_aside(axes, sheet)
+        at = [mode.frequency_hz for mode in modes]
+        is_lonely = np.diff([*at, math.inf]) >= _ROOM * (high_hz - low_hz)
+        labels = [str(m.order) if alone else "" for m, alone in zip(modes, is_lonely, strict=True)]
+        texts = [f"{plane} {m.order}: {m.frequency_hz:.4g} Hz" for m in modes]
+        look = (PLANE_HUES[plane], PLANE_SYMBOLS[plane])
+        found += _row(at, _ROWS[plane], *look, f"{plane} mode", texts, labels)
+    apart = [s for s in sheet.identification.set_aside if low_hz <= s.frequency_hz <= high_hz]
+    at = [each.frequency_hz for each in apart]
+    texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
+    name = "set aside: not a mode of the hanger"
+    return found + _row(at, _SET_ASIDE_ROW, "red", "cross", name, texts, [], "dot")
 
 
-def _mark_set_aside(axes: Axes, sheet: TestSheet) -> None:
-    low, high = axes.get_xlim()
-    found = [
-        f.frequency_hz for f in sheet.identification.set_aside if low <= f.frequency_hz <= high
-    ]
-    if found:
-        label = "set aside: not a mode of the hanger"
-        _markers(axes, found, _SET_ASIDE_ROW, marker="X", colour=style.RED, label=label)
+def _row(
+    at: Sequence[float], height: float, colour: str, symbol: Symbol, name: str,
+    texts: Sequence[str], labels: Sequence[str], dash: Dash = "solid",
+) -> list[Mark]:  # fmt: skip
+    if not at:
+        return []
+    x = [place for each in at for place in (each, each, math.nan)]
+    stems = [0.0, height, math.nan] * len(at)
+    return [
+        Line(x=x, y=stems, in_shares=True, colour=colour, opacity=0.45, width=0.5, dash=dash),
+        Points(
+            x=at, y=[height] * len(at), in_shares=True, colour=colour, symbol=symbol, size=4.0,
+            name=name, texts=texts, labels=labels,
+        ),
+    ]  # fmt: skip
 
 
-def _markers(
-    axes: Axes, found: Sequence[float], height: float, *, marker: str, colour: str, label: str
-) -> None:
-    axes.plot(
-        found,
-        [height] * len(found),
-        transform=axes.get_xaxis_transform(),
-        linestyle="none",
-        marker=marker,
-        markersize=4.0,
-        color=colour,
-        label=label,
-    )
-    axes.vlines(
-        found,
-        0,
-        height,
-        transform=axes.get_xaxis_transform(),
-        color=colour,
-        linewidth=0.5,
-        alpha=0.45,
-        linestyle=":" if marker == "X" else "-",
-    )
+def with_headroom(low: float, high: float) -> tuple[float, float]:
+    """A range of which the upper part is left to the marks."""
+    return low, high + (high - low) * _HEADROOM / (1 - _HEADROOM)
 
 
-def _last_of_each_crowd(modes: Sequence[Mode], distance_hz: float) -> list[Mode]:
-    """The modes whose number, to the right of the marker, does not run into the next marker."""
-    rising = sorted(modes, key=lambda mode: mode.frequency_hz)
-    following = [*(mode.frequency_hz for mode in rising[1:]), math.inf]
-    pairs = zip(rising, following, strict=True)
-    return [mode for mode, after in pairs if after - mode.frequency_hz >= distance_hz]
-
-
-def _number(axes: Axes, mode: Mode, height: float, colour: str) -> None:
-    axes.annotate(
-        str(mode.order),
-        (mode.frequency_hz, height),
-        xycoords=axes.get_xaxis_transform(),
-        xytext=(3.2, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=style.TINY,
-        color=colour,
-    )
+def with_headroom_log(low: float, high: float) -> tuple[float, float]:
+    """The same of a logarithmic axis."""
+    lowest, highest = with_headroom(math.log10(low), math.log10(high))
+    return 10**lowest, 10**highest

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.sheet.content import TestSheet
+from shm.report.sheet.spectra import Shown
 from shm.report.verdicts import COLOURS, SYMBOLS, label, overall, quantity
 from shm.values import QualityCheck
 
@@ -23,8 +23,8 @@ _COLUMNS = (0.004, 0.125, 0.255, 0.38, 0.505)
 _HEADINGS = ("verdict", "check", "figure", "limit", "what was found, what to do")
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    checks = sheet.identification.quality
+def _draw(shown: Shown) -> Figure | None:
+    checks = shown.sheet.identification.quality
     if not checks:
         return None
     rows = [_cells(check) for check in checks]
@@ -67,13 +67,13 @@ def _row(axes: Axes, base: float, cells: tuple[list[str], ...], first_colour: st
             )  # fmt: skip
 
 
-def _caption(sheet: TestSheet) -> str:
+def _caption(shown: Shown) -> str:
     marks = ", ".join(f"{symbol} {verdict}" for verdict, symbol in SYMBOLS.items())
     return f"Everything that can be wrong with a test, as a figure beside its limit: {marks}."
 
 
-def _alt(sheet: TestSheet) -> str:
-    checks = sheet.identification.quality
+def _alt(shown: Shown) -> str:
+    checks = shown.sheet.identification.quality
     listed = ", ".join(f"{check.name}: {check.verdict}" for check in checks)
     return f"{len(checks)} quality checks, together {overall(checks)}. {listed}."
 

@@ -5,13 +5,21 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import words
 from shm.report.content import NORMAL_90
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Specification,
+)
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.shapes import (
     ROOM,
@@ -22,86 +30,76 @@ from shm.report.sheet.shapes import (
     panel_title,
     shown_modes,
 )
+from shm.report.sheet.spectra import Shown
 from shm.values import PLANES, Mode
 
-_MOST_COLUMNS = 7
-_LEAST_COLUMNS = 4
+_MOST_COLUMNS, _LEAST_COLUMNS = 7, 4
+_MOST_ON_SCREEN = 4
 _PANEL_INCHES = 1.12
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    modes = shown_modes(sheet)
-    if not modes:
+def _draw(shown: Shown) -> Specification | None:
+    sheet = shown.sheet
+    if not shown_modes(sheet):
         return None
-    groups = [[m for m in modes if m.plane == plane] for plane in PLANES]
-    columns = _columns(max(len(group) for group in groups))
-    rows = [group[i : i + columns] for group in groups for i in range(0, len(group), columns)]
-    height = _PANEL_INCHES * len(rows) + 0.85
-    figure = style.new_figure(height)
-    # Twenty-four panels by constrained layout take seconds; these are all of one size.
-    figure.set_layout_engine("none")
-    grid = figure.add_gridspec(
-        len(rows), columns, left=0.065, right=0.99, bottom=0.5 / height, top=1 - 0.45 / height,
-        hspace=0.5, wspace=0.14,
+    rows = [[_panel(sheet, mode) for mode in row] for row in rows_of(sheet, shown.is_on_screen)]
+    return Specification(
+        rows=rows, height_inches=_PANEL_INCHES * len(rows) + 0.85, is_grid=True,
+        x_label="position from the deck end (m)" if sheet.hanger else "position (m)",
     )  # fmt: skip
-    for number, row in enumerate(rows):
-        last = number == len(rows) - 1
-        for column, mode in enumerate(row):
-            axes = figure.add_subplot(grid[number, column])
-            _panel(axes, sheet, mode)
-            axes.tick_params(labelleft=column == 0, labelbottom=last or column >= len(rows[-1]))
-    label = "position from the deck end (m)" if sheet.hanger else "position (m)"
-    figure.supxlabel(label, fontsize=style.TINY + 1, color=style.INK, y=0.06 / height)
-    _legend(figure)
-    return figure
 
 
-def _columns(longest: int) -> int:
-    """So many that the rows of a plane are about equally full."""
-    return max(_LEAST_COLUMNS, math.ceil(longest / math.ceil(longest / _MOST_COLUMNS)))
+def rows_of(sheet: TestSheet, is_on_screen: bool) -> list[list[Mode]]:
+    """The modes row by row, the rows of a plane about equally full: a plane begins a new row."""
+    modes = shown_modes(sheet)
+    planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
+    longest = max(map(len, planes)) or 1
+    most = _MOST_ON_SCREEN if is_on_screen else _MOST_COLUMNS
+    columns = math.ceil(longest / math.ceil(longest / most))
+    columns = columns if is_on_screen else max(_LEAST_COLUMNS, columns)
+    return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
 
 
-def _panel(axes: Axes, sheet: TestSheet, mode: Mode) -> None:
-    style.dress(axes, "", "")
-    colour = style.PLANE_COLOURS[mode.plane]
-    x_m, value, cross, sd = np.array([(p.x_m, p.value, p.cross, p.sd) for p in mode.shape]).T
+def _panel(sheet: TestSheet, mode: Mode) -> Panel:
+    points = [p for p in mode.shape if math.isfinite(p.x_m)]
+    x_m = [p.x_m for p in points]
+    value, cross, sd = np.array([(p.value, p.cross, p.sd) for p in points]).reshape(-1, 3).T
+    half = NORMAL_90 * np.nan_to_num(sd)
     low, high = extent_m(sheet)
-    _draw_guide(axes, sheet, mode)
-    axes.errorbar(
-        x_m, value, yerr=NORMAL_90 * np.nan_to_num(sd), fmt=style.PLANE_MARKERS[mode.plane],
-        color=colour, markersize=3.6, elinewidth=1.0, capsize=1.8, label=mode.plane,
-    )  # fmt: skip
-    axes.plot(
-        x_m, cross, linestyle="none", marker="D", markersize=3.2, markerfacecolor="none",
-        markeredgewidth=0.8, color=style.INK, label="other plane",
-    )  # fmt: skip
-    axes.axhline(0, color=style.INK, linewidth=0.5)
     margin = 0.03 * (high - low)
-    axes.set_xlim(low - margin, high + margin)
-    axes.set_ylim(-ROOM, ROOM)
-    axes.set_xticks((low, (low + high) / 2, high))
-    axes.xaxis.set_major_formatter(lambda position, _: f"{position:.3g}")
-    axes.set_yticks((-1, 0, 1))
-    axes.tick_params(labelsize=style.TINY - 0.5, length=2, pad=1.5)
-    axes.set_title(panel_title(mode), fontsize=style.TINY, color=colour, pad=2)
-
-
-def _draw_guide(axes: Axes, sheet: TestSheet, mode: Mode) -> None:
+    ticks = (low, (low + high) / 2, high)
+    marks: list[Mark] = [Rule(at=0, width=0.5)]
     if found := guide(sheet, mode):
-        axes.plot(found.x_m, found.value, color=style.QUIET, linewidth=0.8, label=guide_name(sheet))
-
-
-def _legend(figure: Figure) -> None:
-    named = {}
-    for axes in figure.axes:
-        named.update({name: h for h, name in zip(*axes.get_legend_handles_labels(), strict=True)})
-    figure.legend(
-        list(named.values()), list(named), loc="upper left", ncols=4, fontsize=style.TINY + 0.5,
-        frameon=False, labelcolor=style.INK, borderaxespad=0.1,
+        marks.append(
+            Line(x=found.x_m, y=found.value, colour="quiet", width=0.8, name=guide_name(sheet))
+        )
+    marks.append(
+        Points(
+            x=x_m, y=value, low=value - half, high=value + half, size=3.8, name=mode.plane,
+            colour=PLANE_HUES[mode.plane], symbol=PLANE_SYMBOLS[mode.plane],
+            hover="%{x:.4g} m: %{y:.3g}",
+        )
+    )  # fmt: skip
+    if np.isfinite(cross).any():
+        marks.append(
+            Points(
+                x=x_m, y=cross, symbol="diamond", filled=False, size=3.4, name="other plane",
+                hover="%{x:.4g} m: %{y:.3g}",
+            )
+        )  # fmt: skip
+    return Panel(
+        y=Axis(range=(-ROOM, ROOM), ticks=(-1, 0, 1)),
+        x=Axis(
+            range=(low - margin, high + margin), ticks=ticks,
+            tick_labels=[f"{tick:.3g}" for tick in ticks],
+        ),
+        marks=marks, title=panel_title(mode), title_colour=PLANE_HUES[mode.plane],
+        title_side="left",
     )  # fmt: skip
 
 
-def _caption(sheet: TestSheet) -> str:
+def _caption(shown: Shown) -> str:
+    sheet = shown.sheet
     line = (
         "The thin line is no measurement: it is the shape of a taut string of that order, brought "
         "to the size of the measured points, and left out where it does not come near them."
@@ -116,11 +114,11 @@ def _caption(sheet: TestSheet) -> str:
     )
 
 
-def _alt(sheet: TestSheet) -> str:
-    shown = shown_modes(sheet)
-    places = len({point.x_m for mode in shown for point in mode.shape})
-    listed = ", ".join(f"{mode.plane} {mode.order}" for mode in shown)
-    return f"Shapes of {len(shown)} modes at {words.counted(places, 'place')}: {listed}."
+def _alt(shown: Shown) -> str:
+    modes = shown_modes(shown.sheet)
+    places = len({point.x_m for mode in modes for point in mode.shape})
+    listed = ", ".join(f"{mode.plane} {mode.order}" for mode in modes)
+    return f"Shapes of {len(modes)} modes at {words.counted(places, 'place')}: {listed}."
 
 
 FIGURE = Member("shapes", "Mode shapes", _draw, _caption, _alt)

@@ -3,81 +3,83 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures.marks import HEADROOM, mark_modes
-from shm.report.sheet.spectra import shown_range, spectrum
+from shm.report.figures.specification import (
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Specification,
+    Symbol,
+    stacked,
+)
+from shm.report.sheet.figures.marks import mode_marks, with_headroom
+from shm.report.sheet.spectra import Shown, Spectrum, shown_range
 from shm.report.sheet.thinning import envelope_places
+from shm.values import BoolArray
 
 _BINS = 550
+_LEAST_SPAN = 2.0
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    poles = sheet.identification.poles
+def _draw(shown: Shown) -> Specification | None:
+    poles = shown.sheet.identification.poles
     if not len(poles.order):
         return None
-    figure = style.new_figure(4.2)
-    axes = figure.subplots()
-    low, high = shown_range(sheet)
-    axes.set_xlim(low, high)
-    highest, lowest = float(poles.order.max()), float(poles.order.min())
-    span = max(highest - lowest, 2.0)
-    bottom = lowest - 0.03 * span
-    axes.set_ylim(bottom, highest + (highest - bottom) * HEADROOM / (1 - HEADROOM) + 0.02 * span)
-    style.dress(axes, "frequency (Hz)", "model order")
-    axes.set_yticks([tick for tick in axes.get_yticks() if bottom <= tick <= highest])
-    _background(axes, sheet)
-    _poles(axes, sheet)
-    mark_modes(axes, sheet)
-    style.legend_of_figure(figure, [axes], columns=3)
-    return figure
-
-
-def _poles(axes: Axes, sheet: TestSheet) -> None:
-    poles = sheet.identification.poles
-    dropped = ~poles.stable
-    axes.plot(
-        poles.frequency_hz[dropped], poles.order[dropped], linestyle="none", marker="x",
-        markersize=3.0, markeredgewidth=0.7, color=style.QUIET, label="dropped pole",
+    low, high = shown_range(shown.sheet)
+    lowest, highest = float(poles.order.min()), float(poles.order.max())
+    bottom = lowest - 0.03 * max(highest - lowest, _LEAST_SPAN)
+    step = next((each for each in (1, 2, 5, 10, 20, 50) if 6 * each >= highest), 100)
+    orders = Axis(
+        label="model order", range=with_headroom(bottom, 1.02 * highest),
+        ticks=np.arange(0, highest + 1, step).tolist(),
     )  # fmt: skip
-    axes.plot(
-        poles.frequency_hz[poles.stable], poles.order[poles.stable], linestyle="none",
-        marker="o", markersize=2.8, color=style.GREEN, label="stable pole",
+    marks = [
+        *(_background(shown.spectrum, low, high, bottom, highest) if shown.spectrum else []),
+        _poles(shown, ~poles.stable, "dropped pole", "thin cross", "quiet"),
+        _poles(shown, poles.stable, "stable pole", "circle", "green"),
+        *mode_marks(shown.sheet, low, high),
+    ]
+    across = Axis(label="frequency (Hz)", range=(low, high))
+    return stacked([Panel(y=orders, marks=marks, x=across)], 4.2, legend_columns=3)
+
+
+def _poles(shown: Shown, which: BoolArray, name: str, symbol: Symbol, colour: str) -> Points:
+    poles = shown.sheet.identification.poles
+    return Points(
+        x=poles.frequency_hz[which], y=poles.order[which], symbol=symbol, size=3.0, colour=colour,
+        name=name, texts=[f"{100 * ratio:.2g}" for ratio in poles.damping_ratio[which]],
+        hover="%{x:.3f} Hz, order %{y}, damping %{text} %",
     )  # fmt: skip
 
 
-def _background(axes: Axes, sheet: TestSheet) -> None:
-    """The spectrum over all points on a logarithmic axis of its own, without numbers."""
-    found = spectrum(sheet)
-    if found is None:
-        return
-    behind = axes.twinx()
-    behind.set_zorder(axes.get_zorder() - 1)
-    axes.patch.set_visible(False)
-    low, high = axes.get_xlim()
-    start, stop = np.searchsorted(found.frequency_hz, [low, high])
+def _background(
+    found: Spectrum, low_hz: float, high_hz: float, bottom: float, top: float
+) -> list[Mark]:
+    """The spectrum over all points, its logarithm between the lowest order and the highest."""
+    start, stop = np.searchsorted(found.frequency_hz, [low_hz, high_hz])
     lines = slice(max(1, int(start)), int(stop) + 1)
     values = found.together[lines]
-    places = envelope_places(values, _BINS)
-    label = "spectrum of all points (log scale)"
-    behind.semilogy(
-        found.frequency_hz[lines][places], values[places], color=style.QUIET, linewidth=0.8,
-        alpha=0.6,
-    )  # fmt: skip
-    axes.plot([], [], color=style.QUIET, linewidth=0.8, alpha=0.6, label=label)
-    behind.set_axis_off()
     known = values[np.isfinite(values) & (values > 0)]
-    if len(known):
-        bottom, top = float(np.quantile(known, 0.01)) / 2, float(known.max())
-        behind.set_ylim(bottom, top * (top / bottom) ** (HEADROOM / (1 - HEADROOM)))
+    if not len(known):
+        return []
+    places = envelope_places(values, _BINS)
+    least, most = np.log10([0.5 * np.quantile(known, 0.01), known.max()])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (np.log10(values[places]) - least) / (most - least)
+    name = "spectrum of all points (log scale)"
+    return [
+        Line(
+            x=found.frequency_hz[lines][places], y=bottom + (top - bottom) * share, width=0.8,
+            colour="quiet", opacity=0.6, name=name,
+        )
+    ]  # fmt: skip
 
 
-def _caption(sheet: TestSheet) -> str:
-    poles = sheet.identification.poles
+def _caption(shown: Shown) -> str:
+    poles = shown.sheet.identification.poles
     stable = int(np.sum(poles.stable))
     return (
         f"{len(poles.order)} poles over the order of the model that gave them, {stable} of them "
@@ -86,9 +88,9 @@ def _caption(sheet: TestSheet) -> str:
     )
 
 
-def _alt(sheet: TestSheet) -> str:
-    listed = ", ".join(f"{m.plane} {m.order} at {m.frequency_hz:.2f} Hz" for m in sheet.modes)
-    return f"Stabilisation diagram with {len(sheet.modes)} chosen modes: {listed}."
+def _alt(shown: Shown) -> str:
+    listed = ", ".join(f"{m.plane} {m.order} at {m.frequency_hz:.2f} Hz" for m in shown.sheet.modes)
+    return f"Stabilisation diagram with {len(shown.sheet.modes)} chosen modes: {listed}."
 
 
 FIGURE = Member("stabilisation", "Stabilisation diagram", _draw, _caption, _alt)

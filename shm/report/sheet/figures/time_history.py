@@ -1,20 +1,28 @@
-"""Force and accelerations over the whole test, every hit marked; below, one hit from near."""
+"""Force and accelerations over the whole test, every hit marked; on paper one hit from near."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
 
 from shm.identify import Hit
 from shm.report import words
-from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.figures.specification import (
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Specification,
+    plane_colour,
+)
 from shm.report.sheet.blows import Blow, blows
 from shm.report.sheet.channels import shown_rows, strongest_row
 from shm.report.sheet.content import TestSheet
+from shm.report.sheet.spectra import Shown
 from shm.report.sheet.thinning import envelope_places
 from shm.report.sheet.timeline import (
     borders_s,
@@ -25,7 +33,7 @@ from shm.report.sheet.timeline import (
     thinned,
     unknown_times_s,
 )
-from shm.values import FloatArray, Recording
+from shm.values import FloatArray
 
 _MOST_CHANNELS = 4
 _MOST_NUMBERS = 40
@@ -35,61 +43,73 @@ _LEAD = 0.012
 """Room before the first record, as a share of all: a hit may begin with it."""
 _NEAR_BINS = 300
 _MOST_DOTS = 150
+_MARKS_AT, _ROOM = 0.84, 0.35
+"""Where the marks of the hits stand in the uppermost panel, as a share of its height, and the room
+above the curve that is left to them, as a share of the curve's."""
 
 
-def _draw(sheet: TestSheet) -> Figure | None:
-    records = sheet.recordings
+def _draw(shown: Shown) -> Specification | None:
+    sheet, records = shown.sheet, shown.sheet.recordings
     if not records or not records[0].accelerations:
         return None
     rows: list[int | None] = list(shown_rows(sheet, _MOST_CHANNELS))
     if records[0].force is not None:
         rows = [None, *rows]
-    near = _typical(sheet)
-    heights = [1.25 if row is None else 0.95 for row in rows]
-    figure = style.new_figure(sum(heights) + 0.9 + (_ZOOM_INCHES if near else 0))
-    upper, lower = _halves(figure, sum(heights) + 0.7) if near else (figure, None)
-    panels = style.stacked(upper, heights)
-    for axes, row in zip(panels, rows, strict=True):
-        _history(axes, sheet, row)
-    _hits(panels, sheet)
-    style.legend_of_figure(upper, panels, columns=3)
-    style.dress(panels[-1], _time_label(records), panels[-1].get_ylabel())
-    if near and lower is not None:
-        _near(lower.subplots(1, 2), sheet, near)
-    return figure
-
-
-def _halves(figure: Figure, upper_inches: float) -> tuple[FigureBase, FigureBase]:
-    halves = figure.subfigures(2, 1, height_ratios=(upper_inches, _ZOOM_INCHES), squeeze=False)
-    for half in halves[:, 0]:
-        half.set_facecolor("none")
-    return halves[0, 0], halves[1, 0]
-
-
-def _time_label(records: tuple[Recording, ...]) -> str:
-    return "time (s)" if len(records) == 1 else "time, the records one after the other (s)"
-
-
-def _history(axes: Axes, sheet: TestSheet, row: int | None) -> None:
-    records = sheet.recordings
-    channel = channel_of(records[0], row)
-    assert channel is not None
-    style.dress(axes, "", "force (N)" if row is None else "m/s²")
-    time_s, values = thinned(records, row)
-    colour = style.INK if row is None else style.PURPLE
-    if channel.plane and row is not None:
-        colour = style.PLANE_COLOURS[channel.plane]
-    axes.plot(time_s, values, color=colour, linewidth=0.6)
+    panels = [_history(sheet, row, is_top=place == 0) for place, row in enumerate(rows)]
     end_s = offsets_s(records)[-1] + records[-1].duration_s
-    axes.set_xlim(-_LEAD * end_s, end_s)
-    _full_scale(axes, channel.full_scale, values)
-    _unknown(axes, unknown_times_s(records, row))
-    for border in borders_s(records):
-        axes.axvline(border, color=style.QUIET, linewidth=0.8, linestyle=":")
-    _entitle(axes, sheet, row)
+    several = "" if len(records) == 1 else ", the records one after the other"
+    across = Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
+    panels[-1] = replace(panels[-1], x=across)
+    typical = None if shown.is_on_screen else _typical(sheet)
+    near = [_near(sheet, typical)] if typical else []
+    height = sum(p.height for p in panels) + 0.9 + (_ZOOM_INCHES if near else 0)
+    return Specification(
+        rows=[*([panel] for panel in panels), *near], height_inches=height, legend_columns=3
+    )
 
 
-def _entitle(axes: Axes, sheet: TestSheet, row: int | None) -> None:
+def _history(sheet: TestSheet, row: int | None, is_top: bool) -> Panel:
+    records, channel = sheet.recordings, channel_of(sheet.recordings[0], row)
+    assert channel is not None
+    time_s, values = thinned(records, row)
+    colour = "ink" if row is None else plane_colour(channel.plane)
+    unit = "N" if row is None else "m/s²"
+    marks: list[Mark] = [
+        Line(x=time_s, y=values, colour=colour, width=0.6, hover=f"%{{x:.3f}} s: %{{y:.4g}} {unit}")
+    ]
+    # The largest value that can be recorded, where the signal comes near.
+    if np.nanmax(np.abs(values), initial=0.0) > 0.5 * channel.full_scale:
+        ends = (-channel.full_scale, channel.full_scale)
+        marks += [Rule(at=end, colour="red", width=0.8, dash="dash") for end in ends]
+    if len(unknown := unknown_times_s(records, row)):
+        marks.append(
+            Points(
+                x=unknown, y=np.full(len(unknown), 0.04), in_shares=True, symbol="tick", size=5,
+                colour="red", name="not a number", hover="%{x:.3f} s",
+            )
+        )  # fmt: skip
+    marks += [
+        Rule(at=at_s, axis="x", colour="quiet", width=0.8, dash="dot")
+        for at_s in borders_s(records)
+    ]
+    marks += _hit_marks(sheet) if is_top else _hit_lines(sheet)
+    title, title_colour = _title(sheet, row)
+    label = "force (N)" if row is None else "m/s²"
+    return Panel(
+        y=Axis(label=label, range=_range(values, row, _ROOM if is_top else 0.0)), marks=marks,
+        title=title, title_colour=title_colour, height=1.25 if row is None else 0.95,
+    )  # fmt: skip
+
+
+def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, float]:
+    """The values with a little room, and more above for marks."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+    low = float(np.nanmin(values)) if np.isfinite(values).any() else -1.0
+    low, high = min(low, 0.0) - 0.05 * largest, 1.05 * largest
+    return low, high + room * (high - low)
+
+
+def _title(sheet: TestSheet, row: int | None) -> tuple[str, str]:
     """Name, plane and place, and in red why the channel was left out."""
     channels = [channel_of(record, row) for record in sheet.recordings]
     first = channels[0]
@@ -99,74 +119,44 @@ def _entitle(axes: Axes, sheet: TestSheet, row: int | None) -> None:
     if len(there) > 1:
         title += ", place differs"
     fault = sheet.channel_faults.get(first.name)
-    if fault:
-        title += f", left out: {fault}"
-    colour = style.RED if fault else style.INK
-    axes.set_title(title, fontsize=style.TINY + 0.5, color=colour, loc="right", pad=2)
+    return (f"{title}, left out: {fault}", "red") if fault else (title, "ink")
 
 
-def _full_scale(axes: Axes, full_scale: float, values: FloatArray) -> None:
-    """Lines at the largest value that can be recorded, where the signal comes near."""
-    if np.nanmax(np.abs(values), initial=0.0) > 0.5 * full_scale:
-        for level in (-full_scale, full_scale):
-            axes.axhline(level, color=style.RED, linewidth=0.8, linestyle="--")
+def _hit_lines(sheet: TestSheet) -> list[Mark]:
+    return [
+        Rule(
+            at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
+            opacity=0.7, dash="solid" if hit.used else "dash",
+        )
+        for _, hit in located_hits(sheet)
+    ]  # fmt: skip
 
 
-def _unknown(axes: Axes, time_s: FloatArray) -> None:
-    if len(time_s):
-        axes.plot(
-            time_s, np.full(len(time_s), 0.04), transform=axes.get_xaxis_transform(),
-            linestyle="none", marker="|", markersize=5, color=style.RED, label="not a number",
+def _hit_marks(sheet: TestSheet) -> list[Mark]:
+    """A row of numbered symbols for the hits that were used, and for each reason to drop some."""
+    located = located_hits(sheet)
+    groups: dict[str, list[tuple[int, Hit]]] = {}
+    for number, hit in located:
+        groups.setdefault("" if hit.used else hit.reason, []).append((number, hit))
+    found: list[Mark] = []
+    for reason, hits in groups.items():
+        counted = words.counted(len(hits), "hit")
+        found.append(
+            Points(
+                x=[hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
+                in_shares=True, symbol="cross" if reason else "triangle down", size=5,
+                colour="red" if reason else "green",
+                name=f"{counted} dropped: {reason}" if reason else f"{counted} used",
+                labels=[str(number) for number, _ in hits] if len(located) <= _MOST_NUMBERS else (),
+                label_side="top", texts=[_told(number, hit) for number, hit in hits],
+            )
         )  # fmt: skip
+    return found
 
 
-def _hits(panels: Sequence[Axes], sheet: TestSheet) -> None:
-    """Every hit in every panel; numbers, symbols and reasons in the uppermost."""
-    top, hits = panels[0], located_hits(sheet)
-    low, high = top.get_ylim()
-    top.set_ylim(low, high + 0.35 * (high - low))
-    groups: dict[str, list[float]] = {}
-    for number, hit in hits:
-        time_s = hit_time_s(sheet, hit)
-        groups.setdefault("" if hit.used else hit.reason, []).append(time_s)
-        if len(hits) <= _MOST_NUMBERS:
-            _number(top, number, time_s, hit)
-        for axes in panels[1:]:
-            axes.axvline(
-                time_s, color=style.GREEN if hit.used else style.RED, linewidth=0.7, alpha=0.7,
-                linestyle="-" if hit.used else "--",
-            )  # fmt: skip
-    for reason, times_s in groups.items():
-        _hit_marks(top, reason, times_s)
-
-
-def _hit_marks(axes: Axes, reason: str, times_s: list[float]) -> None:
-    marker, colour = ("X", style.RED) if reason else ("v", style.GREEN)
-    hits = words.counted(len(times_s), "hit")
-    label = f"{hits} dropped: {reason}" if reason else f"{hits} used"
-    axes.plot(
-        times_s,
-        [0.84] * len(times_s),
-        transform=axes.get_xaxis_transform(),
-        linestyle="none",
-        marker=marker,
-        markersize=5,
-        color=colour,
-        label=label,
-    )
-
-
-def _number(axes: Axes, number: int, time_s: float, hit: Hit) -> None:
-    axes.text(
-        time_s,
-        0.99,
-        str(number),
-        transform=axes.get_xaxis_transform(),
-        ha="center",
-        va="top",
-        fontsize=style.TINY,
-        color=style.GREEN if hit.used else style.RED,
-    )
+def _told(number: int, hit: Hit) -> str:
+    what = "used" if hit.used else f"dropped: {hit.reason}"
+    return f"hit {number}, {hit.start_s:.3f} s, {words.plain(hit.peak_force_n, 4)} N, {what}"
 
 
 def _typical(sheet: TestSheet) -> Blow | None:
@@ -177,34 +167,39 @@ def _typical(sheet: TestSheet) -> Blow | None:
     return hits[len(hits) // 2] if hits else None
 
 
-def _near(panels: Sequence[Axes], sheet: TestSheet, near: Blow) -> None:
+def _near(sheet: TestSheet, near: Blow) -> list[Panel]:
     record, start = sheet.recordings[near.hit.record], near.hit.start
     force, motion = record.force, channel_of(record, strongest_row(sheet))
     assert force is not None
     assert motion is not None
     rate = record.sampling_rate_hz
-    label = f"time from the start of hit {near.number} (ms)"
-    _zoom(panels[0], force.values, rate, start, near.near_s)
-    style.dress(panels[0], label, "force (N)")
-    _zoom(panels[1], motion.values, rate, start, _MOTION_NEAR_S)
-    style.dress(panels[1], label, "m/s²")
+    across = Axis(label=f"time from the start of hit {near.number} (ms)")
     name = words.place(motion.name, motion.plane, motion.x_m)
-    panels[1].set_title(name, fontsize=style.TINY + 0.5, color=style.INK, loc="right", pad=2)
+    return [
+        Panel(
+            y=Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
+            x=across, height=_ZOOM_INCHES,
+        ),
+        Panel(
+            y=Axis(label="m/s²"), marks=_zoom(motion.values, rate, start, _MOTION_NEAR_S), x=across,
+            title=name,
+        ),
+    ]  # fmt: skip
 
 
 def _zoom(
-    axes: Axes, values: FloatArray, rate: float, start: int, span_s: tuple[float, float]
-) -> None:
+    values: FloatArray, rate: float, start: int, span_s: tuple[float, float]
+) -> list[Mark]:  # fmt: skip
     first = max(0, start + int(span_s[0] * rate))
     part = values[first : start + int(span_s[1] * rate) + 2]
     places = envelope_places(part, _NEAR_BINS)
     time_ms = 1e3 * (first + places - start) / rate
-    marker = "." if len(part) <= _MOST_DOTS else ""
-    axes.plot(time_ms, part[places], color=style.INK, linewidth=0.8, marker=marker, markersize=3.5)
-    axes.axvline(0, color=style.GREEN, linewidth=0.7)
+    curve = Line(x=time_ms, y=part[places], width=0.8, dots=len(part) <= _MOST_DOTS)
+    return [curve, Rule(at=0, axis="x", colour="green", width=0.7)]
 
 
-def _caption(sheet: TestSheet) -> str:
+def _caption(shown: Shown) -> str:
+    sheet = shown.sheet
     channels = len(sheet.recordings[0].accelerations)
     some = words.some(len(shown_rows(sheet, _MOST_CHANNELS)), channels, "accelerations")
     kind = "Force and accelerations" if sheet.recordings[0].force else "Accelerations"
@@ -220,7 +215,8 @@ def _caption(sheet: TestSheet) -> str:
     )
 
 
-def _alt(sheet: TestSheet) -> str:
+def _alt(shown: Shown) -> str:
+    sheet = shown.sheet
     seconds = sum(record.duration_s for record in sheet.recordings)
     used = words.counted(len(sheet.used_hits), "hit")
     dropped = [

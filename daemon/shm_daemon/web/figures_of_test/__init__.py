@@ -1,1 +1,0 @@
-"""The interactive figures of one hammer test, as documents for plotly."""

@@ -1,0 +1,84 @@
+"""The figures of the gap: those of its diagnosis, one by one."""
+
+from __future__ import annotations
+
+import math
+
+from shm.report import DiagnosisSheet, words
+from shm.report.diagnosis.content import claimed
+from shm.report.diagnosis.figures import before_and_after, causes, gap_map
+from shm.report.diagnosis.figures.modes import kept, measured
+from shm.report.diagnosis.phrases import title
+from shm.report.figures.specification import stacked
+from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm_daemon.web.hanger_view import HangerView
+
+
+def _sheet(view: HangerView) -> DiagnosisSheet:
+    assert view.sheet is not None
+    return view.sheet
+
+
+GAP_MAP = HangerFigure(
+    "gap_map",
+    gap_map.FIGURE.title,
+    "gap",
+    lambda view: view.sheet is not None and bool(measured(view.sheet)),
+    lambda view: gap_map.specify(_sheet(view), is_on_screen=True),
+    lambda view: gap_map.caption(_sheet(view), is_on_screen=True),
+    lambda view: gap_map.FIGURE.alt(_sheet(view)),
+    height_px=480,
+)
+
+
+def _alt_of_places(view: HangerView) -> str:
+    places = "; ".join(
+        f"as {title(place.kind)} it would sit at {words.number(place.x_m, '.2f')} m"
+        for place in gap_map.local(_sheet(view))
+    )
+    return f"Along the hanger: {places}."
+
+
+GAP_PLACES = HangerFigure(
+    "gap_places",
+    "Where along the hanger",
+    "gap",
+    lambda view: view.sheet is not None and bool(gap_map.local(view.sheet)),
+    lambda view: stacked([gap_map.profiles(_sheet(view))], 2.2),
+    lambda view: (
+        "Where along the hanger a local cause of each kind would have to sit, were it of that "
+        "kind, with the share of the misfit that it would explain there."
+    ),
+    _alt_of_places,
+    height_px=300,
+)
+
+
+CAUSES = HangerFigure(
+    "causes",
+    causes.FIGURE.title,
+    "gap",
+    lambda view: view.sheet is not None and bool(view.sheet.diagnosis.causes),
+    lambda view: causes.specify_on_screen(_sheet(view)),
+    lambda view: causes.caption(_sheet(view), is_on_screen=True),
+    lambda view: causes.FIGURE.alt(_sheet(view)),
+    height_px=430,
+)
+
+
+def _shrinks(view: HangerView) -> bool:
+    if view.sheet is None or claimed(view.sheet.diagnosis) is None:
+        return False
+    return any(math.isfinite(residual.after_percent) for residual in kept(view.sheet))
+
+
+BEFORE_AND_AFTER = HangerFigure(
+    "before_and_after",
+    "How far the gap shrinks",
+    "gap",
+    _shrinks,
+    lambda view: before_and_after.specify(_sheet(view), is_on_screen=True),
+    lambda view: before_and_after.FIGURE.caption(_sheet(view)),
+    lambda view: before_and_after.FIGURE.alt(_sheet(view)),
+    height_px=480,
+)

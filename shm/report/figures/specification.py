@@ -1,0 +1,208 @@
+"""What a figure shows, told once: paper draws it by `with_matplotlib`, a screen by plotly.
+
+Colours are names of `style.PALETTE`, sizes are points. Places may be numbers or times. A `hover` is
+a template as plotly takes it; paper leaves it out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from shm.values import Plane
+
+Values: TypeAlias = Any
+"""Shape (n,): an array, or a sequence of numbers, of times or of texts; NaN breaks a line."""
+Place: TypeAlias = float | datetime
+Dash = Literal["solid", "dash", "dot", "dashdot", "longdash"]
+Side = Literal["left", "right", "top"]
+Symbol = Literal[
+    "circle", "square", "diamond", "cross", "thin cross", "triangle", "triangle down", "tick"
+]
+PLANE_HUES: dict[Plane, str] = {"transverse": "blue", "longitudinal": "orange"}
+PLANE_SYMBOLS: dict[Plane, Symbol] = {"transverse": "circle", "longitudinal": "square"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mark:
+    """What all marks share.
+
+    `name` stands in the legend, once a figure. `texts` are what a hover tells of each place, or
+    what its template calls `%{text}`. `in_shares`: y is a share of the panel's height.
+    """
+
+    colour: str = "ink"
+    opacity: float = 1.0
+    name: str = ""
+    texts: Sequence[str] = ()
+    hover: str = ""
+    in_shares: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line(Mark):
+    x: Values
+    y: Values
+    width: float = 1.0
+    dash: Dash = "solid"
+    dots: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Points(Mark):
+    """Symbols, with bars from `low` to `high` where these are given, and `labels` beside them.
+
+    Unless `clipped`, those at the edge of the panel are whole.
+    """
+
+    x: Values
+    y: Values
+    low: Values | None = None
+    high: Values | None = None
+    symbol: Symbol = "circle"
+    filled: bool = True
+    size: float = 4.5
+    caps: bool = True
+    clipped: bool = True
+    labels: Sequence[str] = ()
+    label_side: Side = "right"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Band(Mark):
+    """What lies between two curves."""
+
+    x: Values
+    low: Values
+    high: Values
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bars(Mark):
+    """Upright bars from `base` to `base` + `y`; from the left to the right where `lying`.
+
+    `labels` stand at their ends.
+    """
+
+    x: Values
+    y: Values
+    base: Values = 0.0
+    width: float = 0.8
+    lying: bool = False
+    labels: Sequence[str] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rule(Mark):
+    """A straight line through the whole panel at one value of an axis, with words along it."""
+
+    at: Place
+    axis: Literal["x", "y"] = "y"
+    width: float = 1.0
+    dash: Dash = "solid"
+    label: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Span(Mark):
+    """All of a panel between two values of an axis.
+
+    With a label at its top, so many lines down, that begins on its `left` or ends on its `right`.
+    """
+
+    low: Place
+    high: Place
+    axis: Literal["x", "y"] = "x"
+    label: str = ""
+    label_side: Literal["left", "right"] = "left"
+    label_line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """`range` is from low to high, of a logarithmic axis too."""
+
+    label: str = ""
+    range: tuple[Place, Place] | None = None
+    scale: Literal["linear", "log", "date"] = "linear"
+    ticks: Sequence[float] | None = None
+    tick_labels: Sequence[str] | None = None
+    most_ticks: int | None = None
+    grid: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """Axes and what is on them, drawn in the order of `marks`.
+
+    Without `x` it shares the horizontal axis of the next panel below that has one; `shares_y`: it
+    has the vertical axis of the first panel of its row, or of the row above where it is the first.
+    `has_own_legend`: on paper, apart from the others'. `words` stand in the place of axes.
+    """
+
+    y: Axis
+    marks: Sequence[Mark]
+    x: Axis | None = None
+    title: str = ""
+    title_colour: str = "ink"
+    title_side: Literal["left", "right"] = "right"
+    height: float = 1.0
+    width: float = 1.0
+    shares_y: bool = False
+    has_own_legend: bool = False
+    words: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Specification:
+    """Panels row by row, with the height on paper.
+
+    `is_grid`: many small panels of one size, which share the outermost numbers and `x_label`, and
+    column by column the horizontal axis.
+    """
+
+    rows: Sequence[Sequence[Panel]]
+    height_inches: float
+    legend_columns: int = 4
+    is_grid: bool = False
+    x_label: str = ""
+
+    @property
+    def panels(self) -> list[Panel]:
+        """All of them, in reading order."""
+        return [panel for row in self.rows for panel in row]
+
+
+def stacked(
+    panels: Sequence[Panel], height_inches: float, legend_columns: int = 4
+) -> Specification:
+    """Panels one below the other."""
+    rows = tuple((panel,) for panel in panels)
+    return Specification(rows=rows, height_inches=height_inches, legend_columns=legend_columns)
+
+
+def limits(*values: Values, room: float = 0.08) -> tuple[float, float]:
+    """From the least known value to the largest, with a little room."""
+    known = np.concatenate([np.asarray(each, np.float64) for each in values])
+    low, high = float(np.nanmin(known)), float(np.nanmax(known))
+    margin = room * max(high - low, 1e-3 * abs(high))
+    return low - margin, high + margin
+
+
+def log_axis(label: str, low: float, high: float) -> Axis:
+    """A logarithmic axis of few decades, numbered in full at 1, 2 and 5 of each."""
+    decades = range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 1)
+    ticks = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    shown = [tick for tick in ticks if low <= tick <= high]
+    labels = [f"{tick:g}" for tick in shown]
+    return Axis(label=label, range=(low, high), scale="log", ticks=shown, tick_labels=labels)
+
+
+def plane_colour(plane: Plane | None) -> str:
+    """The name of a plane's colour; purple where the plane is not known."""
+    return PLANE_HUES[plane] if plane else "purple"
