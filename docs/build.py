@@ -1,5 +1,8 @@
 """Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
+The pages of commands and effects are built here and not kept in the repository: `shm VERB --help`
+and `shm gap effects` say the same.
+
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
 python docs/build.py            # the computed tables too (`make tables`): validation, gap, README
 
@@ -20,16 +23,19 @@ from pathlib import Path
 
 import rich_click as click
 
-from docs.effects_page import effects_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
+from docs.house import house
 from shm.models.registry import MODELS
 from shm.settings import TABLE, Setting
+from shm_cli.common import markdown
+from shm_cli.effects import effects_page
 from shm_cli.main import VERBS, cli
-from shm_cli.validate import compared, markdown
+from shm_cli.validate import compared
 from shm_cli.validation import frequencies, selection
 
 DOCS = Path(__file__).parent
+TRIALS = DOCS / "trials"
 
 
 def commands_page() -> str:
@@ -135,13 +141,14 @@ def main() -> None:
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
     fill_in(DOCS / "physics.md", "classes", classes_table())
     fill_in(DOCS / "api.md", "examples", examples())
+    fill_in(DOCS.parent / "CONTRIBUTING.md", "house", house())
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)
     computed = markdown(frequencies.HEADS, [frequencies.cells(row) for row in tables])
     preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
-    fill_in(DOCS / "validation.md", "frequencies", computed)
-    fill_in(DOCS / "validation.md", "selection", preferred)
+    fill_in(TRIALS / "validation.md", "frequencies", computed)
+    fill_in(TRIALS / "validation.md", "selection", preferred)
     fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])

@@ -1,4 +1,6 @@
-"""Makes the answers of docs/real_cases.md in two minutes: `python docs/real_cases_page.py [DATA]`.
+"""Makes the answers of docs/trials/real_cases.md in two minutes.
+
+python docs/real_cases_page.py [DATA]
 
 DATA is the folder of the real data (default: the environment's SHM_DATA, or ../shared/data beside
 the checkout). Without it nothing is made, and it says so.
@@ -42,7 +44,7 @@ from shm.values import (
 )
 
 DOCS = Path(__file__).parent
-HANGERS = DOCS / "real_cases"
+HANGERS = DOCS / "trials" / "real_cases"
 SEED = 1
 HAMMER_X_M = (0.1, 0.25, 0.375, 0.5, 0.65, 0.8, 0.925, 1.05, 1.2)
 GRAVITY_M_S2 = 9.81
@@ -286,9 +288,9 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
 def main(data: Path) -> None:
     """Fills in the answers."""
     if not data.is_dir():
-        print(f"docs/real_cases.md is left as it is: no real data in {data} (SHM_DATA).")
+        print(f"docs/trials/real_cases.md is left as it is: no real data in {data} (SHM_DATA).")
         return
-    page = DOCS / "real_cases.md"
+    page = DOCS / "trials" / "real_cases.md"
     fill_in(page, "free bar", told(*roving_beam(data)))
     fill_in(page, "string", told(*string(data)))
     fill_in(page, "string, all modes", told(*string(data, (1, 2, 3))))

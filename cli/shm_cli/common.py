@@ -193,6 +193,12 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
     return listed
 
 
+def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [heads, ("---",) * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
 def show_texts(texts: Texts) -> None:
     """Prints a table of a report, and its note."""
     made = table(texts.title, *texts.headings)

@@ -33,7 +33,7 @@ from tests.benchmarks.drift.solving import Task, solved
 from tests.benchmarks.drift.table import fragment, marks
 from tests.benchmarks.drift.years import SOUND_TESTS
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "trials"
 PAGE, FIGURES = DOCS / "drift_trial.md", DOCS / "figures"
 QUICK_HANGERS = 20
 

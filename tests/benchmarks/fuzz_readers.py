@@ -37,7 +37,7 @@ from tests.helpers.flows import a_flow
 from tests.helpers.mutations import Sample, damaged, harmful_samples, light, whole_samples
 from tests.helpers.workspaces import make_workspace
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "recordings.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
 BOMB_BYTES = 300_000_000
 SHARE = 500
 

@@ -64,7 +64,7 @@ ROD = Hanger(
     diameter_m=0.130,
 )
 PLAN = CampaignPlan(reality=Reality(own_laws=False))
-DOCS = Path(__file__).parents[2] / "docs" / "gap_trial.md"
+DOCS = Path(__file__).parents[2] / "docs" / "trials" / "gap_trial.md"
 
 
 def solved(case: Case) -> Outcome:

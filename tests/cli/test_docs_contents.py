@@ -14,8 +14,7 @@ from sphinx.errors import SphinxError
 
 from shm.modes_document import load_modes
 from shm.read import peek, sidecar_path
-
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+from tests.helpers.pages import DOCS, PAGES, name_of
 
 
 def blocks(page: str, kind: str) -> list[str]:
@@ -47,9 +46,9 @@ def test_the_modal_tests_of_the_page_on_own_data_are_read(tmp_path: Path) -> Non
     assert json.loads(document)["hanger"] == test.hanger
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_description_of_a_page_is_toml(page: Path) -> None:
-    for block in blocks(page.name, "toml"):
+    for block in blocks(f"{name_of(page)}.md", "toml"):
         if "# ..." not in block:
             assert tomllib.loads(block)
 
