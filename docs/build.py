@@ -14,11 +14,12 @@ minutes where they are.
 from __future__ import annotations
 
 import ast
+import csv
 import inspect
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import rich_click as click
@@ -134,6 +135,20 @@ def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
     )
 
 
+_LONG_LISTS = tuple(head for head in frequencies.HEADS if "(Hz)" in head)
+
+
+def _put_table(
+    name: str, heads: Sequence[str], rows: Sequence[Sequence[str]], long: Sequence[str]
+) -> None:
+    """The whole table as CSV beside the page; into the page all columns but the long ones."""
+    with (TRIALS / "validation" / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows((heads, *rows))
+    kept = [place for place, head in enumerate(heads) if head not in long]
+    short = [[row[place] for place in kept] for row in (heads, *rows)]
+    fill_in(TRIALS / "validation.md", name, markdown(short[0], short[1:]))
+
+
 def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
@@ -145,10 +160,8 @@ def main() -> None:
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)
-    computed = markdown(frequencies.HEADS, [frequencies.cells(row) for row in tables])
-    preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
-    fill_in(TRIALS / "validation.md", "frequencies", computed)
-    fill_in(TRIALS / "validation.md", "selection", preferred)
+    _put_table("frequencies", frequencies.HEADS, [*map(frequencies.cells, tables)], _LONG_LISTS)
+    _put_table("selection", selection.HEADS, [*map(selection.cells, chosen)], ("most probable",))
     fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])

@@ -30,7 +30,7 @@ from tests.benchmarks.drift.figures import save_figures
 from tests.benchmarks.drift.outcomes import Outcome, read, written
 from tests.benchmarks.drift.scenarios import SCENARIOS
 from tests.benchmarks.drift.solving import Task, solved
-from tests.benchmarks.drift.table import fragment, marks
+from tests.benchmarks.drift.table import fragment, marks, write_beside
 from tests.benchmarks.drift.years import SOUND_TESTS
 
 DOCS = Path(__file__).parents[2] / "docs" / "trials"
@@ -94,6 +94,7 @@ def main() -> int:
     print(text)
     if given.write_docs:
         fill_in(PAGE, "trial", text)
+        write_beside(outcomes, DOCS)
         save_figures(outcomes, limits, FIGURES)
     return int(not all(met for _, _, met in marks(outcomes, given.limit, limits)))
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +23,8 @@ from tests.benchmarks.drift.outcomes import BEYOND, OURS, RIVALS, VERDICTS, Outc
 from tests.benchmarks.drift.scenarios import HARD_QUIET, QUIET, SCENARIOS, Scenario
 
 RULES = (OURS, *RIVALS)
+BESIDE = f"drift_trial/delays_at_one_alarm_in_{ASKED_YEARS:g}_years.csv"
+"""The table of the second comparison, beside the page."""
 
 
 def fragment(
@@ -35,13 +39,20 @@ def fragment(
         table(FALSE_HEAD, false_rows(outcomes, same, probability)),
         "Delay in tests, median and 90 % quantile, at the limits above:",
         table(("scenario", *RULES), delay_rows(outcomes, same)),
-        f"The same with every rule, ours too, at one false alarm in {ASKED_YEARS:g} hanger-years "
-        f"({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}):",
-        table(("scenario", *RULES), delay_rows(outcomes, asked)),
+        f"[The same with every rule]({BESIDE}), ours too, at one false alarm in {ASKED_YEARS:g} "
+        f"hanger-years ({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}).",
         "What our first alarm after the change named:",
         table(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
     ]
     return "\n\n".join(parts)
+
+
+def write_beside(outcomes: Sequence[Outcome], folder: Path) -> None:
+    """The delays at the rate of false alarms that is asked, as CSV."""
+    asked = limits_for(outcomes, 1 / ASKED_YEARS)
+    with (folder / BESIDE).open("w", newline="", encoding="utf-8") as file:
+        rows = delay_rows(outcomes, asked)
+        csv.writer(file, lineterminator="\n").writerows((("scenario", *RULES), *rows))
 
 
 def said(outcomes: Sequence[Outcome], years: float) -> str:
