@@ -141,12 +141,14 @@ _LONG_LISTS = tuple(head for head in frequencies.HEADS if "(Hz)" in head)
 def _put_table(
     name: str, heads: Sequence[str], rows: Sequence[Sequence[str]], long: Sequence[str]
 ) -> None:
-    """The whole table as CSV beside the page; into the page all columns but the long ones."""
+    """The whole table as CSV beside the page, which has no long columns and no N_D of 1."""
     with (TRIALS / "validation" / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows((heads, *rows))
     kept = [place for place, head in enumerate(heads) if head not in long]
     short = [[row[place] for place in kept] for row in (heads, *rows)]
-    fill_in(TRIALS / "validation.md", name, markdown(short[0], short[1:]))
+    fill_in(
+        TRIALS / "validation.md", name, markdown(short[0], [r for r in short[1:] if r[1] != "1"])
+    )
 
 
 def main() -> None:

@@ -16,17 +16,18 @@ _FOLDERS = {"shm": "shm", "shm_daemon": "daemon/shm_daemon", "shm_cli": "cli/shm
 
 
 def house() -> str:
-    """The floors as a table, the highest first, and below it the contracts beside them."""
+    """The floors, the highest first, and below them the contracts beside that of the floors."""
     contracts = _contracts()
     (layers,) = [each["layers"] for each in contracts if each["type"] == "layers"]
-    lines = ["| floor | room | what lives there |", "| --- | --- | --- |"]
-    for number, layer in zip(range(len(layers), 0, -1), layers, strict=True):
-        for place, room in enumerate(layer.split(" | ")):
-            path = _path(room)
-            floor = "" if place else str(number)
-            lines.append(f"| {floor} | [`{room}`]({_shown(path)}) | {_first_sentence(path)} |")
+    floors = [layer.split(" | ") for layer in layers]
+    width = max(len(room) for floor in floors for room in floor)
+    lines = []
+    for number, floor in zip(range(len(floors), 0, -1), floors, strict=True):
+        for place, room in enumerate(floor):
+            height = "" if place else str(number)
+            lines.append(f"{height:>2}  {room:{width}}  {_first_sentence(_path(room))}")
     others = [f"- {each['name']}." for each in contracts if each["type"] != "layers"]
-    return "\n".join([*lines, "", *others])
+    return "\n".join(["```text", *lines, "```", "", *others])
 
 
 def _contracts() -> list[dict[str, str]]:
@@ -54,4 +55,4 @@ def _first_sentence(path: Path) -> str:
     said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
     if not said:
         raise ValueError(f"{_shown(path)} has no docstring: say what lives there")
-    return said.split("\n\n")[0].replace("\n", " ").replace("|", "/")
+    return said.split("\n\n")[0].replace("\n", " ")

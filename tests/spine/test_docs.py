@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import re
 from pathlib import Path
@@ -67,7 +68,7 @@ def test_a_generated_part_of_a_page_is_what_the_code_makes(
 def test_every_room_of_shm_has_its_place_in_the_picture_of_the_house(build: ModuleType) -> None:
     packages = {path.parent.name for path in (ROOT / "shm").glob("*/__init__.py")}
     modules = {path.stem for path in (ROOT / "shm").glob("*.py")} - {"__init__"}
-    drawn = set(re.findall(r"\[`shm\.(\w+)`\]", build.house()))
+    drawn = set(re.findall(r"^.. +shm\.(\w+) ", build.house(), re.M))
     assert drawn == packages | modules
 
 
@@ -82,7 +83,7 @@ def test_links_lead_to_files_of_the_repository(page: Path) -> None:
     ("page", "name", "word", "times"),
     [
         ("README.md", "selection", "solid2", 1),
-        ("docs/trials/validation.md", "selection", "| solid2", 4),
+        ("docs/trials/validation.md", "selection", "| solid2", 2),
         ("docs/trials/validation.md", "frequencies", "| A.5", 7),
     ],
 )
@@ -90,3 +91,14 @@ def test_the_validation_tables_stand_in_their_pages(page, name, word, times) -> 
     text = (ROOT / page).read_text()
     table = text.split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
     assert table.count(word) == times
+
+
+@pytest.mark.parametrize("name", ["frequencies", "selection"])
+def test_the_page_of_validation_shows_a_part_of_the_whole_table(name: str) -> None:
+    trials = DOCS / "trials"
+    with (trials / "validation" / f"{name}.csv").open(newline="") as file:
+        whole = [set(row) for row in csv.reader(file)]
+    page = (trials / "validation.md").read_text()
+    shown = page.split(f"<!-- {name} -->\n")[1].split(f"\n<!-- /{name} -->")[0].splitlines()
+    for line in (shown[0], *shown[2:]):
+        assert any(set(line.strip("| ").split(" | ")) <= row for row in whole), line
