@@ -7,8 +7,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-BUILT = {DOCS / "commands.md", DOCS / "effects.md"}
-"""Long reference that `shm VERB --help` and `shm gap effects` give too: built, not kept."""
+BUILT = {DOCS / "commands.md", DOCS / "effects.md", DOCS / "settings.md"}
+"""Long reference that `shm VERB --help`, `settings` and `gap effects` give too: built, not kept."""
 PAGES = sorted({*DOCS.glob("*.md"), *(DOCS / "trials").glob("*.md")} - BUILT)
 """The manual's pages that the repository holds."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib.util
+import json
 import re
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +12,8 @@ from types import ModuleType
 import click
 import pytest
 
+from shm.settings import TABLE
+from shm_cli.main import run
 from tests.helpers.command_lines import commands
 from tests.helpers.pages import BUILT, DOCS, PAGES, ROOT, links, name_of
 
@@ -27,8 +30,18 @@ def build() -> ModuleType:
     return module
 
 
-def test_the_page_of_settings_is_what_the_code_makes(build: ModuleType) -> None:
-    assert (DOCS / "settings.md").read_text() == build.settings_page(), "Run `make docs`."
+def test_the_page_and_the_command_of_settings_name_every_one(
+    build: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = build.settings_page()
+    assert all(f"| `{row.name}` | {row.default} |" in page for row in TABLE)
+    assert run(["settings"]) == 0
+    printed = capsys.readouterr().out
+    assert all(row.name in printed for row in TABLE)
+    assert run(["settings", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["settings"]
+    assert [each["setting"] for each in listed] == [row.name for row in TABLE]
+    assert listed[0]["environment"] == "SHM_STORE"
 
 
 def test_the_page_of_commands_has_every_verb_and_its_options(build: ModuleType) -> None:
