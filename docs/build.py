@@ -14,16 +14,16 @@ minutes where they are.
 from __future__ import annotations
 
 import ast
-import csv
 import inspect
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import rich_click as click
 
+from docs import validation_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
@@ -36,7 +36,6 @@ from shm_cli.validate import compared
 from shm_cli.validation import frequencies, selection
 
 DOCS = Path(__file__).parent
-TRIALS = DOCS / "trials"
 
 
 def commands_page() -> str:
@@ -111,22 +110,6 @@ def _ranges(bounds: Mapping[str, tuple[float, float]]) -> str:
     )
 
 
-_LONG_LISTS = tuple(head for head in frequencies.HEADS if "(Hz)" in head)
-
-
-def _put_table(
-    name: str, heads: Sequence[str], rows: Sequence[Sequence[str]], long: Sequence[str]
-) -> None:
-    """The whole table as CSV beside the page, which has no long columns and no N_D of 1."""
-    with (TRIALS / "validation" / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows((heads, *rows))
-    kept = [place for place, head in enumerate(heads) if head not in long]
-    short = [[row[place] for place in kept] for row in (heads, *rows)]
-    fill_in(
-        TRIALS / "validation.md", name, markdown(short[0], [r for r in short[1:] if r[1] != "1"])
-    )
-
-
 def main() -> None:
     """Writes the pages."""
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
@@ -138,8 +121,7 @@ def main() -> None:
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)
-    _put_table("frequencies", frequencies.HEADS, [*map(frequencies.cells, tables)], _LONG_LISTS)
-    _put_table("selection", selection.HEADS, [*map(selection.cells, chosen)], ("most probable",))
+    validation_page.write([*map(frequencies.cells, tables)], [*map(selection.cells, chosen)])
     fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])

@@ -13,6 +13,7 @@ missed: at most one false alarm in 50 hanger-years, and no rival sooner, in the 
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import sys
 import time
@@ -30,7 +31,7 @@ from tests.benchmarks.drift.figures import save_figures
 from tests.benchmarks.drift.outcomes import Outcome, read, written
 from tests.benchmarks.drift.scenarios import SCENARIOS
 from tests.benchmarks.drift.solving import Task, solved
-from tests.benchmarks.drift.table import fragment, marks, write_beside
+from tests.benchmarks.drift.table import fragment, marks, tables_beside
 from tests.benchmarks.drift.years import SOUND_TESTS
 
 DOCS = Path(__file__).parents[2] / "docs" / "trials"
@@ -89,12 +90,16 @@ def main() -> int:
     given = arguments()
     outcomes = all_outcomes(given)
     limits = limits_at(outcomes, given.limit)
-    probability = Thresholds().alert_probability
-    text = fragment(outcomes, given.limit, probability, given.years)
+    text = fragment(outcomes, given.limit, given.years)
+    beside = tables_beside(outcomes, given.limit, Thresholds().alert_probability)
     print(text)
+    for name, rows in beside.items():
+        print("", name, *map(" | ".join, rows), sep="\n")
     if given.write_docs:
         fill_in(PAGE, "trial", text)
-        write_beside(outcomes, DOCS)
+        for name, rows in beside.items():
+            with (DOCS / name).open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file, lineterminator="\n").writerows(rows)
         save_figures(outcomes, limits, FIGURES)
     return int(not all(met for _, _, met in marks(outcomes, given.limit, limits)))
 

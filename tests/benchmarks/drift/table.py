@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -23,23 +21,20 @@ from tests.benchmarks.drift.outcomes import BEYOND, OURS, RIVALS, VERDICTS, Outc
 from tests.benchmarks.drift.scenarios import HARD_QUIET, QUIET, SCENARIOS, Scenario
 
 RULES = (OURS, *RIVALS)
-BESIDE = f"drift_trial/delays_at_one_alarm_in_{ASKED_YEARS:g}_years.csv"
-"""The table of the second comparison, beside the page."""
+FALSE_ALARMS, DELAYS = "drift_trial/false_alarms.csv", "drift_trial/delays.csv"
+DELAYS_AS_ASKED = f"drift_trial/delays_at_one_alarm_in_{ASKED_YEARS:g}_years.csv"
+"""Tables of all rules, beside the page."""
 
 
-def fragment(
-    outcomes: Sequence[Outcome], limit_years: float, probability: float, years: float
-) -> str:
-    """All tables for people; `probability` is the level of the rule on thresholds."""
+def fragment(outcomes: Sequence[Outcome], limit_years: float, years: float) -> str:
+    """The marks and verdicts for people; `tables_beside` has the other rules in full."""
     same, asked = limits_at(outcomes, limit_years), limits_for(outcomes, 1 / ASKED_YEARS)
     parts = [
         said(outcomes, years),
         table(("mark", "found", "met"), mark_rows(outcomes, limit_years, same)),
-        "False alarms, and limits that give every rule our rate in the years without change:",
-        table(FALSE_HEAD, false_rows(outcomes, same, probability)),
-        "Delay in tests, median and 90 % quantile, at the limits above:",
-        table(("scenario", *RULES), delay_rows(outcomes, same)),
-        f"[The same with every rule]({BESIDE}), ours too, at one false alarm in {ASKED_YEARS:g} "
+        f"Every rule: [false alarms, and limits that give it our rate]({FALSE_ALARMS}); "
+        f"[delays in tests at these limits]({DELAYS}), median and 90 % quantile; "
+        f"[the same delays]({DELAYS_AS_ASKED}), ours too, at one false alarm in {ASKED_YEARS:g} "
         f"hanger-years ({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}).",
         "What our first alarm after the change named:",
         table(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
@@ -47,12 +42,17 @@ def fragment(
     return "\n\n".join(parts)
 
 
-def write_beside(outcomes: Sequence[Outcome], folder: Path) -> None:
-    """The delays at the rate of false alarms that is asked, as CSV."""
-    asked = limits_for(outcomes, 1 / ASKED_YEARS)
-    with (folder / BESIDE).open("w", newline="", encoding="utf-8") as file:
-        rows = delay_rows(outcomes, asked)
-        csv.writer(file, lineterminator="\n").writerows((("scenario", *RULES), *rows))
+def tables_beside(
+    outcomes: Sequence[Outcome], limit_years: float, probability: float
+) -> dict[str, list[Sequence[str]]]:
+    """All rules by file name; `probability` is the level of the rule on thresholds."""
+    same, asked = limits_at(outcomes, limit_years), limits_for(outcomes, 1 / ASKED_YEARS)
+    head = ("scenario", *RULES)
+    return {
+        FALSE_ALARMS: [FALSE_HEAD, *false_rows(outcomes, same, probability)],
+        DELAYS: [head, *delay_rows(outcomes, same)],
+        DELAYS_AS_ASKED: [head, *delay_rows(outcomes, asked)],
+    }
 
 
 def said(outcomes: Sequence[Outcome], years: float) -> str:
