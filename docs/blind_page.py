@@ -8,12 +8,11 @@ in the repository, is written to docs/trials/blind_trial.html; `make docs` takes
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm.blind.scoring import opened
 from shm.report import Illustration, Table, trial_figures, trial_page
 from shm.report.trial.summary import misses, summary
@@ -27,19 +26,12 @@ _HTML, _IN_WORDS = "blind_trial.html", "figures_in_words.txt"
 _DOTS_PER_INCH = 110
 
 
-def _sentence(title: str) -> str:
-    return title if title.endswith("?") else f"{title}."
-
-
 def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
     """What came out, for people: words, what is missed, figures; the tables are linked to."""
     parts = [summary(score), f"Seed {score.seed}; SHA-256 of the key `{score.key_sha256}`."]
     if lost := misses(score):
         parts.append("\n".join(["Missed:\n", *(f"- {each}" for each in lost)]))
-    parts += [
-        f"![{item.title}](figures/{item.name}.png)\n\n*{_sentence(item.title)}* {item.caption}"
-        for item in drawn
-    ]
+    parts += [f"![{item.title}](figures/{item.name}.png)\n\n{item.caption}" for item in drawn]
     listed = [f"- [{each.title}](blind_trial/{file_name(each)})" for each in tables(score)]
     listed.append(f"- [The figures in words](blind_trial/{_IN_WORDS})")
     return "\n\n".join([*parts, "\n".join(["All numbers, as tables:\n", *listed])])
@@ -55,11 +47,8 @@ def file_name(table: Table) -> str:
 
 
 def _write_csv(table: Table, folder: Path) -> None:
-    with (folder / file_name(table)).open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerows((table.headings, *table.rows))
-        if table.note:
-            rows.writerow((table.note,))
+    note = [(table.note,)] if table.note else []
+    write_csv(folder / file_name(table), [table.headings, *table.rows, *note])
 
 
 def write(

@@ -22,7 +22,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
@@ -42,6 +42,7 @@ from shm.values import (
     Scatter,
     Supports,
 )
+from shm_cli.common import markdown
 
 DOCS = Path(__file__).parent
 HANGERS = DOCS / "trials" / "real_cases"
@@ -51,6 +52,7 @@ GRAVITY_M_S2 = 9.81
 END = "rotational_end_flexibility"
 _FORCE_SD_N, _FREQUENCY_SD_HZ = 1.0, 0.5
 _WORTH_A_ROW = 0.01
+_LENGTHS = "arrangements_of_ca.csv"
 _CAUSE_HEAD = ("cause", "probability", "log Bayes factor", "size (90 % interval)")
 _FAMILY_HEAD = (
     "clamp", "direction", "arrangements", "lengths (m)", "measured over pendulum", "no gap",
@@ -169,7 +171,7 @@ Diagnosed: TypeAlias = tuple[Arrangement, Diagnosis]
 
 
 def pipe_hanger_tables(data: Path) -> str:
-    """One row for each clamp and direction, then one for each of CA, in markdown."""
+    """One row for each clamp and direction in markdown; each of CA goes into a file beside."""
     found = [
         (each, diagnose(each.tests, each.hanger, GapOptions(seed=SEED)))
         for each in arrangements(data)
@@ -179,20 +181,15 @@ def pipe_hanger_tables(data: Path) -> str:
         key = (each.name.split("_")[0], each.direction)
         families.setdefault(key, []).append((each, diagnosis))
     shortest_first = sorted(families["CA", "radial"], key=lambda pair: pair[0].hanger.length_m)
+    write_csv(HANGERS / _LENGTHS, [_LENGTH_HEAD, *(_length_row(*pair) for pair in shortest_first)])
     hinges = [hinge for _, diagnosis in shortest_first if (hinge := _hinge(diagnosis))]
     return "\n\n".join(
         (
-            _table(_FAMILY_HEAD, [_family_row(key, pairs) for key, pairs in families.items()]),
-            "The arrangements of CA, the shortest rods first:",
-            _table(_LENGTH_HEAD, [_length_row(*pair) for pair in shortest_first]),
+            markdown(_FAMILY_HEAD, [_family_row(key, pairs) for key, pairs in families.items()]),
+            f"[The arrangements of CA](real_cases/{_LENGTHS}), the shortest rods first.",
             _one_hinge(hinges),
         )
     )
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _family_row(key: tuple[str, str], pairs: Sequence[Diagnosed]) -> tuple[str, ...]:
@@ -274,7 +271,7 @@ def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
     ]
     (HANGERS / file).write_text(f"{text.rstrip()}\n", encoding="utf-8")
     said = f"[What `shm gap diagnose` says](real_cases/{file}), and the causes above 0.01:"
-    return f"{said}\n\n{_table(_CAUSE_HEAD, rows)}"
+    return f"{said}\n\n{markdown(_CAUSE_HEAD, rows)}"
 
 
 def _cause_row(cause: Cause) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm_cli.common import markdown
 from shm_cli.validation import frequencies, selection
 
@@ -19,8 +19,7 @@ def write(tables: Sequence[Cells], chosen: Sequence[Cells], page: Path = PAGE) -
     """Both tables, the thesis's frequencies and the choice among the classes, into CSV and page."""
     whole = {"frequencies": (frequencies.HEADS, *tables), "selection": (selection.HEADS, *chosen)}
     for name, rows in whole.items():
-        with _csv_of(name, page).open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows(rows)
+        write_csv(_csv_of(name, page), rows)
     fill_in(page, "frequencies", largest_differences(tables))
     fill_in(page, "selection", counted_ten_times(chosen))
 

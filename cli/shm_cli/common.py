@@ -195,8 +195,8 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A Markdown table."""
-    lines = [heads, ("---",) * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    head, *others = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
+    return "\n".join([head, "|" + "---|" * len(heads), *others])
 
 
 def show_texts(texts: Texts) -> None:

@@ -13,7 +13,6 @@ missed: at most one false alarm in 50 hanger-years, and no rival sooner, in the 
 from __future__ import annotations
 
 import argparse
-import csv
 import os
 import sys
 import time
@@ -23,7 +22,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm.values import Thresholds
 from shm.watch.options import WatchOptions
 from tests.benchmarks.drift.comparing import limits_at
@@ -98,8 +97,7 @@ def main() -> int:
     if given.write_docs:
         fill_in(PAGE, "trial", text)
         for name, rows in beside.items():
-            with (DOCS / name).open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file, lineterminator="\n").writerows(rows)
+            write_csv(DOCS / name, rows)
         save_figures(outcomes, limits, FIGURES)
     return int(not all(met for _, _, met in marks(outcomes, given.limit, limits)))
 

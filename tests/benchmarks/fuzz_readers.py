@@ -193,9 +193,9 @@ def through_a_flow(files: int, seed: int) -> Counter[str]:
 
 
 def table_of(tally: Tally, flow: Counter[str]) -> str:
-    lines = ["| what came of them | files |", "| --- | --- |"]
+    lines = ["| what came of them | files |", "|---|---|"]
     lines += [f"| {outcome} | {count} |" for outcome, count in tally.outcomes.most_common()]
-    lines += ["", "| measured | |", "| --- | --- |"]
+    lines += ["", "| measured | |", "|---|---|"]
     lines += [
         f"| files, of {len(tally.formats)} endings | {tally.outcomes.total()} |",
         f"| faults of the process that asks | {len(tally.faults)} |",

@@ -15,7 +15,6 @@ of the campaigns without one; with `--leave-out`, something unknown leading in 0
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import sys
@@ -30,6 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from docs.filling import write_csv
 from shm.gap.attribution import Attribution, Explanation, attributed
 from shm.gap.observations import observed
 from shm.gap.options import GapOptions
@@ -224,8 +224,7 @@ def main() -> int:
     print(told, *map(" | ".join, table), sep="\n")
     if given.write_docs:
         put(TRIALS / "gap_trial.md", "trial", f"{told}\n\n[Every effect at both sizes]({BESIDE}).")
-        with (TRIALS / BESIDE).open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows(table)
+        write_csv(TRIALS / BESIDE, table)
     return int(not all(met for _, _, met in marks(outcomes)))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from shm_cli.common import markdown
 from tests.benchmarks.drift.comparing import (
     ASKED_YEARS,
     FalseAlarms,
@@ -31,13 +32,13 @@ def fragment(outcomes: Sequence[Outcome], limit_years: float, years: float) -> s
     same, asked = limits_at(outcomes, limit_years), limits_for(outcomes, 1 / ASKED_YEARS)
     parts = [
         said(outcomes, years),
-        table(("mark", "found", "met"), mark_rows(outcomes, limit_years, same)),
+        markdown(("mark", "found", "met"), mark_rows(outcomes, limit_years, same)),
         f"Every rule: [false alarms, and limits that give it our rate]({FALSE_ALARMS}); "
         f"[delays in tests at these limits]({DELAYS}), median and 90 % quantile; "
         f"[the same delays]({DELAYS_AS_ASKED}), ours too, at one false alarm in {ASKED_YEARS:g} "
         f"hanger-years ({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}).",
         "What our first alarm after the change named:",
-        table(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
+        markdown(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
     ]
     return "\n\n".join(parts)
 
@@ -64,11 +65,6 @@ def said(outcomes: Sequence[Outcome], years: float) -> str:
         f"{tests:.0f} tests in the mean; the sequential test costs "
         f"{1e3 * np.median(own):.1f} ms a test in the median."
     )
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 Mark = tuple[str, str, bool]

@@ -138,7 +138,7 @@ def seeds_said(outcomes: Sequence[Outcome]) -> str:
 def marks_table(outcomes: Sequence[Outcome]) -> str:
     """The marks for people."""
     lines = [f"{len(outcomes)} campaigns, seeds {seeds_said(outcomes)}.", ""]
-    lines += ["| mark | found | met |", "| --- | --- | --- |"]
+    lines += ["| mark | found | met |", "|---|---|---|"]
     lines += [
         f"| {mark} | {found} | {'yes' if met else 'no'} |" for mark, found, met in marks(outcomes)
     ]
