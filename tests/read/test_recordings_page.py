@@ -7,16 +7,12 @@ import re
 import tomllib
 from pathlib import Path
 
-import numpy as np
-import pytest
-
 from shm.modes_document import load_modes
 from shm.read import FORMATS, peek, read, sidecar_path
 from shm.read.limits import Limits
 from shm.read.packed import MOST_MEMBERS
 from shm.read.units import unit_of
 from shm.values import FrequencyResponse, Recording
-from shm_cli.main import run
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
 
@@ -24,26 +20,6 @@ PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding
 def blocks(kind: str) -> list[str]:
     found = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     return [text for of, text in found if of == kind]
-
-
-def test_the_python_examples_write_files_that_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in blocks("python"):
-        exec(block, names)
-    files = sorted(tmp_path.iterdir())
-    assert [path.suffix for path in files] == [".h5", ".mat", ".npz", ".tdms"]
-    for path in files:
-        assert peek(path).problems == ()
-        found = read(path)
-        assert isinstance(found, Recording)
-        assert found.force is not None
-        np.testing.assert_allclose(
-            found.accelerations[0].values, 9.80665 * np.asarray(names["acceleration"])
-        )
-    assert run(["ingest", "--peek", *map(str, files)]) == 0
 
 
 def test_the_texts_are_read(tmp_path: Path) -> None:
