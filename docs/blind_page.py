@@ -31,9 +31,9 @@ def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
     parts = [summary(score), f"Seed {score.seed}; SHA-256 of the key `{score.key_sha256}`."]
     if lost := misses(score):
         parts.append("\n".join(["Missed:\n", *(f"- {each}" for each in lost)]))
-    parts += [f"![{item.title}](figures/{item.name}.png)\n\n{item.caption}" for item in drawn]
+    parts += [f"![{item.title}](figures/{item.name}.png)\n\n*{item.title}*" for item in drawn]
     listed = [f"- [{each.title}](blind_trial/{file_name(each)})" for each in tables(score)]
-    listed.append(f"- [The figures in words](blind_trial/{_IN_WORDS})")
+    listed.append(f"- [The figures explained, and in words](blind_trial/{_IN_WORDS})")
     return "\n\n".join([*parts, "\n".join(["All numbers, as tables:\n", *listed])])
 
 
@@ -60,7 +60,7 @@ def write(
     for table in tables(score):
         _write_csv(table, folder)
     drawn = trial_figures(score)
-    in_words = "\n\n".join(item.alt for item in drawn)
+    in_words = "\n\n".join(f"{item.title}\n{item.caption}\n{item.alt}" for item in drawn)
     (folder / _IN_WORDS).write_text(f"{in_words}\n", encoding="utf-8")
     for item in drawn:
         (figures / f"{item.name}.png").write_bytes(item.png(_DOTS_PER_INCH))

@@ -44,7 +44,7 @@ def hanger_3_table(seed: int = 1) -> str:
 def _row(found: Diagnosis) -> tuple[str, ...]:
     best, shrunk = found.causes[0], found.shrinkage
     return (
-        f"{best.effect.replace('_', ' ')} ({' or '.join([best.at, *best.also_at[:2]])})",
+        f"{best.effect.replace('_', ' ')} ({best.at}{' or elsewhere' if best.also_at else ''})",
         f"{best.probability:.2f}",
         f"{found.claim(best):.2f}",
         f"{found.unexplained_probability:.2f}",

@@ -52,7 +52,7 @@ GRAVITY_M_S2 = 9.81
 END = "rotational_end_flexibility"
 _FORCE_SD_N, _FREQUENCY_SD_HZ = 1.0, 0.5
 _WORTH_A_ROW = 0.01
-_LENGTHS = "arrangements_of_ca.csv"
+_CLAMPS, _LENGTHS = "clamps.csv", "arrangements_of_ca.csv"
 _CAUSE_HEAD = ("cause", "probability", "log Bayes factor", "size (90 % interval)")
 _FAMILY_HEAD = (
     "clamp", "direction", "arrangements", "lengths (m)", "measured over pendulum", "no gap",
@@ -171,7 +171,7 @@ Diagnosed: TypeAlias = tuple[Arrangement, Diagnosis]
 
 
 def pipe_hanger_tables(data: Path) -> str:
-    """One row for each clamp and direction in markdown; each of CA goes into a file beside."""
+    """Files of a row for each clamp and direction, and of each of CA; here what names them."""
     found = [
         (each, diagnose(each.tests, each.hanger, GapOptions(seed=SEED)))
         for each in arrangements(data)
@@ -182,10 +182,12 @@ def pipe_hanger_tables(data: Path) -> str:
         families.setdefault(key, []).append((each, diagnosis))
     shortest_first = sorted(families["CA", "radial"], key=lambda pair: pair[0].hanger.length_m)
     write_csv(HANGERS / _LENGTHS, [_LENGTH_HEAD, *(_length_row(*pair) for pair in shortest_first)])
+    clamps = (_family_row(key, pairs) for key, pairs in families.items())
+    write_csv(HANGERS / _CLAMPS, [_FAMILY_HEAD, *clamps])
     hinges = [hinge for _, diagnosis in shortest_first if (hinge := _hinge(diagnosis))]
     return "\n\n".join(
         (
-            markdown(_FAMILY_HEAD, [_family_row(key, pairs) for key, pairs in families.items()]),
+            f"[Each clamp and direction](real_cases/{_CLAMPS}).",
             f"[The arrangements of CA](real_cases/{_LENGTHS}), the shortest rods first.",
             _one_hinge(hinges),
         )
