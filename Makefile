@@ -60,7 +60,7 @@ docs: .venv/development
 	$(BIN)/sphinx-build --quiet -W --keep-going -b html -d build/manual-doctrees docs build/manual
 	@echo "The manual: build/manual/index.html"
 
-# Computes the tables of docs/validation.md, docs/gap.md and README.md anew: minutes.
+# Computes the tables of docs/trials/validation.md, docs/gap.md and README.md anew: minutes.
 tables: .venv/development
 	$(BIN)/python docs/build.py
 

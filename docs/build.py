@@ -1,5 +1,8 @@
 """Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
+The pages of commands, settings and effects are built here and not kept in the repository: `shm VERB
+--help`, `shm settings` and `shm gap effects` say the same.
+
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
 python docs/build.py            # the computed tables too (`make tables`): validation, gap, README
 
@@ -20,13 +23,16 @@ from pathlib import Path
 
 import rich_click as click
 
-from docs.effects_page import effects_page
+from docs import validation_page
 from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
+from docs.house import house
 from shm.models.registry import MODELS
-from shm.settings import TABLE, Setting
+from shm_cli.common import markdown
+from shm_cli.effects import effects_page
 from shm_cli.main import VERBS, cli
-from shm_cli.validate import compared, markdown
+from shm_cli.settings import settings_page
+from shm_cli.validate import compared
 from shm_cli.validation import frequencies, selection
 
 DOCS = Path(__file__).parent
@@ -62,30 +68,6 @@ def _command(command: click.Command, name: str, parent: click.Context) -> str:
 def _prose(text: str) -> str:
     cleaned = re.sub(r"^\s*\x08\s*\n", "", inspect.cleandoc(text), flags=re.MULTILINE)
     return re.sub(r"Example: (.+)", r"Example: `\1`", cleaned)
-
-
-def settings_page() -> str:
-    """docs/settings.md from the one table of settings."""
-    head = (
-        "# Settings\n\nMade by `make docs` from `shm/settings.py`. A value comes from the flag, "
-        "else the environment, else `[settings]` of `bridge.toml`, else the default.\n\n"
-        "| setting | default | unit | range | environment | meaning |\n|---|---|---|---|---|---|\n"
-    )
-    rows = [
-        f"| `{row.name}` | {row.default} | {row.unit} | {_range(row)} "
-        f"| `{row.environment_variable}` | {row.help} |"
-        for row in TABLE
-    ]
-    return head + "\n".join(rows) + "\n"
-
-
-def _range(row: Setting) -> str:
-    bounds = (
-        ", ".join(row.choices),
-        "" if row.low is None else f"from {row.low:g}",
-        "" if row.high is None else f"to {row.high:g}",
-    )
-    return " ".join(text for text in bounds if text)
 
 
 def classes_table() -> str:
@@ -135,13 +117,11 @@ def main() -> None:
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
     fill_in(DOCS / "physics.md", "classes", classes_table())
     fill_in(DOCS / "api.md", "examples", examples())
+    fill_in(DOCS.parent / "CONTRIBUTING.md", "house", house())
     if "--quick" in sys.argv:
         return
     tables, chosen = compared(seed=1)
-    computed = markdown(frequencies.HEADS, [frequencies.cells(row) for row in tables])
-    preferred = markdown(selection.HEADS, [selection.cells(row) for row in chosen])
-    fill_in(DOCS / "validation.md", "frequencies", computed)
-    fill_in(DOCS / "validation.md", "selection", preferred)
+    validation_page.write([*map(frequencies.cells, tables)], [*map(selection.cells, chosen)])
     fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
     short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])

@@ -9,6 +9,8 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 from shm import __version__
 
+_BLIND_TRIAL = Path(__file__).parent / "trials" / "blind_trial.html"
+
 project = "shm"
 author = "the authors of shm"
 copyright = author
@@ -16,7 +18,7 @@ version = release = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "drawn_math"]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["examples", "extensions", "figures", "real_cases", "static"]
+exclude_patterns = ["examples", "extensions", "static", "trials/figures", "trials/real_cases"]
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
@@ -28,7 +30,8 @@ html_math_renderer = "drawn"
 html_show_copyright = False
 html_copy_source = False
 html_static_path = ["static"]
-html_extra_path = ["blind_trial.html"]
+# Only who has solved the trial has its page (docs/blind_page.py).
+html_extra_path = ["trials/blind_trial.html"] if _BLIND_TRIAL.exists() else []
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

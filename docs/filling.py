@@ -1,7 +1,9 @@
-"""Puts what was computed between the markers of a page."""
+"""Puts what was computed between the markers of a page, or as CSV beside it."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 
@@ -11,3 +13,10 @@ def fill_in(path: Path, name: str, text: str) -> None:
     before, rest = path.read_text(encoding="utf-8").split(begin)
     after = rest.split(end)[1]
     path.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
+
+
+def write_csv(path: Path, rows: Iterable[Sequence[str]]) -> None:
+    """A table with its head as the first row; long tables are read better so than in a page."""
+    path.parent.mkdir(exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)

@@ -8,6 +8,7 @@ from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.modes_document import load_modes
 from shm.values import Diagnosis, TensionEstimate
+from shm_cli.common import markdown
 from shm_cli.thesis import HANGER_FILE, PRINTINGS
 
 _END_FLEXIBILITY = ("rotational_end_flexibility", "translational_end_flexibility")
@@ -33,17 +34,17 @@ def hanger_3_table(seed: int = 1) -> str:
     """One row for each baseline and catalogue, as a markdown table."""
     hanger = load_hanger(HANGER_FILE)
     tests = load_modes(PRINTINGS["table 1.1"])
-    rows = [_HEAD, ("---",) * len(_HEAD)]
+    rows = []
     for baseline, catalogue, without in _CASES:
         found = diagnose(tests, hanger, GapOptions(baseline, without=without, seed=seed))
         rows.append((baseline, catalogue, *_row(found)))
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown(_HEAD, rows)
 
 
 def _row(found: Diagnosis) -> tuple[str, ...]:
     best, shrunk = found.causes[0], found.shrinkage
     return (
-        f"{best.effect.replace('_', ' ')} ({' or '.join([best.at, *best.also_at[:2]])})",
+        f"{best.effect.replace('_', ' ')} ({best.at}{' or elsewhere' if best.also_at else ''})",
         f"{best.probability:.2f}",
         f"{found.claim(best):.2f}",
         f"{found.unexplained_probability:.2f}",

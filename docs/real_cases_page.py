@@ -1,4 +1,6 @@
-"""Makes the answers of docs/real_cases.md in two minutes: `python docs/real_cases_page.py [DATA]`.
+"""Makes the answers of docs/trials/real_cases.md in two minutes.
+
+python docs/real_cases_page.py [DATA]
 
 DATA is the folder of the real data (default: the environment's SHM_DATA, or ../shared/data beside
 the checkout). Without it nothing is made, and it says so.
@@ -20,7 +22,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
@@ -40,15 +42,17 @@ from shm.values import (
     Scatter,
     Supports,
 )
+from shm_cli.common import markdown
 
 DOCS = Path(__file__).parent
-HANGERS = DOCS / "real_cases"
+HANGERS = DOCS / "trials" / "real_cases"
 SEED = 1
 HAMMER_X_M = (0.1, 0.25, 0.375, 0.5, 0.65, 0.8, 0.925, 1.05, 1.2)
 GRAVITY_M_S2 = 9.81
 END = "rotational_end_flexibility"
 _FORCE_SD_N, _FREQUENCY_SD_HZ = 1.0, 0.5
 _WORTH_A_ROW = 0.01
+_CLAMPS, _LENGTHS = "clamps.csv", "arrangements_of_ca.csv"
 _CAUSE_HEAD = ("cause", "probability", "log Bayes factor", "size (90 % interval)")
 _FAMILY_HEAD = (
     "clamp", "direction", "arrangements", "lengths (m)", "measured over pendulum", "no gap",
@@ -167,7 +171,7 @@ Diagnosed: TypeAlias = tuple[Arrangement, Diagnosis]
 
 
 def pipe_hanger_tables(data: Path) -> str:
-    """One row for each clamp and direction, then one for each of CA, in markdown."""
+    """Files of a row for each clamp and direction, and of each of CA; here what names them."""
     found = [
         (each, diagnose(each.tests, each.hanger, GapOptions(seed=SEED)))
         for each in arrangements(data)
@@ -177,20 +181,17 @@ def pipe_hanger_tables(data: Path) -> str:
         key = (each.name.split("_")[0], each.direction)
         families.setdefault(key, []).append((each, diagnosis))
     shortest_first = sorted(families["CA", "radial"], key=lambda pair: pair[0].hanger.length_m)
+    write_csv(HANGERS / _LENGTHS, [_LENGTH_HEAD, *(_length_row(*pair) for pair in shortest_first)])
+    clamps = (_family_row(key, pairs) for key, pairs in families.items())
+    write_csv(HANGERS / _CLAMPS, [_FAMILY_HEAD, *clamps])
     hinges = [hinge for _, diagnosis in shortest_first if (hinge := _hinge(diagnosis))]
     return "\n\n".join(
         (
-            _table(_FAMILY_HEAD, [_family_row(key, pairs) for key, pairs in families.items()]),
-            "The arrangements of CA, the shortest rods first:",
-            _table(_LENGTH_HEAD, [_length_row(*pair) for pair in shortest_first]),
+            f"[Each clamp and direction](real_cases/{_CLAMPS}).",
+            f"[The arrangements of CA](real_cases/{_LENGTHS}), the shortest rods first.",
             _one_hinge(hinges),
         )
     )
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _family_row(key: tuple[str, str], pairs: Sequence[Diagnosed]) -> tuple[str, ...]:
@@ -261,8 +262,8 @@ def _one_hinge(hinges: list[EffectEstimate]) -> str:
 # ---------------------------------------------------------------- the page
 
 
-def told(hanger: Hanger, tests: list[ModalTest]) -> str:
-    """The answer of `shm gap diagnose` and its remarks in full, of the causes those above 1 %."""
+def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
+    """The causes above 1 %; the answer of `shm gap diagnose` in words goes into a file beside."""
     found = diagnose(tests, hanger, GapOptions(seed=SEED))
     text = diagnosis_text(DiagnosisSheet(found, hanger)).split("\nCAUSES, LIKELIEST FIRST")[0]
     rows = [_cause_row(cause) for cause in found.causes if cause.probability >= _WORTH_A_ROW]
@@ -270,7 +271,9 @@ def told(hanger: Hanger, tests: list[ModalTest]) -> str:
         ("no gap", probability(found.no_gap_probability), "", ""),
         ("something not in the catalogue", probability(found.unexplained_probability), "", ""),
     ]
-    return f"```text\n{text.rstrip()}\n```\n\n{_table(_CAUSE_HEAD, rows)}"
+    (HANGERS / file).write_text(f"{text.rstrip()}\n", encoding="utf-8")
+    said = f"[What `shm gap diagnose` says](real_cases/{file}), and the causes above 0.01:"
+    return f"{said}\n\n{markdown(_CAUSE_HEAD, rows)}"
 
 
 def _cause_row(cause: Cause) -> tuple[str, ...]:
@@ -286,12 +289,12 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
 def main(data: Path) -> None:
     """Fills in the answers."""
     if not data.is_dir():
-        print(f"docs/real_cases.md is left as it is: no real data in {data} (SHM_DATA).")
+        print(f"docs/trials/real_cases.md is left as it is: no real data in {data} (SHM_DATA).")
         return
-    page = DOCS / "real_cases.md"
-    fill_in(page, "free bar", told(*roving_beam(data)))
-    fill_in(page, "string", told(*string(data)))
-    fill_in(page, "string, all modes", told(*string(data, (1, 2, 3))))
+    page = DOCS / "trials" / "real_cases.md"
+    fill_in(page, "free bar", told("free_bar.txt", *roving_beam(data)))
+    fill_in(page, "string", told("string.txt", *string(data)))
+    fill_in(page, "string, all modes", told("string_all_modes.txt", *string(data, (1, 2, 3))))
     fill_in(page, "pipe hangers", pipe_hanger_tables(data))
 
 

@@ -193,6 +193,12 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
     return listed
 
 
+def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    head, *others = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
+    return "\n".join([head, "|" + "---|" * len(heads), *others])
+
+
 def show_texts(texts: Texts) -> None:
     """Prints a table of a report, and its note."""
     made = table(texts.title, *texts.headings)

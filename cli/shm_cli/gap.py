@@ -38,6 +38,7 @@ from shm_cli.common import (
     tests_and_hanger,
     told_doubts,
 )
+from shm_cli.effects import effects
 from shm_cli.update import modes_argument
 from shm_cli.writable import NewFile
 
@@ -146,6 +147,7 @@ command.add_command(adopt)
 command.add_command(adopted)
 command.add_command(drop)
 command.add_command(blind)
+command.add_command(effects)
 
 
 def _of_workspace(

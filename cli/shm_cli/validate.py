@@ -10,7 +10,7 @@ import rich_click as click
 from shm.bridge import load_hanger
 from shm.errors import GateNotMet
 from shm_cli import thesis
-from shm_cli.common import json_option, progress_bar, seed_option, show, show_table, table
+from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
 from shm_cli.validation import frequencies, selection
 
 Texts = tuple[str, ...]
@@ -55,7 +55,7 @@ def command(as_markdown: bool, seed: int, as_json: bool) -> None:
     misses = [*frequencies.misses(tables), *selection.misses(chosen)]
     if misses:
         message = "; ".join(misses)
-        raise GateNotMet(f"{message}.", remedy="See docs/validation.md for the marks.")
+        raise GateNotMet(f"{message}.", remedy="See docs/trials/validation.md for the marks.")
 
 
 def compared(
@@ -73,9 +73,3 @@ def _show(title: str, heads: Texts, rows: Sequence[Texts]) -> None:
     for row in rows:
         made.add_row(*row)
     show_table(made)
-
-
-def markdown(heads: Texts, rows: Sequence[Texts]) -> str:
-    """A Markdown table."""
-    lines = [heads, ("---",) * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -294,7 +294,7 @@ def _effect(table: Table, effect: str) -> Table:
     if not isinstance(values, dict):
         raise table.refusal(
             f"{effect} is not a table",
-            "Write [hanger.effects.NAME], NAME an effect of docs/effects.md, and below it the "
+            "Write [hanger.effects.NAME], NAME one of `shm gap effects`, and below it the "
             "ranges of its parameters.",
         )
     return Table(values, f"{table.label}.{effect}", table.path)

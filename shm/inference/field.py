@@ -52,7 +52,7 @@ _UNFELT = 0.1
 
 _UNSTATED_SD = 1e-4
 """Of a frequency whose error nobody states and no second test shows, as a fraction of it: what a
-hammer test reaches (docs/identification_benchmarks.md)."""
+hammer test reaches (docs/trials/identification_benchmarks.md)."""
 
 
 class FieldLikelihood:

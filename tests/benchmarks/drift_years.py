@@ -22,7 +22,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from docs.filling import fill_in
+from docs.filling import fill_in, write_csv
 from shm.values import Thresholds
 from shm.watch.options import WatchOptions
 from tests.benchmarks.drift.comparing import limits_at
@@ -30,10 +30,10 @@ from tests.benchmarks.drift.figures import save_figures
 from tests.benchmarks.drift.outcomes import Outcome, read, written
 from tests.benchmarks.drift.scenarios import SCENARIOS
 from tests.benchmarks.drift.solving import Task, solved
-from tests.benchmarks.drift.table import fragment, marks
+from tests.benchmarks.drift.table import fragment, marks, tables_beside
 from tests.benchmarks.drift.years import SOUND_TESTS
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "trials"
 PAGE, FIGURES = DOCS / "drift_trial.md", DOCS / "figures"
 QUICK_HANGERS = 20
 
@@ -89,11 +89,15 @@ def main() -> int:
     given = arguments()
     outcomes = all_outcomes(given)
     limits = limits_at(outcomes, given.limit)
-    probability = Thresholds().alert_probability
-    text = fragment(outcomes, given.limit, probability, given.years)
+    text = fragment(outcomes, given.limit, given.years)
+    beside = tables_beside(outcomes, given.limit, Thresholds().alert_probability)
     print(text)
+    for name, rows in beside.items():
+        print("", name, *map(" | ".join, rows), sep="\n")
     if given.write_docs:
         fill_in(PAGE, "trial", text)
+        for name, rows in beside.items():
+            write_csv(DOCS / name, rows)
         save_figures(outcomes, limits, FIGURES)
     return int(not all(met for _, _, met in marks(outcomes, given.limit, limits)))
 

@@ -37,7 +37,7 @@ from tests.helpers.flows import a_flow
 from tests.helpers.mutations import Sample, damaged, harmful_samples, light, whole_samples
 from tests.helpers.workspaces import make_workspace
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "recordings.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
 BOMB_BYTES = 300_000_000
 SHARE = 500
 
@@ -193,9 +193,9 @@ def through_a_flow(files: int, seed: int) -> Counter[str]:
 
 
 def table_of(tally: Tally, flow: Counter[str]) -> str:
-    lines = ["| what came of them | files |", "| --- | --- |"]
+    lines = ["| what came of them | files |", "|---|---|"]
     lines += [f"| {outcome} | {count} |" for outcome, count in tally.outcomes.most_common()]
-    lines += ["", "| measured | |", "| --- | --- |"]
+    lines += ["", "| measured | |", "|---|---|"]
     lines += [
         f"| files, of {len(tally.formats)} endings | {tally.outcomes.total()} |",
         f"| faults of the process that asks | {len(tally.faults)} |",

@@ -29,6 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from docs.filling import write_csv
 from shm.gap.attribution import Attribution, Explanation, attributed
 from shm.gap.contract import GapOptions
 from shm.gap.observations import observed
@@ -48,7 +49,7 @@ from shm.simulate import (
 )
 from shm.values import Hanger
 from tests.benchmarks.gap.outcomes import ABOUT, NONE, Case, Outcome, kept
-from tests.benchmarks.gap.table import fragment, marks
+from tests.benchmarks.gap.table import by_effect, marks, marks_table
 from tests.benchmarks.identification.page import put
 
 DRAWS_OF_A_CASE = 12
@@ -64,7 +65,9 @@ ROD = Hanger(
     diameter_m=0.130,
 )
 PLAN = CampaignPlan(reality=Reality(own_laws=False))
-DOCS = Path(__file__).parents[2] / "docs" / "gap_trial.md"
+TRIALS = Path(__file__).parents[2] / "docs" / "trials"
+BESIDE = "gap_trial/by_effect.csv"
+"""The table of all effects, beside the page."""
 
 
 def solved(case: Case) -> Outcome:
@@ -217,9 +220,11 @@ def main() -> int:
             print(json.dumps(asdict(outcome)), file=answers, flush=True)
             if not given.quiet:
                 print(detail(outcome), flush=True)
-    print(fragment(outcomes))
+    told, table = marks_table(outcomes), by_effect(outcomes)
+    print(told, *map(" | ".join, table), sep="\n")
     if given.write_docs:
-        put(DOCS, "trial", fragment(outcomes))
+        put(TRIALS / "gap_trial.md", "trial", f"{told}\n\n[Every effect at both sizes]({BESIDE}).")
+        write_csv(TRIALS / BESIDE, table)
     return int(not all(met for _, _, met in marks(outcomes)))
 
 

@@ -32,6 +32,8 @@ from comparing import COLUMNS, TITLES, give, rows, sound_case  # noqa: E402
 from page import DOCS, put  # noqa: E402
 from peers import environment  # noqa: E402
 
+from shm_cli.common import markdown  # noqa: E402
+
 ENVIRONMENTS = {"shm": "", "pyoma2": "", "sdypy_told": "sdypy_ema", "sdypy_peaks": "sdypy_ema"}
 """Environment of each; an empty one is ours."""
 
@@ -81,8 +83,7 @@ def answers_of(
 
 def fragment(lines: list[tuple[str, ...]], failures: list[str]) -> str:
     """The table as markdown, and why there was no answer."""
-    cells = [COLUMNS, ("---",) * len(COLUMNS), *lines]
-    grid = "\n".join(f"| {' | '.join(row)} |" for row in cells)
+    grid = markdown(COLUMNS, lines)
     return "\n\n".join([grid, *(["\n".join(f"- {line}" for line in failures)] if failures else [])])
 
 

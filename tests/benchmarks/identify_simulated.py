@@ -31,6 +31,7 @@ from page import DOCS, put  # noqa: E402
 from scoring import TestScore, score_number  # noqa: E402
 
 from shm.simulate import DISTURBANCES  # noqa: E402
+from shm_cli.common import markdown  # noqa: E402
 
 
 def run(numbers: range, seed: int, disturbance: str | None, processes: int) -> Iterator[TestScore]:
@@ -57,14 +58,16 @@ def show(scores: list[TestScore], console: Console) -> None:
 def fragment(scores: list[TestScore], seed: int) -> str:
     """The tables as markdown."""
     head = f"{len(scores)} tests, seed {seed}."
-    rows = [COLUMNS, ("---",) * len(COLUMNS), *table(scores)]
-    told = [("planted", "flagged"), ("---", "---"), *flags(scores)]
-    calls = [("check", "sound tests in which it is not good"), ("---", "---")]
-    calls += [(name, str(count)) for name, count in alarms(scores)]
-    lines = [
-        "\n".join(f"| {' | '.join(cells)} |" for cells in part) for part in (rows, told, calls)
-    ]
-    return "\n\n".join([head, *lines])
+    calls = ", ".join(f"{name} {count}" for name, count in alarms(scores))
+    told = ", ".join(f"{kind} {found}" for kind, found in flags(scores))
+    return "\n\n".join(
+        [
+            head,
+            markdown(COLUMNS, table(scores)),
+            f"Planted faults flagged: {told}.",
+            f"Checks that are not good in sound tests: {calls}.",
+        ]
+    )
 
 
 def main() -> int:

@@ -40,7 +40,7 @@ from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, put
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "operation.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
 PLATE = """nominal_tension_n = 711e3
 [hanger.plate]
 length_m = 1.0915

@@ -37,7 +37,7 @@ sys.path[:0] = [str(SCRIPTS), str(ROOT)]
 
 from table import Case, failed_bounds, show, write_docs  # noqa: E402
 
-DOCS = ROOT / "docs" / "peers.md"
+DOCS = ROOT / "docs" / "trials" / "peers.md"
 OURS = "shm"
 OUR_SEEDS = 20
 ENVIRONMENTS = {

@@ -3,7 +3,7 @@
     python tests/benchmarks/round_ends.py
 
 Exact frequencies of beam3, six orders in two planes, a standard deviation of 1e-4, no sensor: the
-case in which frequencies tell a soft spring from tension worst (docs/validation.md).
+case in which frequencies tell a soft spring from tension worst (docs/trials/validation.md).
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ from tests.helpers.flows import Clock
 from tests.helpers.footprint import Trend, descendants, open_files, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "operation.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
 WEEK_S = 7 * 86400.0
 BATCH = 100
 FREQUENCY_SD = 3e-4

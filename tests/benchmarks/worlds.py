@@ -6,8 +6,8 @@ python tests/benchmarks/worlds.py --diagnoses 40 --seeds 5  # two planes, baseli
 
 Both worlds solve other equations by other code, with the nuisances of the field on. Every hanger
 goes through `shm select` as a user's would: its TOML, its modes, all beam classes, no other word.
-Nothing was tuned on the seeds that docs/validation.md quotes. Two processes; half a minute of one
-core for ten hangers.
+Nothing was tuned on the seeds that docs/trials/validation.md quotes. Two processes; half a minute
+of one core for ten hangers.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def main() -> None:
     if asked.keep:
         asked.keep.write_text(json.dumps(rows))
     if asked.write_docs:
-        fill_in(ROOT / "docs" / "validation.md", "worlds", text)
+        fill_in(ROOT / "docs" / "trials" / "validation.md", "worlds", text)
 
 
 if __name__ == "__main__":

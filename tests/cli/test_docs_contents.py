@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
 import tomllib
 from pathlib import Path
@@ -12,10 +11,7 @@ from types import ModuleType
 import pytest
 from sphinx.errors import SphinxError
 
-from shm.modes_document import load_modes
-from shm.read import peek, sidecar_path
-
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+from tests.helpers.pages import DOCS, PAGES, name_of
 
 
 def blocks(page: str, kind: str) -> list[str]:
@@ -23,33 +19,9 @@ def blocks(page: str, kind: str) -> list[str]:
     return re.findall(rf"^```{kind}\n(.*?)^```$", text, re.M | re.S)
 
 
-def test_the_sidecars_of_the_page_on_own_data_make_a_file_complete(tmp_path: Path) -> None:
-    whole, volts = blocks("own_data.md", "toml")
-    path = tmp_path / "hanger3.csv"
-    path.write_text(
-        "# sampling_rate_hz: 512\nforce,acc_1,acc_2\n" + "1,2,3\n" * 64, encoding="utf-8"
-    )
-    sidecar_path(path).write_text(whole)
-    first = peek(path)
-    assert first.problems == ()
-    assert first.hanger == 3
-    assert [channel.plane for channel in first.channels[1:]] == ["transverse", "longitudinal"]
-    sidecar_path(path).write_text(volts)
-    assert [channel.calibration for channel in peek(path).channels[:2]] == [227.0, 10.0]
-
-
-def test_the_modal_tests_of_the_page_on_own_data_are_read(tmp_path: Path) -> None:
-    (document,) = blocks("own_data.md", "json")
-    path = tmp_path / "t1.modes.json"
-    path.write_text(document)
-    (test,) = load_modes(path)
-    assert [mode.plane for mode in test.modes] == ["transverse", "longitudinal"]
-    assert json.loads(document)["hanger"] == test.hanger
-
-
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_description_of_a_page_is_toml(page: Path) -> None:
-    for block in blocks(page.name, "toml"):
+    for block in blocks(f"{name_of(page)}.md", "toml"):
         if "# ..." not in block:
             assert tomllib.loads(block)
 

@@ -8,7 +8,7 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm_cli import thesis
-from shm_cli.validate import markdown
+from shm_cli.common import markdown
 from shm_cli.validation import frequencies, selection
 
 

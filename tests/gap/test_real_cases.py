@@ -27,7 +27,7 @@ def data() -> Path:
 
 
 def test_a_free_bars_falling_ratios_are_shear_and_rotary_inertia() -> None:
-    hanger = load_hanger(ROOT / "docs" / "real_cases" / "roving_beam.toml")
+    hanger = load_hanger(ROOT / "docs" / "trials" / "real_cases" / "roving_beam.toml")
     modes = [Mode("transverse", n, f, 1e-3 * f) for n, f in enumerate(FREE_BAR_HZ, start=1)]
     found = diagnose([ModalTest("beam", tuple(modes))], hanger, GapOptions(seed=2))
     assert found.leading is not None

@@ -2,45 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
 
-import numpy as np
-import pytest
-
+from shm.modes_document import load_modes
 from shm.read import FORMATS, peek, read, sidecar_path
 from shm.read.content import MOST_MEMBERS
 from shm.read.limits import Limits
 from shm.read.units import unit_of
 from shm.values import FrequencyResponse, Recording
-from shm_cli.main import run
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
 
 
 def blocks(kind: str) -> list[str]:
-    return re.findall(rf"^```{kind}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-
-
-def test_the_python_examples_write_files_that_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in blocks("python"):
-        exec(block, names)
-    files = sorted(tmp_path.iterdir())
-    assert [path.suffix for path in files] == [".h5", ".mat", ".npz", ".tdms"]
-    for path in files:
-        assert peek(path).problems == ()
-        found = read(path)
-        assert isinstance(found, Recording)
-        assert found.force is not None
-        np.testing.assert_allclose(
-            found.accelerations[0].values, 9.80665 * np.asarray(names["acceleration"])
-        )
-    assert run(["ingest", "--peek", *map(str, files)]) == 0
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    return [text for of, text in found if of == kind]
 
 
 def test_the_texts_are_read(tmp_path: Path) -> None:
@@ -56,17 +35,30 @@ def test_the_texts_are_read(tmp_path: Path) -> None:
 
 
 def test_the_sidecars_are_read(tmp_path: Path, recording: Recording) -> None:
-    first, calibration, whole = blocks("toml")
-    assert set(tomllib.loads(first)["channel"]) == {"Time_chan_1", "Time_chan_2"}
+    whole, volts, analysers = blocks("toml")
+    assert set(tomllib.loads(analysers)["channel"]) == {"Time_chan_1", "Time_chan_2"}
     path = tmp_path / "test.csv"
     head = "# sampling_rate_hz: 9\nforce,acc_1,acc_2,acc_3\n"
     path.write_text(head + "1,2,3,4\n" * 20)
     sidecar_path(path).write_text(whole)
+    assert peek(path).problems == ()
     found = read(path)
     assert isinstance(found, Recording)
+    assert found.hanger == 3
     assert [c.name for c in found.channels] == ["force", "acc_1", "acc_2"]
-    sidecar_path(path).write_text(calibration)
+    assert [c.plane for c in found.channels[1:]] == ["transverse", "longitudinal"]
+    sidecar_path(path).write_text(volts)
     assert [c.full_scale for c in peek(path).channels[:2]] == [2200.0, 50.0]
+    assert [c.calibration for c in peek(path).channels[:2]] == [227.0, 10.0]
+
+
+def test_the_modal_tests_are_read(tmp_path: Path) -> None:
+    (document,) = blocks("json")
+    path = tmp_path / "t1.modes.json"
+    path.write_text(document)
+    (test,) = load_modes(path)
+    assert [mode.plane for mode in test.modes] == ["transverse", "longitudinal"]
+    assert json.loads(document)["hanger"] == test.hanger
 
 
 def test_the_page_names_every_format_unit_and_limit() -> None:

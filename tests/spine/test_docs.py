@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 from pathlib import Path
 from types import ModuleType
 
+import click
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")]
+from docs import validation_page
+from shm.settings import TABLE
+from shm_cli.main import run
+from tests.helpers.command_lines import commands
+from tests.helpers.pages import BUILT, DOCS, PAGES, ROOT, links, name_of
+
+READ = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *PAGES]
 
 
 @pytest.fixture(scope="module")
@@ -23,39 +30,101 @@ def build() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("page", ["commands", "settings"])
-def test_a_generated_page_is_what_the_code_makes(build: ModuleType, page: str) -> None:
-    made = getattr(build, f"{page}_page")()
-    assert (ROOT / "docs" / f"{page}.md").read_text() == made, "Run `make docs`."
+def test_the_page_and_the_command_of_settings_name_every_one(
+    build: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = build.settings_page()
+    assert all(f"| `{row.name}` | {row.default} |" in page for row in TABLE)
+    assert run(["settings"]) == 0
+    printed = capsys.readouterr().out
+    assert all(row.name in printed for row in TABLE)
+    assert run(["settings", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["settings"]
+    assert [each["setting"] for each in listed] == [row.name for row in TABLE]
+    assert listed[0]["environment"] == "SHM_STORE"
+
+
+def test_the_page_of_commands_has_every_verb_and_its_options(build: ModuleType) -> None:
+    page = build.commands_page()
+    assert [line for line in page.splitlines() if line.startswith("## shm ")][:2]
+    for name, command in commands():
+        section = page.split(f"## shm {name}\n")[1].split("\n## ")[0]
+        for parameter in command.params:
+            if isinstance(parameter, click.Option) and not parameter.hidden:
+                assert parameter.opts[0] in section, f"shm {name}"
+
+
+def test_built_pages_are_ignored_by_git_and_named_by_the_tree() -> None:
+    ignored = (ROOT / ".gitignore").read_text().splitlines()
+    index = (DOCS / "index.md").read_text()
+    for page in BUILT:
+        assert f"docs/{page.name}" in ignored
+        assert f"\n{page.stem}\n" in index
 
 
 @pytest.mark.parametrize(
     ("page", "name", "makes"),
-    [("physics", "classes", "classes_table"), ("api", "examples", "examples")],
+    [
+        ("docs/physics.md", "classes", "classes_table"),
+        ("docs/api.md", "examples", "examples"),
+        ("CONTRIBUTING.md", "house", "house"),
+    ],
 )
 def test_a_generated_part_of_a_page_is_what_the_code_makes(
     build: ModuleType, page: str, name: str, makes: str
 ) -> None:
-    text = (ROOT / "docs" / f"{page}.md").read_text()
+    text = (ROOT / page).read_text()
     stands = text.split(f"<!-- {name} -->\n")[1].split(f"\n<!-- /{name} -->")[0]
     assert stands == getattr(build, makes)(), "Run `make docs`."
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+def test_every_room_of_shm_has_its_place_in_the_picture_of_the_house(build: ModuleType) -> None:
+    packages = {path.parent.name for path in (ROOT / "shm").glob("*/__init__.py")}
+    modules = {path.stem for path in (ROOT / "shm").glob("*.py")} - {"__init__"}
+    drawn = set(re.findall(r"^.. +shm\.(\w+) ", build.house(), re.M))
+    assert drawn == packages | modules
+
+
+@pytest.mark.parametrize("page", READ, ids=name_of)
+def test_links_lead_to_files_of_the_repository(page: Path) -> None:
+    for target, _ in links(page.read_text()):
         assert (page.parent / target).exists(), target
+        assert (page.parent / target).resolve() not in BUILT, f"{target} is not in the repository"
 
 
 @pytest.mark.parametrize(
     ("page", "name", "word", "times"),
     [
         ("README.md", "selection", "solid2", 1),
-        ("docs/validation.md", "selection", "| solid2", 4),
-        ("docs/validation.md", "frequencies", "| A.5", 7),
+        ("docs/trials/validation.md", "selection", "| solid2", 2),
+        ("docs/trials/validation.md", "frequencies", "| A.5", 1),
     ],
 )
 def test_the_validation_tables_stand_in_their_pages(page, name, word, times) -> None:
     text = (ROOT / page).read_text()
     table = text.split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
     assert table.count(word) == times
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("frequencies", validation_page.largest_differences),
+        ("selection", validation_page.counted_ten_times),
+    ],
+)
+def test_the_page_of_validation_shows_the_whole_table_beside_it_in_short(name, shown) -> None:
+    page = validation_page.PAGE.read_text()
+    stands = page.split(f"<!-- {name} -->\n")[1].split(f"\n<!-- /{name} -->")[0]
+    assert stands == shown(validation_page.kept(name))
+
+
+def test_writing_the_page_of_validation_gives_what_is_kept(tmp_path: Path) -> None:
+    copy = tmp_path / "validation.md"
+    copy.write_text(validation_page.PAGE.read_text())
+    copy.with_suffix("").mkdir()
+    rows = {name: validation_page.kept(name) for name in ("frequencies", "selection")}
+    validation_page.write(rows["frequencies"], rows["selection"], copy)
+    assert copy.read_text() == validation_page.PAGE.read_text()
+    for name, whole in rows.items():
+        assert validation_page.kept(name, copy) == whole

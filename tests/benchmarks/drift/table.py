@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from shm_cli.common import markdown
 from tests.benchmarks.drift.comparing import (
     ASKED_YEARS,
     FalseAlarms,
@@ -21,27 +22,38 @@ from tests.benchmarks.drift.outcomes import BEYOND, OURS, RIVALS, VERDICTS, Outc
 from tests.benchmarks.drift.scenarios import HARD_QUIET, QUIET, SCENARIOS, Scenario
 
 RULES = (OURS, *RIVALS)
+FALSE_ALARMS, DELAYS = "drift_trial/false_alarms.csv", "drift_trial/delays.csv"
+DELAYS_AS_ASKED = f"drift_trial/delays_at_one_alarm_in_{ASKED_YEARS:g}_years.csv"
+"""Tables of all rules, beside the page."""
 
 
-def fragment(
-    outcomes: Sequence[Outcome], limit_years: float, probability: float, years: float
-) -> str:
-    """All tables for people; `probability` is the level of the rule on thresholds."""
+def fragment(outcomes: Sequence[Outcome], limit_years: float, years: float) -> str:
+    """The marks and verdicts for people; `tables_beside` has the other rules in full."""
     same, asked = limits_at(outcomes, limit_years), limits_for(outcomes, 1 / ASKED_YEARS)
     parts = [
         said(outcomes, years),
-        table(("mark", "found", "met"), mark_rows(outcomes, limit_years, same)),
-        "False alarms, and limits that give every rule our rate in the years without change:",
-        table(FALSE_HEAD, false_rows(outcomes, same, probability)),
-        "Delay in tests, median and 90 % quantile, at the limits above:",
-        table(("scenario", *RULES), delay_rows(outcomes, same)),
-        f"The same with every rule, ours too, at one false alarm in {ASKED_YEARS:g} hanger-years "
-        f"({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}):",
-        table(("scenario", *RULES), delay_rows(outcomes, asked)),
+        markdown(("mark", "found", "met"), mark_rows(outcomes, limit_years, same)),
+        f"Every rule: [false alarms, and limits that give it our rate]({FALSE_ALARMS}); "
+        f"[delays in tests at these limits]({DELAYS}), median and 90 % quantile; "
+        f"[the same delays]({DELAYS_AS_ASKED}), ours too, at one false alarm in {ASKED_YEARS:g} "
+        f"hanger-years ({', '.join(f'{rule} {limit:.3g}' for rule, limit in asked.items())}).",
         "What our first alarm after the change named:",
-        table(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
+        markdown(("scenario", "alarms", *VERDICTS), verdict_rows(outcomes, limit_years)),
     ]
     return "\n\n".join(parts)
+
+
+def tables_beside(
+    outcomes: Sequence[Outcome], limit_years: float, probability: float
+) -> dict[str, list[Sequence[str]]]:
+    """All rules by file name; `probability` is the level of the rule on thresholds."""
+    same, asked = limits_at(outcomes, limit_years), limits_for(outcomes, 1 / ASKED_YEARS)
+    head = ("scenario", *RULES)
+    return {
+        FALSE_ALARMS: [FALSE_HEAD, *false_rows(outcomes, same, probability)],
+        DELAYS: [head, *delay_rows(outcomes, same)],
+        DELAYS_AS_ASKED: [head, *delay_rows(outcomes, asked)],
+    }
 
 
 def said(outcomes: Sequence[Outcome], years: float) -> str:
@@ -53,11 +65,6 @@ def said(outcomes: Sequence[Outcome], years: float) -> str:
         f"{tests:.0f} tests in the mean; the sequential test costs "
         f"{1e3 * np.median(own):.1f} ms a test in the median."
     )
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 Mark = tuple[str, str, bool]

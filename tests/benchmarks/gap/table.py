@@ -135,14 +135,16 @@ def seeds_said(outcomes: Sequence[Outcome]) -> str:
     return ", ".join(f"{seeds[a]} to {seeds[b]}" for a, b in zip(begins, ends, strict=True))
 
 
-def fragment(outcomes: Sequence[Outcome]) -> str:
-    """Both tables for people."""
-    planted = [each for each in outcomes if each.planted is not None]
+def marks_table(outcomes: Sequence[Outcome]) -> str:
+    """The marks for people."""
     lines = [f"{len(outcomes)} campaigns, seeds {seeds_said(outcomes)}.", ""]
-    lines += ["| mark | found | met |", "| --- | --- | --- |"]
+    lines += ["| mark | found | met |", "|---|---|---|"]
     lines += [
         f"| {mark} | {found} | {'yes' if met else 'no'} |" for mark, found, met in marks(outcomes)
     ]
-    lines += ["", f"| {' | '.join(HEADER)} |", f"| {' | '.join('---' for _ in HEADER)} |"]
-    lines += [f"| {' | '.join(cells)} |" for cells in rows(planted)]
     return "\n".join(lines)
+
+
+def by_effect(outcomes: Sequence[Outcome]) -> list[Sequence[str]]:
+    """Every effect at both sizes, under its headings."""
+    return [HEADER, *rows([each for each in outcomes if each.planted is not None])]

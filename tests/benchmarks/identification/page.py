@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-DOCS = Path(__file__).resolve().parents[3] / "docs" / "identification_benchmarks.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "trials" / "identification_benchmarks.md"
 
 
 def put(page: Path, name: str, fragment: str) -> None:
