@@ -14,7 +14,7 @@ from rich.markup import escape
 
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES, Hanger
-from shm_cli import completers
+from shm_cli import completion
 from shm_cli.common import json_option, markdown, show, show_table, table
 
 _AREA_M2 = math.pi * 0.130**2 / 4
@@ -74,7 +74,7 @@ think of then. What imitates what:
     required=False,
     metavar="[EFFECT]",
     type=click.Choice(list(EFFECTS)),
-    shell_complete=completers.effects,
+    shell_complete=completion.effects,
 )
 @json_option
 def effects(name: str | None, as_json: bool) -> None:
