@@ -85,7 +85,9 @@ def test_the_tables_stand_between_the_marks_and_the_text_stays(tmp_path: Path) -
     text = page.read_text()
     assert text.startswith("before\n<!-- peers -->")
     assert text.endswith("<!-- /peers -->\nafter\n")
-    assert "| **shm** 1 | integrated | 3 | 1 | 1 | 1,000 |" in text
+    assert "**shm** 1 1 s, bias " in text
+    whole = (tmp_path / "peers" / "n_d_1.csv").read_text()
+    assert '**shm** 1,integrated,3,1,1,"1,000",' in whole
     assert "old" not in text
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from docs.filling import write_csv
 from tests.helpers.evidence_oracle import ORACLE
 
 EVIDENCE = {repeat: ORACLE["1.1", "beam2", repeat] for repeat in (1, 10)}
@@ -194,17 +195,24 @@ def write_docs(rows: Sequence[dict[str, Any]], page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     before, rest = text.split("<!-- peers -->")
     after = rest.split("<!-- /peers -->")[1]
-    parts = [_markdown(repeat, lines) for repeat, lines in _tables(rows).items()]
-    parts += ["\n".join(f"- {line}" for line in failures(rows))]
-    inside = "\n\n".join(part for part in parts if part)
+    parts = []
+    for repeat, lines in _tables(rows).items():
+        name = f"n_d_{repeat}.csv"
+        write_csv(page.with_suffix("") / name, [COLUMNS, *lines])
+        parts.append(f"{_in_short(repeat, lines)} ([All figures]({page.stem}/{name}).)")
+    parts += [*failures(rows)]
+    inside = "\n".join(f"- {part}" for part in parts)
     page.write_text(f"{before}<!-- peers -->\n{inside}\n<!-- /peers -->{after}", encoding="utf-8")
 
 
-def _markdown(repeat: int, lines: Sequence[Sequence[str]]) -> str:
-    head = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
-    body = ["| " + " | ".join(cells) + " |" for cells in lines]
-    title = f"### N_D = {repeat} (log evidence {EVIDENCE[repeat]:.2f})\n"
-    return "\n".join([title, *head, *body])
+def _in_short(repeat: int, lines: Sequence[Sequence[str]]) -> str:
+    """Of each sampler how long it took, how far its evidence is off, and the verdict."""
+    told = []
+    for cells in lines:
+        row = dict(zip(COLUMNS, cells, strict=True))
+        bias = "evidence" if row["bias"] == "-" else f"bias {row['bias']},"
+        told.append(f"{row['sampler']} {row['processor time s']} s, {bias} {row['evidence is']}")
+    return f"**N_D = {repeat}**, log evidence {EVIDENCE[repeat]:.2f}: {'; '.join(told)}."
 
 
 def failed_bounds(rows: Sequence[dict[str, Any]]) -> list[str]:
