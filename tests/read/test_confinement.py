@@ -246,8 +246,8 @@ found = str(ctypes.CFUNCTYPE(ctypes.c_int)(address)())
 
 def test_what_unpacks_makes_new_files_in_its_own_folder_and_changes_none(tmp_path: Path) -> None:
     code = """
-from shm.read import packed
-folder = packed._given.get()
+from shm.read import content
+folder = content._given.get()
 (folder / 'made').mkdir()
 with open(folder / 'made' / 'new', 'xb') as file:
     file.write(b'1')
