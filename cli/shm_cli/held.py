@@ -151,7 +151,10 @@ def _withdrawn_words(what: str, withdrawal: Withdrawal) -> str:
     names = ", ".join(test.name for test in withdrawal.hold.tests)
     said = [f"{what}: {names} is discarded and counts in nothing from now on."]
     if withdrawal.watched_again:
-        said.append(f"Later tests that are watched again: {withdrawal.watched_again}.")
+        said.append(
+            f"Later tests that are watched again: {withdrawal.watched_again}; alerts that were "
+            "raised stay raised."
+        )
     if withdrawal.of_baseline:
         said.append(
             f"The baseline was made from {', '.join(withdrawal.of_baseline)} and stays until you "

@@ -350,11 +350,12 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
 
 
 def _shown(hanger: int) -> sa.Select[Any]:
-    counting = sa.select(posterior_tests.c.posterior_id).join(tests).where(counts(tests))
+    refused = (tests.c.hanger == hanger) & (tests.c.stage == Stage.REFUSED) & in_force(tests)
+    of_refused = sa.select(posterior_tests.c.posterior_id).join(tests).where(refused)
     return sa.select(posteriors).where(
         posteriors.c.hanger == hanger,
         posteriors.c.id.not_in(hidden),
-        posteriors.c.id.in_(counting.where(tests.c.hanger == hanger)),
+        posteriors.c.id.not_in(of_refused),
         in_force(posteriors),
     )
 

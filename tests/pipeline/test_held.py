@@ -227,7 +227,9 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         assert [watch.watched.change.called for watch in store.watches(3)] == [False, False]
         assert {drift.test for drift in store.drifts(3)} == {"t1", "t3"}
         assert [test.test.id for test, _ in store.history(3)] == ["t0", "t1", "t3"]
-        assert len(store.posteriors(3)) == 3
+        assert len(store.posteriors(3)) == len(store.trend(counting.bridge.hanger(3))) == 3
+        with pytest.raises(NothingThere):
+            store.posterior(3, "t2")
         recording = store.recording(3)
         assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
         assert check_store(store, quiet).troubles == ()
