@@ -9,8 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 
-from shm.values import Plane
-
 INK = "#1d2330"
 GRID = "#d5d9e0"
 BLUE = "#0072b2"
@@ -30,8 +28,6 @@ PALETTE = {
     "red": RED,
     "quiet": QUIET,
 }
-PLANE_COLOURS: dict[Plane, str] = {"transverse": BLUE, "longitudinal": ORANGE}
-PLANE_MARKERS: dict[Plane, str] = {"transverse": "o", "longitudinal": "s"}
 
 WIDTH_INCHES = 7.4
 _SMALL = 9.0
