@@ -14,7 +14,10 @@ from pathlib import Path
 
 from docs.filling import fill_in, write_csv
 from shm.blind.scoring import opened
-from shm.report import Illustration, Table, trial_figures, trial_page
+from shm.report.figures import Illustration
+from shm.report.table import Table
+from shm.report.trial.figures import trial_figures
+from shm.report.trial.page import trial_page
 from shm.report.trial.summary import misses, summary
 from shm.report.trial.tables import answers, evidence
 from shm.values import TrialScore

@@ -26,9 +26,10 @@ from docs.filling import fill_in, write_csv
 from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
-from shm.report import DiagnosisSheet, diagnosis_text
+from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.sizes import quantity, size
+from shm.report.diagnosis.text import diagnosis_text
 from shm.report.words import probability
 from shm.values import (
     Cause,

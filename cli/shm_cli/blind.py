@@ -211,7 +211,9 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     Example: shm gap blind score trial --html trial.html --gate
     """
     from shm.blind.scoring import opened
-    from shm.report import trial_json, trial_page, trial_text
+    from shm.report.trial.document import trial_json
+    from shm.report.trial.page import trial_page
+    from shm.report.trial.text import trial_text
 
     found = opened(directory, key or key_beside(directory))
     if html is not None:

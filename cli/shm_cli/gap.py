@@ -13,13 +13,11 @@ from shm.gap import GapOptions
 from shm.gap import diagnose as diagnosed
 from shm.pipeline import utc_now
 from shm.pipeline.terms import diagnosis_lineage
-from shm.report import (
-    DiagnosisSheet,
-    diagnosis_figures,
-    diagnosis_json,
-    diagnosis_page,
-    diagnosis_text,
-)
+from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.diagnosis.document import diagnosis_json
+from shm.report.diagnosis.figures import diagnosis_figures
+from shm.report.diagnosis.page import diagnosis_page
+from shm.report.diagnosis.text import diagnosis_text
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion
 from shm_cli.adopt import adopt, adopted, drop

@@ -16,7 +16,10 @@ from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
 from shm.read.apart import read_test
-from shm.report import TestSheet, test_figures, test_page, test_text
+from shm.report.sheet.content import TestSheet
+from shm.report.sheet.figures import test_figures
+from shm.report.sheet.page import test_page
+from shm.report.sheet.text import test_text
 from shm.settings import Settings
 from shm.values import Hanger, Recording
 from shm_cli.common import (

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from shm.errors import NothingThere
 from shm.read import read_test
-from shm.store import StoredTest, Workspace
 from shm.values import (
     Diagnosis,
     FrequencyResponse,
@@ -18,6 +17,9 @@ from shm.values import (
     Recording,
     Selection,
 )
+
+if TYPE_CHECKING:
+    from shm.store import StoredTest
 
 
 class Store:
@@ -35,6 +37,9 @@ class Store:
     """
 
     def __init__(self, workspace: str | Path):
+        # The store's libraries take a second to load, and most notebooks open none.
+        from shm.store import Workspace
+
         self._workspace = Workspace.described(workspace)
         self._store = self._workspace.store()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from shm.gap.contract import Design, Fit
 from shm.gap.problem import GapProblem
@@ -125,7 +125,9 @@ class Change:
 
     def between(self, x_m: FloatArray, fine_m: FloatArray) -> Change:
         """The same at places between those tried, `x_m` (n,)."""
-        deviation, per_size = CubicSpline(x_m, [self.deviation, self.per_size], axis=1)(fine_m)
+        deviation, per_size = scipy.interpolate.CubicSpline(
+            x_m, [self.deviation, self.per_size], axis=1
+        )(fine_m)
         return Change(deviation, per_size, self.largest)
 
 

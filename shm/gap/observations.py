@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
@@ -245,7 +245,9 @@ def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArr
     """
     if len(sd) < _FEWEST:
         return sd, 0.0
-    (own, turn), _ = nnls(np.column_stack([np.ones_like(sd), size**2]) / sd[:, None] ** 2, sd / sd)
+    (own, turn), _ = scipy.optimize.nnls(
+        np.column_stack([np.ones_like(sd), size**2]) / sd[:, None] ** 2, sd / sd
+    )
     if turn * np.max(size**2) <= max(own, least**2):
         return sd, 0.0
     return np.full_like(sd, np.sqrt(max(own, least**2))), float(np.sqrt(turn))

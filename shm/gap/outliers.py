@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+import scipy
 from scipy.special import expit, logsumexp
 
 from shm.gap.attribution import Attribution
@@ -229,7 +229,9 @@ class LeftOut:
     @property
     def log_rest(self) -> FloatArray:
         """Log evidence (nodes, r) of all data but each frequency."""
-        return np.asarray(self.log_all[:, None] - stats.norm.logpdf(self.deviation, scale=self.sd))
+        return np.asarray(
+            self.log_all[:, None] - scipy.stats.norm.logpdf(self.deviation, scale=self.sd)
+        )
 
     @property
     def gross(self) -> FloatArray:
@@ -267,7 +269,7 @@ def log_gross(deviation: FloatArray) -> FloatArray:
 
 def log_ordinary(deviation: FloatArray, sd: FloatArray) -> FloatArray:
     """Log of probability times density of an ordinary error."""
-    return np.asarray(np.log1p(-GROSS_ERROR) + stats.t.logpdf(deviation, FREEDOM, scale=sd))
+    return np.asarray(np.log1p(-GROSS_ERROR) + scipy.stats.t.logpdf(deviation, FREEDOM, scale=sd))
 
 
 def left_out(

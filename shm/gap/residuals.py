@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from shm.gap.contract import Covariance, Design, Fit, Observations
 from shm.gap.likelihood import ShapeErrors
@@ -180,7 +180,7 @@ def predictive_p_value(observations: Observations, fit: Fit, noise: Covariance) 
     ]
     if noise.shape.size:
         distance = ShapeErrors([noise]).squares(residual[:, count:])[:, 0]
-        misfits.append(float(np.mean(stats.chi2.sf(distance, _freedom(observations.design)))))
+        misfits.append(float(np.mean(scipy.stats.chi2.sf(distance, _freedom(observations.design)))))
     return min(1.0, len(misfits) * min(misfits))
 
 
@@ -194,7 +194,7 @@ def _p_value(residual: FloatArray, covariance: FloatArray, means: FloatArray) ->
     """The mean p-value of `means` (m, F) of residuals (draws, F) whose covariance is (F, F)."""
     lower = np.linalg.cholesky(means @ covariance @ means.T)
     whitened = np.linalg.solve(lower, means @ residual.T)
-    return float(np.mean(stats.chi2.sf(np.sum(whitened**2, axis=0), len(means))))
+    return float(np.mean(scipy.stats.chi2.sf(np.sum(whitened**2, axis=0), len(means))))
 
 
 def _freedom(design: Design) -> int:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from scipy.special import logsumexp
-from scipy.stats import qmc
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import DEVIATIONS, Coordinates, is_place
@@ -240,7 +240,7 @@ def _spread(parameters: int, count: int) -> FloatArray:
     """Shares (count, parameters) evenly over the unit cube."""
     if parameters == 1:
         return ((np.arange(count) + 0.5) / count)[:, None]
-    points = qmc.Sobol(parameters, scramble=False).random(count)
+    points = scipy.stats.qmc.Sobol(parameters, scramble=False).random(count)
     return np.asarray(points + 0.5 / count)
 
 

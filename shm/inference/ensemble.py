@@ -18,8 +18,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from emcee import EnsembleSampler
-from emcee.moves import DEMove, KDEMove
 
 from shm.errors import UsageError
 from shm.inference.importance import Weighted, weigh
@@ -187,6 +185,10 @@ def _ensemble(
     problem: Problem, weighted: Weighted, population: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
     """Points (n, d) of the posterior by emcee, started from the best draws and the population."""
+    # Its moves load all of scipy.stats, and most posteriors need none of them.
+    from emcee import EnsembleSampler
+    from emcee.moves import DEMove, KDEMove
+
     lots = weighted.log_weights + rng.gumbel(size=len(weighted.log_weights))
     drawn = weighted.points.z[np.argsort(-lots)[: _WALKERS - _WALKERS // 2]]
     chosen = rng.permutation(len(population))[: _WALKERS // 2]

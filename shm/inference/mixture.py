@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
-from scipy.cluster.vq import kmeans2
+import scipy
 from scipy.special import gammaln, logsumexp
 
 from shm.values import FloatArray
@@ -72,7 +72,9 @@ class TMixture:
         with warnings.catch_warnings():
             # A cluster that loses its points is left out below.
             warnings.filterwarnings("ignore", "One of the clusters is empty")
-            label = kmeans2(whole.whiten(population), clusters, minit="++", rng=rng)[1]
+            label = scipy.cluster.vq.kmeans2(
+                whole.whiten(population), clusters, minit="++", rng=rng
+            )[1]
         members = [population[label == k] for k in range(clusters) if np.sum(label == k) > 2]
         shares = np.array([len(cluster) for cluster in members], dtype=float)
         return cls([_shrunk(cluster, whole) for cluster in members], shares)

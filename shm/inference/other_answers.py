@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
-from scipy.optimize import least_squares
+import scipy
 
 from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
@@ -171,7 +170,7 @@ def reading_off_sd(log_tension: FloatArray, reading: TensionReading, nominal_n: 
     tails of rare ends are long, and would make any reading fit.
     """
     low, middle, high = np.quantile(log_tension, [0.25, 0.5, 0.75])
-    sd = (high - low) / (2 * stats.norm.ppf(0.75))
+    sd = (high - low) / (2 * scipy.stats.norm.ppf(0.75))
     return float(abs(math.log(reading.tension_n / nominal_n) - middle) / math.hypot(sd, reading.sd))
 
 
@@ -246,5 +245,7 @@ def fitted(
         found = scaled(np.vstack([point, point + np.diag(steps)]))
         return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
 
-    fit = least_squares(one, start, slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS)
+    fit = scipy.optimize.least_squares(
+        one, start, slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS
+    )
     return np.asarray(fit.x)

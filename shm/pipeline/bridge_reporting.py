@@ -11,8 +11,8 @@ from datetime import datetime
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.origins import settings_words, software
-from shm.report import Interval
 from shm.report.bridge.content import BridgeReport, Course, HangerLine
+from shm.report.content import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
 from shm.report.summary import status_of

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from shm.simulate.elements import modes_below, plane_modes
 from shm.simulate.logger import Line, logged
@@ -111,4 +111,4 @@ def _steady_state(exponent: complex, samples: int, rng: np.random.Generator) -> 
     real, imaginary = np.linalg.cholesky(covariance) @ rng.standard_normal(2)
     first = factor * (real + 1j * imaginary)
     impulses = rng.standard_normal(samples).astype(complex)
-    return np.asarray(lfilter([1.0], [1.0, -factor], impulses, zi=[first])[0], complex)
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -factor], impulses, zi=[first])[0], complex)

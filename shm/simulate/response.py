@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from shm.simulate.elements import PlaneModes
 from shm.simulate.strikes import Pulse, samples_of
@@ -130,7 +130,9 @@ def state_of(
         room = max(0, len(added) - begin)
         added[begin : begin + len(share)] += share[:room]
     factor = np.exp(pole / sampling_rate_hz)
-    return np.asarray(lfilter([1.0], [1.0, -factor], added, zi=[factor * carried])[0], complex)
+    return np.asarray(
+        scipy.signal.lfilter([1.0], [1.0, -factor], added, zi=[factor * carried])[0], complex
+    )
 
 
 def _pushed(modes: PlaneModes, plane: Plane, pulse: Pulse) -> FloatArray:

@@ -11,7 +11,7 @@ from functools import cache
 from typing import cast
 
 import numpy as np
-from scipy.signal import firwin, kaiserord
+import scipy
 
 from shm.simulate.state import HammerPlan
 from shm.values import NAN, FloatArray, Hanger, IntArray, Plane
@@ -131,7 +131,7 @@ def _steps(samples: float) -> int:
 @cache
 def _filter(steps: int) -> FloatArray:
     """Linear-phase low-pass of the logger: flat to 0.4, closed from 0.5 of the sampling rate."""
-    count, beta = kaiserord(_STOP_BAND_DB, (_STOP - _PASS) * 2 / steps)
+    count, beta = scipy.signal.kaiserord(_STOP_BAND_DB, (_STOP - _PASS) * 2 / steps)
     half = math.ceil(count / (2 * steps)) * steps
     cutoff = (_PASS + _STOP) / steps
-    return cast(FloatArray, firwin(2 * half + 1, cutoff, window=("kaiser", beta)))
+    return cast(FloatArray, scipy.signal.firwin(2 * half + 1, cutoff, window=("kaiser", beta)))

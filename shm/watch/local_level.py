@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 from statsmodels.tsa.statespace.kalman_smoother import SmootherResults
 from statsmodels.tsa.statespace.mlemodel import MLEModel
 
@@ -100,7 +100,7 @@ class LocalLevels(MLEModel):  # type: ignore[misc]
 
     def fitted(self) -> FloatArray:
         """z (2 q,) of the largest posterior density: the likelihood times the weak prior."""
-        found = minimize(
+        found = scipy.optimize.minimize(
             self.misfit,
             self.start_params,
             method="L-BFGS-B",

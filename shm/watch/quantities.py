@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from shm.errors import UsageError
 from shm.models import MODELS, AdoptedName, Model, class_of, is_adopted
@@ -274,7 +274,7 @@ def _refined(log10_k: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatAr
     share = np.arange(_FINER) / _FINER
     between = (log10_k[:-1, None] + np.diff(log10_k)[:, None] * share).ravel()
     fine = np.append(between, log10_k[-1])
-    return fine, np.asarray(PchipInterpolator(log10_k, mean)(fine))
+    return fine, np.asarray(scipy.interpolate.PchipInterpolator(log10_k, mean)(fine))
 
 
 def _springs(model: Model) -> list[str]:

@@ -134,6 +134,19 @@ def test_importing_loads_nothing_and_takes_little() -> None:
     assert float(took) < 0.1
 
 
+def test_the_steps_are_at_hand_without_the_libraries_that_take_long_to_load() -> None:
+    code = (
+        "import sys, shm; "
+        "shm.read, shm.identify, shm.update, shm.select, shm.diagnose, shm.simulate, shm.Store\n"
+        "print(*sys.modules)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    slow = {"scipy.stats", "scipy.signal", "scipy.optimize", "sqlalchemy", "matplotlib", "emcee"}
+    assert not slow & set(ran.stdout.split())
+
+
 def test_a_step_can_be_called_after_its_package_was_imported() -> None:
     code = "import shm.read, shm\ntry: shm.read('none.csv')\nexcept shm.ShmError as e: print(e)"
     ran = subprocess.run(

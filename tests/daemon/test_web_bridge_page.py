@@ -13,8 +13,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.report import Interval, Status
 from shm.report.bridge.content import HangerLine
+from shm.report.content import Interval
+from shm.report.summary import Status
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from shm import documents, report
-from shm.report import BridgeReport, HangerReport, Interval
-from shm.report.bridge.content import Course, HangerLine
-from shm.report.content import TrendRow
+from shm.report.bridge.content import BridgeReport, Course, HangerLine
+from shm.report.content import HangerReport, Interval, TrendRow
 from shm.report.period import Period
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.report.summary import Status

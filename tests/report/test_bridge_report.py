@@ -8,9 +8,12 @@ from datetime import UTC, datetime
 
 import pytest
 
-from shm.report import BridgeReport, HangerReport, Interval, bridge_json, bridge_page, bridge_text
-from shm.report.bridge.content import HangerLine
+from shm.report.bridge.content import BridgeReport, HangerLine
+from shm.report.bridge.document import bridge_json
+from shm.report.bridge.page import bridge_page
 from shm.report.bridge.tables import bar
+from shm.report.bridge.text import bridge_text
+from shm.report.content import HangerReport, Interval
 from shm.report.summary import Status, summary
 from shm.report.tables import neighbours
 from shm.values import Hanger

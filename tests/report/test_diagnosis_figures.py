@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from shm import report
-from shm.report import DiagnosisSheet, Illustration
+from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.figures import Illustration
 from shm.report.figures.style import PALETTE
 from shm.values import TensionEstimate
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, STRING, STRING_HANGER, sheet

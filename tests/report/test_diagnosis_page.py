@@ -10,7 +10,8 @@ from itertools import pairwise
 import pytest
 
 from shm import documents, report
-from shm.report import DiagnosisSheet, HangerReport
+from shm.report.content import HangerReport
+from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.page import in_words
 from shm.values import TensionEstimate
 from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet

@@ -13,7 +13,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from shm.report import HangerReport, Illustration, illustrations
+from shm.report.content import HangerReport
+from shm.report.figures import Illustration, illustrations
 from shm.report.figures.style import PALETTE
 from shm.values import FrequencyResponse
 
@@ -201,5 +202,8 @@ def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -
 
 
 def test_reports_do_without_pyplot_and_its_global_figures() -> None:
-    asked = "import sys, shm.report; sys.exit('matplotlib.pyplot' in sys.modules)"
+    asked = (
+        "import sys, shm.report.figures, shm.report.paper.pdf; "
+        "sys.exit('matplotlib.pyplot' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

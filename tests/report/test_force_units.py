@@ -11,26 +11,22 @@ import numpy as np
 import pytest
 
 from shm import notebook
-from shm.report import (
-    BridgeReport,
-    DiagnosisSheet,
-    HangerReport,
-    Interval,
-    bridge_text,
-    diagnosis_text,
-    html,
-    illustrations,
-    json,
-    text,
-)
-from shm.report.bridge.content import HangerLine
+from shm.report.bridge.content import BridgeReport, HangerLine
+from shm.report.bridge.text import bridge_text
+from shm.report.content import HangerReport, Interval
+from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
+from shm.report.diagnosis.text import diagnosis_text
+from shm.report.document import json
+from shm.report.figures import illustrations
 from shm.report.figures.bridge_shift import bridge_illustration
 from shm.report.figures.drift import STATES
+from shm.report.page import html
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.report.summary import Status
 from shm.report.tables import history, models, tension
+from shm.report.text import text
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.force_units import force_unit
 from shm.watch.history import Band

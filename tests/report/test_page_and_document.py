@@ -10,7 +10,10 @@ from itertools import pairwise
 import pytest
 
 from shm import documents
-from shm.report import HangerReport, html, json, text
+from shm.report.content import HangerReport
+from shm.report.document import json
+from shm.report.page import html
+from shm.report.text import text
 from shm.values import QualityCheck
 from tests.report.outline import Outline
 

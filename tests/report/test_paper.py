@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shm import report
-from shm.report import HangerReport
+from shm.report.content import HangerReport
 from shm.report.paper import setting
 from shm.report.paper.hanger import hanger_paper
 from shm.report.paper.setting import WIDTH

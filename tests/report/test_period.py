@@ -8,12 +8,14 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from shm.errors import UsageError
-from shm.report import HangerReport, html, json, text
-from shm.report.content import Interval
+from shm.report.content import HangerReport, Interval
+from shm.report.document import json
+from shm.report.page import html
 from shm.report.period import Period, period_since
 from shm.report.summary import in_period, summary
 from shm.report.tables import period as period_table
 from shm.report.tables import tables
+from shm.report.text import text
 from tests.report.conftest import START
 
 NOW = datetime(2026, 9, 10, 12, tzinfo=UTC)

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from shm.report import HangerReport, Table, text
-from shm.report.table import laid_out
+from shm.report.content import HangerReport
+from shm.report.table import Table, laid_out
 from shm.report.tables import frequencies, tables
+from shm.report.text import text
 from shm.values import Mode, PredictedFrequency
 
 WHOLE = [

@@ -8,9 +8,11 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from shm.report import HangerReport, json, text
+from shm.report.content import HangerReport
+from shm.report.document import json
 from shm.report.states import StatesOverTime
 from shm.report.temperatures import temperature_documents, temperature_table
+from shm.report.text import text
 from shm.values import FloatArray, TemperatureCoefficient
 
 TENSION = TemperatureCoefficient("tension", -0.0012, 0.0003, 0.004)

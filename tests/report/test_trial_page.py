@@ -12,7 +12,7 @@ import pytest
 
 from shm import documents, report
 from shm.blind.scoring import trial_score
-from shm.report import Illustration
+from shm.report.figures import Illustration
 from shm.values import TrialScore
 from tests.helpers.trial_answers import a_truth, an_answer, oracle, plausible, some_truths
 from tests.report.outline import Outline

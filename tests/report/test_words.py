@@ -6,7 +6,8 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from shm.report import Interval, words
+from shm.report import words
+from shm.report.content import Interval
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from shm.report import Interval, words
+from shm.report import words
+from shm.report.content import Interval
 from shm.store import TestRow, TrendPoint
 from shm.values.force_units import ForceUnit
 from shm_daemon.web.address_of_test import test_page

@@ -19,7 +19,7 @@ from shm.errors import NothingThere
 from shm.identify import Identification, Poles
 from shm.pipeline.reporting import test_sheet
 from shm.pipeline.terms import identify_lineage
-from shm.report import TestSheet
+from shm.report.sheet.content import TestSheet
 from shm.report.sheet.spectra import Shown, Spectrum
 from shm.report.sheet.summary import advice, summary, trust
 from shm.report.sheet.tables import conditions, dropped, hits

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta, bootstrap
+import scipy
 
 from shm.values import NAN, FloatArray, Score
 
@@ -40,7 +40,7 @@ def resampled(statistic: Callable[..., FloatArray]) -> Estimator:
         value = float(statistic(*samples, axis=-1)) if cases else NAN
         if cases < 2:
             return Estimate(Score(value, cases=cases), np.array([value]))
-        found = bootstrap(
+        found = scipy.stats.bootstrap(
             samples,
             statistic,
             n_resamples=_RESAMPLES,
@@ -81,7 +81,9 @@ def share(samples: Samples, rng: np.random.Generator) -> Estimate:
     if len(flags) == 0 or np.ptp(flags) > 0:
         return found
     hits = float(flags.sum())
-    low, high = (float(beta.ppf(end, hits + 0.5, len(flags) - hits + 0.5)) for end in ENDS)
+    low, high = (
+        float(scipy.stats.beta.ppf(end, hits + 0.5, len(flags) - hits + 0.5)) for end in ENDS
+    )
     ends = (low, 1.0) if hits else (0.0, high)
     return Estimate(Score(found.score.value, *ends, len(flags)), found.draws)
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from shm.identify.contract import Dropped, Poles
 from shm.identify.finding.poles import (
@@ -203,7 +203,7 @@ def _extended(tracks: list[list[Pole]], poles: list[Pole]) -> list[list[Pole]]:
         return tracks + [[pole] for pole in poles]
     cost = mismatch([track[-1] for track in tracks], poles)
     taken = set()
-    for row, column in zip(*linear_sum_assignment(cost), strict=True):
+    for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
         if cost[row, column] < _FAR:
             tracks[row].append(poles[column])
             taken.add(column)
@@ -234,7 +234,7 @@ def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
         return [None] * len(known)
     cost = mismatch(known, candidates, 2 * FREQUENCY_TOLERANCE, 2 * SHAPE_TOLERANCE)
     best: list[Pole | None] = [None] * len(known)
-    for row, column in zip(*linear_sum_assignment(cost), strict=True):
+    for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
         if cost[row, column] < _FAR:
             best[row] = candidates[column]
     return best

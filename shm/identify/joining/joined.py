@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
@@ -275,7 +275,7 @@ def _take_in(groups: list[list[Seen]], modes: Sequence[Seen]) -> None:
     cost = cost.reshape(len(modes), len(groups))
     joined = {
         int(row): int(column)
-        for row, column in zip(*linear_sum_assignment(cost), strict=True)
+        for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True)
         if cost[row, column] < _NEVER
     }
     for row, mode in enumerate(modes):

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from scipy.fft import next_fast_len, rfft
-from scipy.signal import firwin, upfirdn
 
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
@@ -199,7 +199,7 @@ def band_limited(
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
     if factor < 2:
         return signals, sampling_rate_hz
-    taps = firwin(2 * reach + 1, 1 / factor, window=("kaiser", _KAISER_BETA))
-    filtered = np.asarray(upfirdn(taps, signals, down=factor, axis=-1))
+    taps = scipy.signal.firwin(2 * reach + 1, 1 / factor, window=("kaiser", _KAISER_BETA))
+    filtered = np.asarray(scipy.signal.upfirdn(taps, signals, down=factor, axis=-1))
     last = (signals.shape[-1] - 1) // factor
     return filtered[..., 2 * _HALF_LENGTH : last + 1], sampling_rate_hz / factor

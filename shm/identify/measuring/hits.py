@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
+import scipy
 
 from shm.values import FloatArray
 
@@ -63,7 +63,7 @@ def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
     push, noise = _push(force, sampling_rate_hz)
     level = max(HIT_SIGMAS * noise, LEAST_SHARE_OF_HARDEST * float(push.max(initial=0.0)))
     # A pulse may begin with the record: a zero on either side makes its edge a peak.
-    peaks = find_peaks(np.concatenate(([0.0], push, [0.0])), height=level)[0]
+    peaks = scipy.signal.find_peaks(np.concatenate(([0.0], push, [0.0])), height=level)[0]
     if not len(peaks):
         return []
     groups = _grouped((peaks - 1).tolist(), int(GROUP_SECONDS * sampling_rate_hz))

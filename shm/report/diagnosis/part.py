@@ -17,6 +17,7 @@ def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
 
 
 def how_to_diagnose(data: HangerReport) -> str:
+    """What to do where no diagnosis was made."""
     return (
         "The gap between model and measurement has not been diagnosed. To learn where it lies, "
         "what causes it and what that does to the tension: "

@@ -44,6 +44,7 @@ def headline(sheet: DiagnosisSheet) -> str:
 
 
 def name(sheet: DiagnosisSheet) -> str:
+    """`Gap diagnosis, Hanger 3`."""
     return f"Gap diagnosis, {words.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
 
 

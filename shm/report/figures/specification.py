@@ -46,6 +46,8 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line(Mark):
+    """A line through points; with `dots`, these too."""
+
     x: Values
     y: Values
     width: float = 1.0

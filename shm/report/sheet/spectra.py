@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import welch
+import scipy
 
 from shm.report.sheet.content import TestSheet
 from shm.values import FloatArray, Mode, Recording, ResponsePoint
@@ -83,7 +83,9 @@ def _welch(record: Recording, segment: int) -> tuple[FloatArray, FloatArray]:
     known = np.isfinite(signals)
     # A gap counts as rest: it lowers the level a little and hides no peak.
     rest = np.nan_to_num(signals - np.mean(signals, axis=1, where=known, keepdims=True))
-    frequency_hz, values = welch(rest, record.sampling_rate_hz, nperseg=segment, axis=1)
+    frequency_hz, values = scipy.signal.welch(
+        rest, record.sampling_rate_hz, nperseg=segment, axis=1
+    )
     return frequency_hz, values
 
 

@@ -26,6 +26,7 @@ def headline(sheet: TestSheet) -> str:
 
 
 def name(sheet: TestSheet) -> str:
+    """`Test t7, Hanger 3`, as far as it is known."""
     test = sheet.identification.test
     if sheet.hanger is not None:
         return f"Test {test.id}, {words.hanger_name(sheet.hanger.id, sheet.hanger.name)}"

@@ -73,6 +73,7 @@ def set_aside(sheet: TestSheet) -> Table:
 
 
 def dropped(sheet: TestSheet) -> Table:
+    """What the identification left out of the records, and why."""
     return Table(
         "Left out",
         ("what", "how many", "why"),
@@ -81,6 +82,7 @@ def dropped(sheet: TestSheet) -> Table:
 
 
 def hits(sheet: TestSheet) -> Table:
+    """Each hit with its time in s and peak force in N, and whether it was used."""
     records = sheet.recordings
     return Table(
         "Hits",
@@ -105,6 +107,7 @@ def notes(sheet: TestSheet) -> Table:
 
 
 def conditions(sheet: TestSheet) -> Table:
+    """Which test it is, and what was noted with it."""
     test = sheet.identification.test
     facts = {
         "test": test.id,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from shm.report import HangerReport, words
+from shm.report import words
+from shm.report.content import HangerReport
 from shm.report.diagnosis.figures.causes import Bar, probability_bars
 from shm.report.figures.frequencies import FIGURE as OF_REPORT
 from shm.report.figures.frequencies import compared_modes

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.report import Interval, words
+from shm.report import words
+from shm.report.content import Interval
 from shm.report.figures import stiffness, trend
 from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked

@@ -9,12 +9,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from shm.report import HangerReport, Table, status, summary, words
 from shm.report import tables as report_tables
+from shm.report import words
+from shm.report.content import HangerReport
 from shm.report.diagnosis.page import in_words
 from shm.report.diagnosis.part import how_to_diagnose
 from shm.report.facts import facts
 from shm.report.states import called_words
+from shm.report.summary import status, summary
+from shm.report.table import Table
 from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
