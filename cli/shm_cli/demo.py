@@ -20,7 +20,6 @@ import numpy as np
 import rich_click as click
 from rich.progress import Progress
 
-from shm import report
 from shm.documents import dump
 from shm.errors import ShmError, UsageError
 from shm.modes_document import load_modes, modes_document
@@ -28,6 +27,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.reporting import hanger_report
 from shm.read import write
 from shm.read.atomic import replace_text
+from shm.report.page import html
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.values import Hanger, Posterior
@@ -273,6 +273,6 @@ def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
         for hanger_id in (MEASURED, LOSING):
             content = hanger_report(workspace, store, hanger_id, utc_now())
             path = workspace.folder / f"hanger{hanger_id}.html"
-            path.write_text(report.html(content), encoding="utf-8")
+            path.write_text(html(content), encoding="utf-8")
             click.echo(f"Report of hanger {hanger_id}: {path}")
     click.echo(f"Look around: shm --workspace {workspace.folder} status")

@@ -12,36 +12,64 @@ from typing import Any
 
 import rich_click as click
 
-from shm import report
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
+from shm.report.bridge.document import bridge_json
+from shm.report.bridge.text import bridge_text
+from shm.report.document import json
+from shm.report.paper import bridge_pdf, pdf
+from shm.report.paper import test_pdf as report_test_pdf
 from shm.report.period import Period, period_since
+from shm.report.sheet.document import test_json as report_test_json
+from shm.report.sheet.text import test_text as report_test_text
+from shm.report.text import text
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 from shm_cli.writable import NewFile
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 _DRAWN = ("html", "pdf")
 _Writers = dict[str, Callable[[Any], str | bytes]]
+
+
+# Pages draw figures: what that takes is loaded where one is asked for.
+def _hanger_page(content: Any) -> str:
+    from shm.report.page import html
+
+    return html(content)
+
+
+def _bridge_page(content: Any) -> str:
+    from shm.report.bridge.page import bridge_page
+
+    return bridge_page(content)
+
+
+def _test_page(sheet: Any) -> str:
+    from shm.report.sheet.page import test_page
+
+    return test_page(sheet)
+
+
 _OF_HANGER: _Writers = {
-    "text": lambda content: report.text(content, readable_width()),
-    "html": report.html,
-    "pdf": report.pdf,
-    "json": lambda content: dump(report.json(content)),
+    "text": lambda content: text(content, readable_width()),
+    "html": _hanger_page,
+    "pdf": pdf,
+    "json": lambda content: dump(json(content)),
 }
 _OF_BRIDGE: _Writers = {
-    "text": lambda content: report.bridge_text(content, readable_width()),
-    "html": report.bridge_page,
-    "pdf": report.bridge_pdf,
-    "json": lambda content: dump(report.bridge_json(content)),
+    "text": lambda content: bridge_text(content, readable_width()),
+    "html": _bridge_page,
+    "pdf": bridge_pdf,
+    "json": lambda content: dump(bridge_json(content)),
 }
 _OF_TEST: _Writers = {
-    "text": lambda sheet: report.test_text(sheet, readable_width()),
-    "html": report.test_page,
-    "pdf": report.test_pdf,
-    "json": lambda sheet: dump(report.test_json(sheet)),
+    "text": lambda sheet: report_test_text(sheet, readable_width()),
+    "html": _test_page,
+    "pdf": report_test_pdf,
+    "json": lambda sheet: dump(report_test_json(sheet)),
 }
 
 

@@ -9,7 +9,9 @@ import sys
 import time
 from dataclasses import replace
 
-from shm import report
+from shm.report.sheet.content import TestSheet
+from shm.report.sheet.figures import test_figures as report_test_figures
+from shm.report.sheet.page import test_page as report_test_page
 from tests.report.sheets import make_points, make_recording, make_sheet, warned
 
 PLACES_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
@@ -19,7 +21,7 @@ MOST_SECONDS = 5.0
 MOST_BYTES = 2_000_000
 
 
-def large_sheet() -> report.TestSheet:
+def large_sheet() -> TestSheet:
     sheet = warned(make_sheet(places_m=PLACES_M, orders=12))
     record = make_recording(sheet.modes, make_points(PLACES_M), 5, SLOT_S, RATE_HZ)
     starts_s = [number * SLOT_S + 0.5 for number in range(5)]
@@ -35,9 +37,9 @@ def large_sheet() -> report.TestSheet:
 def main() -> int:
     sheet = large_sheet()
     begin = time.process_time()
-    figures = [item.svg() for item in report.test_figures(sheet)]
+    figures = [item.svg() for item in report_test_figures(sheet)]
     drawn = time.process_time()
-    page = report.test_page(sheet)
+    page = report_test_page(sheet)
     done = time.process_time()
     size = len(page.encode())
     print(f"{'figures, SVG':20} {drawn - begin:8.2f} s   {sum(map(len, figures)) / 1e6:6.2f} MB")

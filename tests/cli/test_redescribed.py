@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from shm import report
 from shm.pipeline.redescribed import MOVES_NOTHING, redescribed
 from shm.pipeline.reporting import hanger_report
+from shm.report.document import json
+from shm.report.page import html
+from shm.report.text import text
 from shm.store import Workspace
 from shm.values import Hanger
 from tests.cli.conftest import Shm
@@ -49,12 +51,12 @@ def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_ba
         workspace = rewritten(before, "length_m = 12.0", "length_m = 12.4")
         data = hanger_report(workspace, store, 3, START)
     assert data.redescribed == ("length_m from 12 to 12.4",)
-    lines = report.text(data).splitlines()
+    lines = text(data).splitlines()
     first = " ".join(lines[:8])
     assert "description of hanger 3 has changed since its baseline" in first
     assert "shm drift rebaseline --hanger 3" in first
-    assert "has changed since its baseline" in report.html(data)
-    assert report.json(data)["redescribed"] == ["length_m from 12 to 12.4"]
+    assert "has changed since its baseline" in html(data)
+    assert json(data)["redescribed"] == ["length_m from 12 to 12.4"]
     told = shm("--workspace", workspace.folder, "doctor").out
     assert "described otherwise since the baseline: 3" in told
     command = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}")

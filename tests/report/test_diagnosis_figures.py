@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm import report
 from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.figures import Illustration
 from shm.report.figures.style import PALETTE
 from shm.values import TensionEstimate
@@ -21,9 +21,7 @@ ALL = ["causes", "gap_map", "before_and_after", "gap_tension"]
 
 @pytest.fixture(scope="module")
 def drawn() -> dict[str, dict[str, Illustration]]:
-    return {
-        case: {item.name: item for item in report.diagnosis_figures(sheet(case))} for case in CASES
-    }
+    return {case: {item.name: item for item in diagnosis_figures(sheet(case))} for case in CASES}
 
 
 @pytest.mark.parametrize(
@@ -106,7 +104,7 @@ def test_the_map_names_place_and_units(drawn: dict[str, dict[str, Illustration]]
 def test_one_plane_gets_one_panel() -> None:
     one = tuple(r for r in LED.where if r.plane == "transverse")
     alone = replace(LED, where=one, places=(), trends=())
-    items = report.diagnosis_figures(DiagnosisSheet(alone, HANGER))
+    items = diagnosis_figures(DiagnosisSheet(alone, HANGER))
     assert len(next(i for i in items if i.name == "gap_map").figure.axes) == 1
 
 
@@ -117,7 +115,7 @@ def test_before_and_after_shows_held_out_modes_apart(
     labels = [series.get_label() for series in upper.containers]
     assert labels == ["baseline", "with the cause", "with the cause, held out"]
     unheld = tuple(replace(r, held_out_after_percent=float("nan")) for r in LED.where)
-    item = report.diagnosis_figures(DiagnosisSheet(replace(LED, where=unheld), HANGER))[2]
+    item = diagnosis_figures(DiagnosisSheet(replace(LED, where=unheld), HANGER))[2]
     assert "Nothing was held out" in item.caption
     assert len(item.figure.axes[0].containers) == 2
 
@@ -129,7 +127,7 @@ def test_tensions_are_drawn_in_kilonewtons(drawn: dict[str, dict[str, Illustrati
 
 
 def test_tensions_below_one_kilonewton_are_drawn_in_newtons() -> None:
-    item = report.diagnosis_figures(DiagnosisSheet(STRING, STRING_HANGER))[-1]
+    item = diagnosis_figures(DiagnosisSheet(STRING, STRING_HANGER))[-1]
     (axes,) = item.figure.axes
     points = [line for line in axes.lines if line.get_marker() == "o"]
     assert [float(np.asarray(p.get_xdata())[0]) for p in points] == pytest.approx([38.34, 41.04])
@@ -149,7 +147,7 @@ def test_a_nominal_tension_far_away_does_not_squeeze_the_intervals() -> None:
         tension_before_n=TensionEstimate(731.4e3, 20.0, 731.36e3, 731.44e3),
         tension_after_n=TensionEstimate(731.5e3, 20.0, 731.46e3, 731.54e3),
     )
-    item = report.diagnosis_figures(DiagnosisSheet(sharp, HANGER))[-1]
+    item = diagnosis_figures(DiagnosisSheet(sharp, HANGER))[-1]
     low, high = item.figure.axes[0].get_xlim()
     assert high - low < 1.0
 
@@ -173,7 +171,7 @@ def test_twenty_tests_and_long_names_leave_the_axes_their_room() -> None:
     long = replace(ALIKE.causes[0], effect="translational_end_flexibility + skewed_principal_axes",
                    at="deck end, longitudinal + both ends", group=None)  # fmt: skip
     for diagnosis in (many, replace(LED, causes=(long,))):
-        for item in report.diagnosis_figures(DiagnosisSheet(diagnosis, HANGER)):
+        for item in diagnosis_figures(DiagnosisSheet(diagnosis, HANGER)):
             item.figure.draw_without_rendering()
             for axes in item.figure.axes:
                 assert axes.get_position().width > 0.2, item.name
@@ -194,7 +192,7 @@ def test_no_word_of_a_figure_is_cut_off(
 
 def test_the_words_of_a_bracket_and_the_column_of_bayes_factors_keep_apart() -> None:
     sure = (replace(ALIKE.causes[0], probability=0.95), replace(ALIKE.causes[1], probability=0.04))
-    figure = report.diagnosis_figures(DiagnosisSheet(replace(ALIKE, causes=sure), HANGER))[0].figure
+    figure = diagnosis_figures(DiagnosisSheet(replace(ALIKE, causes=sure), HANGER))[0].figure
     figure.draw_without_rendering()
     (axes,) = figure.axes
     boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}

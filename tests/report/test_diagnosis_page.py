@@ -9,10 +9,15 @@ from itertools import pairwise
 
 import pytest
 
-from shm import documents, report
+from shm import documents
 from shm.report.content import HangerReport
 from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.page import in_words
+from shm.report.diagnosis.document import diagnosis_json
+from shm.report.diagnosis.page import diagnosis_page, in_words
+from shm.report.diagnosis.text import diagnosis_text
+from shm.report.document import json as report_json
+from shm.report.page import html
+from shm.report.text import text as report_text
 from shm.values import TensionEstimate
 from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet
 from tests.report.outline import Outline
@@ -22,7 +27,7 @@ PAGES = ("led", "alike", "nothing known")
 
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
-    return {name: report.diagnosis_page(sheet(name)) for name in PAGES}
+    return {name: diagnosis_page(sheet(name)) for name in PAGES}
 
 
 def parsed(page: str) -> Outline:
@@ -77,21 +82,21 @@ def test_the_page_tells_what_these_data_cannot_show_and_why(pages: dict[str, str
 def test_words_from_outside_cannot_inject_markup() -> None:
     sly = "<script>alert(1)</script>"
     remarked = replace(CASES["nothing known"], remarks=(sly,))
-    page = report.diagnosis_page(DiagnosisSheet(remarked, HANGER, bridge=sly))
+    page = diagnosis_page(DiagnosisSheet(remarked, HANGER, bridge=sly))
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_texts_fit_a_terminal(name: str) -> None:
-    text = report.diagnosis_text(sheet(name))
+    text = diagnosis_text(sheet(name))
     assert max(len(line) for line in text.splitlines()) <= 100
     assert len(text.splitlines()) <= 100
     assert not re.search(r"\b(nan|inf|None(?! of))\b", text)
 
 
 def test_a_shortened_table_of_causes_keeps_no_gap_and_something_else() -> None:
-    text = report.diagnosis_text(sheet("led"))
+    text = diagnosis_text(sheet("led"))
     table = text[text.index("CAUSES") : text.index("SIZES")]
     assert "no gap" in table
     assert "something not in" in table
@@ -100,7 +105,7 @@ def test_a_shortened_table_of_causes_keeps_no_gap_and_something_else() -> None:
 
 def test_tensions_below_one_kilonewton_are_told_in_newtons_everywhere() -> None:
     small = DiagnosisSheet(STRING, STRING_HANGER)
-    text = report.diagnosis_text(small)
+    text = diagnosis_text(small)
     words = " ".join(text.split())
     assert (
         "the tension is 41.0 N (90 % interval 35.9 to 45.7 N); the baseline beam1 alone gives"
@@ -108,7 +113,7 @@ def test_tensions_below_one_kilonewton_are_told_in_newtons_everywhere() -> None:
     )
     assert "mean, N" in text
     assert "kN" not in text[text.index("\nTENSION") : text.index("\nWHAT WOULD TELL")]
-    assert "41 N" in told(parsed(report.diagnosis_page(small)))
+    assert "41 N" in told(parsed(diagnosis_page(small)))
 
 
 def test_both_tensions_are_told_in_kilonewtons_where_one_reaches_it() -> None:
@@ -117,19 +122,19 @@ def test_both_tensions_are_told_in_kilonewtons_where_one_reaches_it() -> None:
         tension_before_n=TensionEstimate(960.0, 30.0, 910.0, 1010.0),
         tension_after_n=TensionEstimate(1100.0, 40.0, 1030.0, 1170.0),
     )
-    text = " ".join(report.diagnosis_text(DiagnosisSheet(mixed, STRING_HANGER)).split())
+    text = " ".join(diagnosis_text(DiagnosisSheet(mixed, STRING_HANGER)).split())
     assert "the tension is 1.100 kN (90 % interval 1.030 to 1.170 kN)" in text
     assert "alone gives 0.960 kN (90 % interval 0.910 to 1.010 kN)" in text
 
 
 def test_causes_that_cannot_be_told_apart_share_a_letter() -> None:
-    text = report.diagnosis_text(sheet("alike"))
+    text = diagnosis_text(sheet("alike"))
     marked = [line for line in text.splitlines() if re.search(r"0\.\d{3} +A ", line)]
     assert len(marked) == 3
 
 
 def test_the_document_holds_the_contract_and_the_answer_in_words() -> None:
-    document = json.loads(documents.dump(report.diagnosis_json(sheet("led"))))
+    document = json.loads(documents.dump(diagnosis_json(sheet("led"))))
     assert document["answer"] == "explained"
     assert document["summary"].startswith("The gap is explained by a point mass of 12 kg")
     assert document["causes"][0]["effect"] == "point_mass"
@@ -137,29 +142,29 @@ def test_the_document_holds_the_contract_and_the_answer_in_words() -> None:
 
 
 def test_a_report_without_diagnosis_says_how_to_make_one(bare: HangerReport) -> None:
-    for written in (told(parsed(report.html(bare))), " ".join(report.text(bare).split())):
+    for written in (told(parsed(html(bare))), " ".join(report_text(bare).split())):
         assert "shm gap diagnose --hanger 3" in written
-    assert report.json(bare)["diagnosis"] is None
+    assert report_json(bare)["diagnosis"] is None
 
 
 def test_a_report_holds_the_latest_diagnosis_and_how_the_gap_has_gone(bare: HangerReport) -> None:
     watched = "beam1 with point mass, adopted 2026-05-01: gap 2.30 % before, 0.62 % now."
     diagnosed = replace(bare, diagnosis=LED, gap_watch=watched)
-    outline = parsed(report.html(diagnosed))
+    outline = parsed(html(diagnosed))
     assert outline.open == []
     names = {attributes.get("id") for _, attributes in outline.tags}
     assert {"causes-title", "gap_map-title", "before_and_after-title"} <= names
-    for written in (told(outline), " ".join(report.text(diagnosed).split())):
+    for written in (told(outline), " ".join(report_text(diagnosed).split())):
         assert "explained by a point mass of 12 kg" in written
         assert watched in written
         assert "has not been diagnosed" not in written
-    document = report.json(diagnosed)
+    document = report_json(diagnosed)
     assert document["diagnosis"]["causes"][0]["effect"] == "point_mass"
     assert document["gap_watch"] == watched
 
 
 def test_a_frequency_set_aside_leads_the_table_and_is_marked() -> None:
-    text = report.diagnosis_text(sheet("blunder"))
+    text = diagnosis_text(sheet("blunder"))
     rows = text[text.index("WHERE THE GAP LIES") :].splitlines()
     marked = [line for line in rows if "set aside" in line]
     assert len(marked) == 1

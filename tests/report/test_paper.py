@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from shm import report
 from shm.report.content import HangerReport
-from shm.report.paper import setting
+from shm.report.paper import pdf, setting
 from shm.report.paper.hanger import hanger_paper
 from shm.report.paper.setting import WIDTH
 from shm.report.table import Table
@@ -22,7 +21,7 @@ from tests.report.diagnoses import UNEXPLAINED
 def content(season: HangerReport) -> bytes:
     with pytest.MonkeyPatch.context() as patch:
         paint_blank(patch)
-        return report.pdf(season)
+        return pdf(season)
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +31,9 @@ def parsed(content: bytes) -> Pdf:
 
 @pytest.mark.usefixtures("unpainted")
 def test_the_same_content_gives_the_same_bytes(bare: HangerReport) -> None:
-    first = report.pdf(bare)
-    assert first == report.pdf(bare)
-    assert first != report.pdf(replace(bare, bridge="Another bridge"))
+    first = pdf(bare)
+    assert first == pdf(bare)
+    assert first != pdf(replace(bare, bridge="Another bridge"))
 
 
 def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> None:
@@ -59,7 +58,7 @@ def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, par
 @pytest.mark.usefixtures("unpainted")
 def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(bare: HangerReport) -> None:
     signs = "α → ± ² · ≤ ✓ ✗ – … ° é Ł ω"  # noqa: RUF001
-    told = Pdf.parse(report.pdf(replace(bare, bridge=signs)))
+    told = Pdf.parse(pdf(replace(bare, bridge=signs)))
     assert signs in told.words
     used = {name for name in told.fonts if name.startswith(("F1", "F2"))}
     assert all(b"FontFile2" in told._referred(told.fonts[name], b"FontDescriptor") for name in used)
@@ -81,7 +80,7 @@ def test_a_long_table_goes_on_under_repeated_headings(
     bare: HangerReport, season: HangerReport
 ) -> None:
     long = replace(bare, trend=season.trend * 12)
-    pages = Pdf.parse(report.pdf(long)).pages
+    pages = Pdf.parse(pdf(long)).pages
     with_heading = [page for page in pages if "90 % interval, kN" in page and "beam2" in page]
     assert len([page for page in with_heading if "t004" in page]) >= 2
 
@@ -89,14 +88,14 @@ def test_a_long_table_goes_on_under_repeated_headings(
 @pytest.mark.usefixtures("unpainted")
 def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
     alert = replace(season.alerts[0], message="The tension fell. " * 700)
-    told = Pdf.parse(report.pdf(replace(bare, alerts=(alert,)))).words
+    told = Pdf.parse(pdf(replace(bare, alerts=(alert,)))).words
     assert told.count("fell.") == 700
 
 
 @pytest.mark.usefixtures("unpainted")
 def test_names_from_outside_are_set_as_they_are(bare: HangerReport) -> None:
     sly = '<b>&amp;</b> "x" <img src="http://example.org/a.png"/>'
-    told = Pdf.parse(report.pdf(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
+    told = Pdf.parse(pdf(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
     assert sly in told.words
 
 

@@ -14,11 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from shm import report
-from shm.report.figures import style
+from shm.report.figures import Illustration, style
 from shm.report.figures.member import drawn as members_drawn
 from shm.report.figures.style import PALETTE
+from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures import MEMBERS
+from shm.report.sheet.figures import test_figures as report_test_figures
 from shm.report.sheet.spectra import Shown
 from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
 from tests.report.sheets import (
@@ -34,7 +35,7 @@ from tests.report.sheets import (
 
 DROPPED = {2: "double hit", 5: "not-a-number samples"}
 EIGHT_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
-CASES: dict[str, Callable[[], report.TestSheet]] = {
+CASES: dict[str, Callable[[], TestSheet]] = {
     "two sensors": make_sheet,
     "eight sensors": lambda: make_sheet(places_m=EIGHT_M, orders=12),
     "dropped hits": lambda: make_sheet(hits=6, dropped=DROPPED),
@@ -60,18 +61,18 @@ DRAWN = {
     "refused": ["quality", *TIMED, *SPECTRAL, "shapes", "damping"],
     "no records": [*SPECTRAL, "shapes", "damping"],
 }
-Drawn = dict[str, dict[str, report.Illustration]]
+Drawn = dict[str, dict[str, Illustration]]
 
 
 @pytest.fixture(scope="module")
 def drawn() -> Drawn:
     return {
-        name: {item.name: item for item in report.test_figures(make())}
+        name: {item.name: item for item in report_test_figures(make())}
         for name, make in CASES.items()
     }
 
 
-def alone(name: str, sheet: report.TestSheet) -> report.Illustration:
+def alone(name: str, sheet: TestSheet) -> Illustration:
     """One figure by itself: all of them take a second."""
     (item,) = members_drawn([member for member in MEMBERS if member.name == name], Shown.of(sheet))
     return item
