@@ -6,16 +6,9 @@ import math
 from collections.abc import Sequence
 
 from shm.report import words
-from shm.report.figures import style
 from shm.values import QualityCheck, Verdict
 
 SYMBOLS: dict[Verdict, str] = {"good": "✓", "warning": "!", "refused": "✗", "unknown": "?"}
-COLOURS: dict[Verdict, str] = {
-    "good": style.GREEN,
-    "warning": style.ORANGE,
-    "refused": style.RED,
-    "unknown": style.QUIET,
-}
 _GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
 
 

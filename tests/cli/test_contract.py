@@ -56,6 +56,15 @@ def test_help_is_shown_without_loading_what_the_verbs_need() -> None:
     assert ended.returncode == 0
 
 
+def test_what_is_told_in_words_is_told_without_loading_what_draws() -> None:
+    asked = (
+        "import sys, shm_cli.status, shm_cli.report, shm_cli.alerts; "
+        "sys.exit(bool({'matplotlib', 'jinja2', 'reportlab'} & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", asked], capture_output=True, check=False)
+    assert ended.returncode == 0
+
+
 def test_the_version_is_that_of_the_package(shm: Shm) -> None:
     assert package.__version__ in shm("--version").out
 

@@ -13,9 +13,9 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from shm.report.colours import PALETTE
 from shm.report.content import HangerReport
 from shm.report.figures import Illustration, illustrations
-from shm.report.figures.style import PALETTE
 from shm.values import FrequencyResponse
 
 SVG = "{http://www.w3.org/2000/svg}"

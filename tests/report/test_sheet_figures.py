@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from shm.report.figures import Illustration, style
+from shm.report import colours
+from shm.report.colours import PALETTE
+from shm.report.figures import Illustration
 from shm.report.figures.member import drawn as members_drawn
-from shm.report.figures.style import PALETTE
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures import MEMBERS
 from shm.report.sheet.figures import test_figures as report_test_figures
@@ -206,7 +207,7 @@ def test_hits_are_laid_over_each_other_dropped_ones_in_red(drawn: Drawn) -> None
     pulse, spectrum, fade = figure.axes
     assert len(pulse.lines) == len(fade.lines) == 6
     assert len(spectrum.lines) == 7  # and the line of a tenth
-    red = [line.get_label() for line in pulse.lines if line.get_color() == style.RED]
+    red = [line.get_label() for line in pulse.lines if line.get_color() == colours.RED]
     assert red == ["hit 2, dropped: double hit", "hit 5, dropped: not-a-number samples"]
     peaks = [float(np.max(np.asarray(line.get_ydata()))) for line in pulse.lines]
     assert peaks == pytest.approx([900 + 50 * hit for hit in range(6)], abs=4)
@@ -337,9 +338,9 @@ def test_damping_is_shown_with_its_interval(drawn: Drawn) -> None:
 def test_the_quality_sheet_says_each_verdict_by_symbol_word_and_colour(drawn: Drawn) -> None:
     texts = {t.get_text(): t for t in drawn["warned"]["quality"].figure.axes[0].texts}
     for verdict, symbol, colour in (
-        ("good", "✓", style.GREEN),
-        ("warning", "!", style.ORANGE),
-        ("unknown", "?", style.QUIET),
+        ("good", "✓", colours.GREEN),
+        ("warning", "!", colours.ORANGE),
+        ("unknown", "?", colours.QUIET),
     ):
         assert texts[f"{symbol} {verdict}"].get_color() == colour
     assert {"double hits", "14 dB", "10 dB", "not known", "→ Hit freely."} <= set(texts)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import words
+from shm.report import colours, words
 from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.content import Interval
 from shm.report.figures import style
@@ -14,10 +14,10 @@ from shm.report.figures.member import Member
 from shm.report.summary import Status
 
 _MARKS = {
-    Status.ALERT: (style.RED, "v"),
-    Status.WATCH: (style.ORANGE, "D"),
-    Status.STEADY: (style.GREEN, "o"),
-    Status.FIRST: (style.BLUE, "s"),
+    Status.ALERT: (colours.RED, "v"),
+    Status.WATCH: (colours.ORANGE, "D"),
+    Status.STEADY: (colours.GREEN, "o"),
+    Status.FIRST: (colours.BLUE, "s"),
 }
 _MOST_TICKS = 40
 _VIEW_PERCENT = 25.0
@@ -32,7 +32,7 @@ def _draw(data: BridgeReport) -> Figure | None:
     axes = figure.subplots()
     style.dress(axes, "hanger, in the order of the bridge", "tension (% of nominal)")
     axes.grid(False, axis="x")
-    axes.axhline(100, color=style.INK, linestyle=":", label="nominal")
+    axes.axhline(100, color=colours.INK, linestyle=":", label="nominal")
     for status in Status:
         _points(axes, [each for each in shares if each[1].status is status], status)
     _view(axes, [share for *_, share in shares])

@@ -14,9 +14,9 @@ from typing import Generic, TypeVar
 
 from matplotlib.figure import Figure
 
+from shm.report.colours import PALETTE
 from shm.report.figures import with_matplotlib
 from shm.report.figures.specification import Specification
-from shm.report.figures.style import PALETTE
 
 Data = TypeVar("Data")
 

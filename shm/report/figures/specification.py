@@ -1,7 +1,7 @@
 """What a figure shows, told once: paper draws it by `with_matplotlib`, a screen by plotly.
 
-Colours are names of `style.PALETTE`, sizes are points. Places may be numbers or times. A `hover` is
-a template as plotly takes it; paper leaves it out.
+Colours are names of `colours.PALETTE`, sizes are points. Places may be numbers or times. A
+`hover` is a template as plotly takes it; paper leaves it out.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What all figures share: size, colours that the colour-blind tell apart, quiet axes."""
+"""What all figures share: size, letters, quiet axes."""
 
 from __future__ import annotations
 
@@ -9,25 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 
-INK = "#1d2330"
-GRID = "#d5d9e0"
-BLUE = "#0072b2"
-ORANGE = "#d55e00"
-GREEN = "#009e73"
-PURPLE = "#9b4f96"
-RED = "#b00020"
-QUIET = "#565f70"
-# Okabe and Ito (2008), darkened where small marks need it; names are the page's CSS variables.
-PALETTE = {
-    "ink": INK,
-    "grid": GRID,
-    "blue": BLUE,
-    "orange": ORANGE,
-    "green": GREEN,
-    "purple": PURPLE,
-    "red": RED,
-    "quiet": QUIET,
-}
+from shm.report import colours
 
 WIDTH_INCHES = 7.4
 _SMALL = 9.0
@@ -49,13 +31,13 @@ def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
     """Labels, grid and spines."""
     axes.set_facecolor("none")
-    axes.set_xlabel(x_label, fontsize=_SMALL, color=INK)
-    axes.set_ylabel(y_label, fontsize=_SMALL, color=INK)
-    axes.tick_params(which="both", labelsize=_SMALL, colors=INK)
-    axes.grid(True, color=GRID, linewidth=0.6)
+    axes.set_xlabel(x_label, fontsize=_SMALL, color=colours.INK)
+    axes.set_ylabel(y_label, fontsize=_SMALL, color=colours.INK)
+    axes.tick_params(which="both", labelsize=_SMALL, colors=colours.INK)
+    axes.grid(True, color=colours.GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     for side, spine in axes.spines.items():
-        spine.set_color(INK)
+        spine.set_color(colours.INK)
         spine.set_visible(side in ("left", "bottom"))
 
 
@@ -66,7 +48,7 @@ def legend_above(axes: Axes, columns: int = 4) -> Legend:
         bbox_to_anchor=(0.0, 1.0),
         ncols=columns,
         fontsize=_SMALL,
-        labelcolor=INK,
+        labelcolor=colours.INK,
         frameon=False,
         borderaxespad=0.2,
         handlelength=1.6,
@@ -89,7 +71,7 @@ def legend_of_figure(
             loc=where,  # type: ignore[call-overload]
             ncols=columns,
             fontsize=TINY + 1,
-            labelcolor=INK,
+            labelcolor=colours.INK,
             frameon=False,
             borderaxespad=0.2,
             handlelength=2.0,

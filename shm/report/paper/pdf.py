@@ -12,7 +12,7 @@ from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import BaseDocTemplate, CallerMacro, Flowable, Frame, PageTemplate
 
-from shm.report.figures import style
+from shm.report import colours
 from shm.report.paper import fonts
 from shm.report.paper.content import Paper
 from shm.report.paper.setting import WIDTH, flowables
@@ -60,8 +60,8 @@ def _around(canvas: Canvas, paper: Paper) -> None:
     canvas.setDateFormatter(lambda *_: _made_at(paper))
     canvas.saveState()
     canvas.setFont(fonts.PLAIN, _LINE_SIZE)
-    canvas.setFillColor(colors.HexColor(style.QUIET))
-    canvas.setStrokeColor(colors.HexColor(style.GRID))
+    canvas.setFillColor(colors.HexColor(colours.QUIET))
+    canvas.setStrokeColor(colors.HexColor(colours.GRID))
     right, top, bottom = _SIDE + WIDTH, _PAGE_HEIGHT - 13 * mm, 11 * mm
     canvas.drawString(_SIDE, top, _cut(paper.bridge))
     canvas.drawRightString(right, top, _cut(paper.title))
@@ -84,7 +84,7 @@ def _counted() -> Flowable:
         pages = str(canvas.getPageNumber())
         canvas.beginForm(_NUMBER_OF_PAGES)
         canvas.setFont(fonts.PLAIN, _LINE_SIZE)
-        canvas.setFillColor(colors.HexColor(style.QUIET))
+        canvas.setFillColor(colors.HexColor(colours.QUIET))
         canvas.drawString(0, 0, pages)
         canvas.endForm()
 

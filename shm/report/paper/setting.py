@@ -26,7 +26,7 @@ from reportlab.platypus import (
     Table as SetTable,
 )
 
-from shm.report.figures import style
+from shm.report import colours
 from shm.report.figures.member import Illustration
 from shm.report.paper import fonts
 from shm.report.paper.content import Fact, Paper, Part
@@ -37,16 +37,8 @@ DOTS_PER_INCH = 220
 _TALLEST = 200 * mm
 _PADDING = 4.0
 _CELL_SIZE = 7.6
-_INK, _QUIET, _GRID = (colors.HexColor(each) for each in (style.INK, style.QUIET, style.GRID))
+_INK, _QUIET, _GRID = (colors.HexColor(each) for each in (colours.INK, colours.QUIET, colours.GRID))
 _PANEL = colors.HexColor("#f4f6f9")
-STATUS_COLOURS = {
-    "alert": style.RED,
-    "watch": style.ORANGE,
-    "steady": style.GREEN,
-    "first": style.BLUE,
-}
-"""By the page's style of a state; its word always stands beside the colour."""
-_VERDICT_COLOURS = {"good": style.GREEN, "warning": style.ORANGE, "refused": style.RED}
 
 
 def _letters(name: str, size: float, font: str = fonts.PLAIN, **more: Any) -> ParagraphStyle:
@@ -69,7 +61,7 @@ _LABEL = _letters("label", 7.6, textColor=_QUIET)
 def flowables(paper: Paper) -> list[Flowable]:
     """The title and all parts that have something, in order; figures and tables are numbered."""
     figures, tables = count(1), count(1)
-    colour = STATUS_COLOURS[paper.style]
+    colour = colours.STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
     top: list[Flowable] = [
         Paragraph(escape(paper.bridge), _LABEL),
@@ -77,7 +69,7 @@ def flowables(paper: Paper) -> list[Flowable]:
     ]
     parts = [
         each for part in paper.parts if not part.is_empty
-        for each in _part(part, STATUS_COLOURS[part.style or paper.style], figures, tables)
+        for each in _part(part, colours.STATUS_COLOURS[part.style or paper.style], figures, tables)
     ]  # fmt: skip
     return [*top, *parts, Paragraph(escape(f"{paper.made}. {paper.closing}"), _NOTE)]
 
@@ -183,8 +175,8 @@ def _rules(table: Table) -> list[tuple[Any, ...]]:
         ("BOTTOMPADDING", (0, 0), (-1, -1), 2.5),
     ]
     for row, mark in enumerate(table.marks, 1):
-        if mark in _VERDICT_COLOURS:
-            colour = colors.HexColor(_VERDICT_COLOURS[mark])
+        if mark in colours.VERDICT_COLOURS and mark != "unknown":
+            colour = colors.HexColor(colours.VERDICT_COLOURS[mark])
             rules.append(("LINEBEFORE", (1, row), (1, row), 1.5, colour))
             rules.append(("LEFTPADDING", (1, row), (1, row), _PADDING))
     return rules

@@ -7,6 +7,7 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.diagnosis.content import DiagnosisSheet
 from shm.report.diagnosis.tensions import AFTER, tension_of, tension_unit, tension_words
 from shm.report.figures import style
@@ -41,8 +42,8 @@ def _draw(sheet: DiagnosisSheet) -> Figure | None:
 def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
     diagnosis = sheet.diagnosis
     rows = [
-        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, style.QUIET),
-        (AFTER, diagnosis.tension_after_n, style.BLUE),
+        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, colours.QUIET),
+        (AFTER, diagnosis.tension_after_n, colours.BLUE),
     ]
     return [row for row in rows if math.isfinite(row[1].mean)]
 
@@ -64,7 +65,7 @@ def _interval(
         textcoords="offset points",
         ha="center",
         fontsize=style.TINY + 0.5,
-        color=style.INK,
+        color=colours.INK,
     )
 
 
@@ -74,7 +75,7 @@ def _nominal(axes: Axes, nominal: float) -> None:
     reach = _NEAR * (high - low)
     if not low - reach <= nominal <= high + reach:
         return
-    axes.axvline(nominal, color=style.INK, linestyle=":", linewidth=1.2, label="nominal")
+    axes.axvline(nominal, color=colours.INK, linestyle=":", linewidth=1.2, label="nominal")
     margin = 0.08 * (high - low)
     axes.set_xlim(min(low, nominal - margin), max(high, nominal + margin))
     style.legend_above(axes)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from shm.report import words
+from shm.report import colours, words
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import judged, large
@@ -17,7 +17,7 @@ from shm.values.diagnosis import parted
 
 _NOTHING, _TWO, _UNKNOWN = "nothing", "two effects", "not in the catalogue"
 _NO_GAP, _PAIR, _UNEXPLAINED, _FAILED = "no gap", "a pair", "unexplained", "failed"
-_SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", style.BLUE])
+_SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", colours.BLUE])
 _DARK = 0.55
 
 
@@ -57,7 +57,7 @@ def _draw(score: TrialScore) -> Figure | None:
         dark = share[row, column] > _DARK
         axes.text(
             column, row, f"{table[row, column]:.0f}", ha="center", va="center",
-            fontsize=style.TINY, color="white" if dark else style.INK,
+            fontsize=style.TINY, color="white" if dark else colours.INK,
         )  # fmt: skip
     axes.set_xticks(range(len(columns)), list(map(words.quantity, columns)), rotation=60,
                     ha="right", rotation_mode="anchor")  # fmt: skip

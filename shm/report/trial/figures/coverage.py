@@ -7,6 +7,7 @@ import math
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import find
@@ -28,8 +29,8 @@ def _draw(score: TrialScore) -> Figure | None:
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for axes, (name, title, nominal) in zip(panels, shown, strict=True):
         _panel(axes, score, name, nominal)
-        axes.set_title(title, fontsize=9, color=style.INK, loc="left")
-    panels[0].set_ylabel("share that holds the truth", fontsize=9, color=style.INK)
+        axes.set_title(title, fontsize=9, color=colours.INK, loc="left")
+    panels[0].set_ylabel("share that holds the truth", fontsize=9, color=colours.INK)
     return figure
 
 
@@ -38,9 +39,9 @@ def _panel(axes: Axes, score: TrialScore, name: MarkName, nominal: float) -> Non
     found = of_richness(score, name)
     mark = find(score, name)
     if mark and math.isfinite(mark.lower + mark.upper):
-        axes.axhspan(mark.lower, mark.upper, color=style.GREEN, alpha=0.15, linewidth=0)
-    axes.axhline(nominal, color=style.QUIET, linestyle=":", linewidth=1.0)
-    points(axes, range(len(found)), [each for _, each in found], style.BLUE)
+        axes.axhspan(mark.lower, mark.upper, color=colours.GREEN, alpha=0.15, linewidth=0)
+    axes.axhline(nominal, color=colours.QUIET, linestyle=":", linewidth=1.0)
+    points(axes, range(len(found)), [each for _, each in found], colours.BLUE)
     name_richness(axes, [richness for richness, _ in found])
     lowest = min((each.low for _, each in found if math.isfinite(each.low)), default=0.5)
     axes.set_ylim(min(0.5, axes.get_ylim()[0], lowest - 0.05), 1.03)

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import RICHNESS, find, large
@@ -28,9 +29,9 @@ def _draw(score: TrialScore) -> Figure | None:
     for axes in panels.flat[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:
-        axes.set_ylabel("share seen", fontsize=9, color=style.INK)
+        axes.set_ylabel("share seen", fontsize=9, color=colours.INK)
     for axes in panels[-1]:
-        axes.set_xlabel("size (standard deviations)", fontsize=9, color=style.INK)
+        axes.set_xlabel("size (standard deviations)", fontsize=9, color=colours.INK)
     return figure
 
 
@@ -40,13 +41,13 @@ def _bins(score: TrialScore, richness: Richness) -> list[Bin]:
 
 def _panel(axes: Axes, score: TrialScore, richness: Richness) -> None:
     style.dress(axes, "", "")
-    axes.set_title(richness, fontsize=9, color=style.INK, loc="left")
+    axes.set_title(richness, fontsize=9, color=colours.INK, loc="left")
     bins = _bins(score, richness)
-    points(axes, [each.mean for each in bins], [each.score for each in bins], style.BLUE)
+    points(axes, [each.mean for each in bins], [each.score for each in bins], colours.BLUE)
     mark = find(score, "detected")
     if mark and np.isfinite(mark.lower):
         axes.plot(
-            [mark.above, _TICKS[-1]], [mark.lower] * 2, color=style.ORANGE, linestyle="--",
+            [mark.above, _TICKS[-1]], [mark.lower] * 2, color=colours.ORANGE, linestyle="--",
             linewidth=1.2,
         )  # fmt: skip
     axes.set_xscale("log")

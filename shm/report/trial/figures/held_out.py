@@ -6,13 +6,14 @@ import math
 
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import find
 from shm.report.trial.phrases import value
 from shm.values import TrialScore, Way
 
-_COLOURS: dict[Way, str] = {"modes": style.BLUE, "recordings": style.ORANGE}
+_COLOURS: dict[Way, str] = {"modes": colours.BLUE, "recordings": colours.ORANGE}
 
 
 def _above(score: TrialScore) -> float:
@@ -40,11 +41,11 @@ def _draw(score: TrialScore) -> Figure | None:
     style.dress(axes, "held-out error, after over before", "share of cases below")
     for way, ratios in found.items():
         axes.ecdf(ratios, color=_COLOURS[way], linewidth=1.5, label=f"{way} ({len(ratios)} cases)")
-    axes.axvline(1.0, color=style.QUIET, linestyle=":", linewidth=1.0)
+    axes.axvline(1.0, color=colours.QUIET, linestyle=":", linewidth=1.0)
     mark = find(score, "held-out misfit after over before")
     if mark and math.isfinite(mark.upper):
         axes.plot(
-            mark.upper, 0.5, marker="D", markersize=6, color=style.GREEN, linestyle="none",
+            mark.upper, 0.5, marker="D", markersize=6, color=colours.GREEN, linestyle="none",
             label="asked of the median: left of this",
         )  # fmt: skip
     axes.set_xlim(0, max(1.3, min(2.5, max(map(max, found.values())) * 1.05)))

@@ -6,19 +6,19 @@ from collections import Counter
 
 from matplotlib.figure import Figure
 
-from shm.report import words
+from shm.report import colours, words
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import RICHNESS, judged
 from shm.values import CaseScore, TrialScore
 
 _OUTCOMES = {
-    "unexplained": style.GREEN,
-    "one of its group": style.BLUE,
-    "no gap": style.GRID,
-    "another, not sure": style.PURPLE,
-    "another, more than 0.9 sure": style.RED,
-    "failed": style.INK,
+    "unexplained": colours.GREEN,
+    "one of its group": colours.BLUE,
+    "no gap": colours.GRID,
+    "another, not sure": colours.PURPLE,
+    "another, more than 0.9 sure": colours.RED,
+    "failed": colours.INK,
 }
 
 

@@ -6,6 +6,7 @@ import math
 
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import find
@@ -26,13 +27,13 @@ def _draw(score: TrialScore) -> Figure | None:
     figure = style.new_figure(2.8)
     axes = figure.subplots()
     style.dress(axes, "", "log score")
-    points(axes, range(len(found)), [each for _, each in found], style.BLUE, "this trial")
+    points(axes, range(len(found)), [each for _, each in found], colours.BLUE, "this trial")
     before = [_prototype(score, richness) for richness, _ in found]
     there = [(x, bound) for x, bound in enumerate(before) if math.isfinite(bound)]
     if there:
         axes.plot(
             *zip(*there, strict=True), linestyle="none", marker="D", markersize=5,
-            color=style.ORANGE, label="prototype: the mark to beat",
+            color=colours.ORANGE, label="prototype: the mark to beat",
         )  # fmt: skip
     name_richness(axes, [richness for richness, _ in found])
     axes.set_ylim(bottom=0)

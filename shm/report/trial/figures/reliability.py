@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import find
@@ -19,13 +20,13 @@ def _draw(score: TrialScore) -> Figure | None:
     figure = style.new_figure(3.6)
     axes = figure.subplots()
     style.dress(axes, "probability of what leads", "share that is right")
-    axes.plot([0, 1], [0, 1], color=style.QUIET, linewidth=1.0, linestyle=":", label="just right")
+    axes.plot([0, 1], [0, 1], color=colours.QUIET, linewidth=1.0, linestyle=":", label="just right")
     points(
-        axes, [each.mean for each in bins], [each.score for each in bins], style.BLUE,
+        axes, [each.mean for each in bins], [each.score for each in bins], colours.BLUE,
         "found, with 90 % interval",
     )  # fmt: skip
     for each in bins:
-        axes.hlines(each.score.value, each.low, each.high, color=style.BLUE, linewidth=0.8)
+        axes.hlines(each.score.value, each.low, each.high, color=colours.BLUE, linewidth=0.8)
     axes.set_xlim(min(0.4, bins[0].low - 0.02), 1.02)
     axes.set_ylim(-0.02, 1.05)
     style.legend_above(axes)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.trial.content import find, judged
@@ -14,10 +15,10 @@ from shm.report.trial.phrases import value
 from shm.values import CaseScore, PlantedKind, TrialScore
 
 _KINDS: dict[PlantedKind, tuple[str, str, str]] = {
-    "none": ("nothing", style.QUIET, "x"),
-    "one": ("one effect", style.BLUE, "o"),
-    "two": ("two effects", style.PURPLE, "s"),
-    "unknown": ("not in the catalogue", style.ORANGE, "^"),
+    "none": ("nothing", colours.QUIET, "x"),
+    "one": ("one effect", colours.BLUE, "o"),
+    "two": ("two effects", colours.PURPLE, "s"),
+    "unknown": ("not in the catalogue", colours.ORANGE, "^"),
 }
 _LEAST = 0.01
 
@@ -51,8 +52,8 @@ def _draw(score: TrialScore) -> Figure | None:
                 markerfacecolor="none", label=name,
             )  # fmt: skip
     ends = np.array([_LEAST * 0.8, 1.3 * max(max(_errors(case)) for case in cases)])
-    axes.plot(ends, ends, color=style.INK, linewidth=0.9, linestyle=":")
-    axes.plot(ends, ends / 5, color=style.GREEN, linewidth=1.1, linestyle="--")
+    axes.plot(ends, ends, color=colours.INK, linewidth=0.9, linestyle=":")
+    axes.plot(ends, ends / 5, color=colours.GREEN, linewidth=1.1, linestyle="--")
     axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     ticks = [tick for tick in (0.01, 0.1, 1, 10, 100) if tick < ends[1]]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
