@@ -44,7 +44,7 @@ def test_a_crash_is_told_and_work_left_undone_is_ended_with_the_context() -> Non
         endless = pool.submit(time.sleep, 600)
         pool.shutdown(wait=False)
     with pytest.raises(WorkerDied):
-        endless.result(20)
+        endless.result(60)
     with children_ended():
         crashing = process_pool(1)
         with pytest.raises(BrokenProcessPool):
