@@ -238,7 +238,8 @@ def archived_names(store: Database) -> tuple[str, ...]:
     """Every file of the archive that a recording refers to, sidecars too, each once."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
-        return tuple(sorted({name for row in rows for name in row if name is not None}))
+        # A flipped bit in the schema may make a name a number.
+    return tuple(sorted({str(name) for row in rows for name in row if name is not None}))
 
 
 def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
