@@ -29,6 +29,25 @@ RENAMED = "renamed"
 """The kind of event that keeps the former name of a file that came again under another."""
 
 
+def end_recording(
+    connection: Connection, recording_id: int, reason: Mapping[str, Any], at: datetime
+) -> None:
+    """A recording is refused, with a reason."""
+    own = sa.update(recordings).where(recordings.c.id == recording_id)
+    connection.execute(own.values(stage=Stage.REFUSED, reason=dict(reason)))
+    write_step(connection, recording_id, Stage.REFUSED, at)
+
+
+def end_tests(
+    connection: Connection, recording_id: int, test_ids: Collection[int], at: datetime
+) -> None:
+    """Tests of a recording are refused."""
+    chosen = sa.update(tests).where(tests.c.id.in_(test_ids))
+    connection.execute(chosen.values(stage=Stage.REFUSED))
+    for test_id in test_ids:
+        write_step(connection, recording_id, Stage.REFUSED, at, test_id)
+
+
 class Files(Database):
     """The part of the store that keeps account of the files."""
 
@@ -51,16 +70,8 @@ class Files(Database):
             if stage is not None and not _waits(connection, row, stage, test_ids):
                 return
             test_ids = _own(connection, recording_id, test_ids)
-            connection.execute(
-                sa.update(recordings)
-                .where(recordings.c.id == recording_id)
-                .values(stage=Stage.REFUSED, reason=dict(reason))
-            )
-            connection.execute(
-                sa.update(tests).where(tests.c.id.in_(test_ids)).values(stage=Stage.REFUSED)
-            )
-            for test_id in (None, *test_ids):
-                write_step(connection, recording_id, Stage.REFUSED, at, test_id)
+            end_recording(connection, recording_id, reason, at)
+            end_tests(connection, recording_id, test_ids, at)
             message = str(reason.get("message", ""))
             write_event(connection, at, "refused", row.id, row.file_name, message)
 

@@ -15,7 +15,7 @@ from shm.modes_document import test_document
 from shm.store.blobs import test_from_document
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import by_id, counts, in_force, write_event
+from shm.store.files import by_id, counts, end_recording, end_tests, in_force, write_event
 from shm.store.hold_rows import Decision, Hold
 from shm.store.judging import fingerprint_from, held_tests_from, notice_key
 from shm.store.queries import Queries, plain_tests
@@ -96,19 +96,15 @@ class Holding(Queries):
         """
         with self.writing() as connection:
             hold = _undecided(connection, recording_id)
-            for row in _held(connection, recording_id):
-                this = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(this.values(stage=Stage.REFUSED))
-                write_step(connection, recording_id, Stage.REFUSED, at, row.id)
-            own = sa.update(recordings).where(recordings.c.id == recording_id)
+            end_tests(
+                connection, recording_id, [row.id for row in _held(connection, recording_id)], at
+            )
             reason = connection.scalar(
                 sa.select(recordings.c.reason).where(recordings.c.id == recording_id)
             )
             decided = replace(hold, decision=Decision.DISCARDED, decided_at=at, who=who, why=why)
             told = {"message": discarded_reason(decided), "remedy": taking_back(decided)}
-            discarded = {**(loads(reason) or {}), **told}
-            connection.execute(own.values(stage=Stage.REFUSED, reason=discarded))
-            write_step(connection, recording_id, Stage.REFUSED, at)
+            end_recording(connection, recording_id, {**(loads(reason) or {}), **told}, at)
             return _decide(connection, decided, who, why, at)
 
     def known_samples(

@@ -15,7 +15,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.store.database import Database, insert
-from shm.store.files import by_id, counts, in_force, write_event
+from shm.store.files import by_id, counts, end_recording, end_tests, in_force, write_event
 from shm.store.hold_rows import Decision, HeldTest, Hold
 from shm.store.holding import confirmed_values, discarded_reason, holds_of, taking_back
 from shm.store.judging import reason_of
@@ -61,18 +61,14 @@ class Withdrawing(Database):
             own = of_baselines(connection, chosen)
             weighed = _weighed(connection, chosen)
             ids = [row.id for row in chosen]
-            connection.execute(
-                sa.update(tests).where(tests.c.id.in_(ids)).values(stage=Stage.REFUSED)
-            )
-            for id_ in ids:
-                write_step(connection, recording_id, Stage.REFUSED, at, id_)
+            end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
             again = _watch_again(connection, chosen, weighed, at)
             held = [HeldTest(row.position, row.name, ()) for row in chosen]
             hold = _decide(connection, recording, held, (Decision.WITHDRAWN, who, why, at, None))
             if not connection.scalar(_left(recording_id)):
                 reason = reason_of(recording, discarded_reason(hold), at, taking_back(hold))
-                _end(connection, recording_id, reason, at)
+                end_recording(connection, recording_id, reason, at)
             names = tuple(sorted(row.name for row in chosen if row.id in own))
             return Withdrawal(hold, names, min(row.time for row in chosen), again)
 
@@ -156,14 +152,6 @@ def _left(recording_id: int) -> sa.Select[Any]:
     """How many tests of a recording count or are held."""
     own = (tests.c.recording_id == recording_id) & in_force(tests)
     return sa.select(sa.func.count()).where(own, tests.c.stage != Stage.REFUSED)
-
-
-def _end(
-    connection: Connection, recording_id: int, reason: Mapping[str, Any], at: datetime
-) -> None:
-    own = sa.update(recordings).where(recordings.c.id == recording_id)
-    connection.execute(own.values(stage=Stage.REFUSED, reason=dict(reason)))
-    write_step(connection, recording_id, Stage.REFUSED, at)
 
 
 def _decide(
