@@ -112,16 +112,19 @@ def _cleared(target: str | Path, keep_as: Path, tell: Tell, replace: bool) -> Pa
             schema.upgrade(engine)
             with Database(engine).reading() as connection:
                 held = sum(row_counts(connection).values())
-            if not held:
+                changed = bool(schema.changed_objects(connection))
+            if not (held or changed):
                 return None
             if not replace:
                 raise _holds(Database(engine).location, held)
-            back_up(Database(engine), keep_as, tell)
+            if not (changed and isinstance(target, Path)):
+                back_up(Database(engine), keep_as, tell)
+                return keep_as
     except StoreError as error:
         mendable = error.retry_after_s is not None and not isinstance(error, StoreDamaged)
         if mendable or not replace or not isinstance(target, Path):
             raise
-        _move_aside(target, keep_as)
+    _move_aside(target, keep_as)
     return keep_as
 
 

@@ -30,6 +30,7 @@ from shm.store.columns import Document
 from shm.store.copying import Rows, TableContent, Tell, contents
 from shm.store.database import Database
 from shm.store.missing import MissingRow, missing_rows
+from shm.store.schema import changed_objects
 from shm.store.tables import APART, recordings
 from shm.store.upkeep import Upkeep
 
@@ -55,12 +56,17 @@ class CheckedStore:
     troubles: tuple[str, ...]
     damaged: tuple[DamagedRow, ...] = ()
     missing: tuple[MissingRow, ...] = ()
+    changed: tuple[str, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """The troubles, each with its place and its remedy apart."""
         known = {str(row): _damaged_finding(row) for row in self.damaged}
         known |= {str(row): _missing_finding(row) for row in self.missing}
+        known |= {
+            _changed(name): Finding("changed schema", name, _CHANGED, _COPY)
+            for name in self.changed
+        }
         file = "fault of the file"
         return tuple(
             known.get(each) or Finding(file, "store", sentence(each), RESTORE)
@@ -70,9 +76,18 @@ class CheckedStore:
     @property
     def unfit(self) -> tuple[str, ...]:
         """Troubles for which it cannot be put in another's place: not rows that only are no more,
-        since an older backup may lack more than that."""
+        since an older backup may lack more than that, nor a changed schema, which is not copied."""
         gone = {str(row) for row in self.missing if not row.referred}
+        gone |= set(map(_changed, self.changed))
         return tuple(each for each in self.troubles if each not in gone)
+
+
+_CHANGED = "its schema is not what the migrations make; rows may be read or kept wrongly."
+_COPY = "Write `shm db backup FILE` and restore it with `shm db restore FILE --replace`."
+
+
+def _changed(name: str) -> str:
+    return f"{name}: {_CHANGED} {_COPY}"
 
 
 def _damaged_finding(row: DamagedRow) -> Finding:
@@ -139,13 +154,14 @@ def check_store(store: Database, tell: Tell) -> CheckedStore:
     with store.reading() as connection:
         try:
             structure, missing = tuple(_damage(connection)), missing_rows(connection)
+            changed = changed_objects(connection)
         except sa.exc.DatabaseError as error:
             if connection.dialect.name != "sqlite":
                 raise
-            structure, missing = (f"the file is damaged: {error.orig}",), ()
+            structure, missing, changed = (f"the file is damaged: {error.orig}",), (), ()
         checked = read_rows(connection, tell, structure)
-        troubles = (*checked.troubles, *map(str, missing))
-        return replace(checked, troubles=troubles, missing=missing)
+        troubles = (*checked.troubles, *map(str, missing), *map(_changed, changed))
+        return replace(checked, troubles=troubles, missing=missing, changed=changed)
 
 
 def read_rows(connection: Connection, tell: Tell, troubles: tuple[str, ...] = ()) -> CheckedStore:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from functools import cache
+
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import SchemaOutdated, StoreError
 from shm.resources import migrations_folder
 from shm.store.checksums import seal
-from shm.store.database import reading, writing
+from shm.store.database import make_engine, reading, writing
 from shm.store.location import shown
 from shm.store.numbering import note_numbering
 from shm.store.tables import SCHEMA
@@ -69,3 +72,45 @@ def _refuse_newer(version: str | None, location: str) -> None:
             f"the store {location} has schema {version}, newer than this shm knows ({SCHEMA}).",
             remedy="Install the shm that wrote it, or a newer one.",
         )
+
+
+def changed_objects(connection: Connection) -> tuple[str, ...]:
+    """Tables and indexes of a SQLite store that are not as its migrations make them.
+
+    A flipped bit in the text of the schema leaves every row and page valid, and yet may drop a
+    constraint or read a number as a text. Of a server, and of another schema, nothing is said.
+    """
+    if connection.dialect.name != "sqlite" or _version(connection) != SCHEMA:
+        return ()
+    held = _objects(connection)
+    return tuple(
+        f"{kind} {name}" for (kind, name), made in _made().items() if held.get((kind, name)) != made
+    )
+
+
+_Object = tuple[str, Counter[str]]
+
+
+def _objects(connection: Connection) -> dict[tuple[str, str], _Object]:
+    query = "SELECT type, name, tbl_name, coalesce(sql, '') FROM sqlite_master ORDER BY name"
+    return {
+        (kind, name): (table, _parts(sql))
+        for kind, name, table, sql in connection.exec_driver_sql(query).fetchall()
+    }
+
+
+def _parts(sql: str) -> Counter[str]:
+    """Alembic's batches write the constraints of a table in any order."""
+    return Counter(sql.removesuffix("\n)").split(","))
+
+
+@cache
+def _made() -> dict[tuple[str, str], _Object]:
+    """What the migrations make, all run on an empty database in memory."""
+    engine = make_engine("sqlite://")
+    try:
+        upgrade(engine)
+        with reading(engine) as connection:
+            return _objects(connection)
+    finally:
+        engine.dispose()

@@ -222,3 +222,20 @@ def test_a_backup_keeps_all_else_and_names_the_damaged_row(
     assert "row 2 of posteriors of hanger 3 is damaged" in capsys.readouterr().err
     with Store.open(file) as store:
         assert len(store.recordings()) == 6
+
+
+@pytest.mark.parametrize(
+    ("was", "became"),
+    [("CONSTRAINT fk_tests", "CONSTRAINT fk_tdsts"), ("archived_as TEXT", "archived_as TEPT")],
+)
+def test_a_flip_in_the_text_of_the_schema_is_found_and_a_restore_heals_it(
+    bridge: Workspace, was: str, became: str
+) -> None:
+    bits = bridge.database.read_bytes()
+    assert bits.count(was.encode()) >= 1
+    bridge.database.write_bytes(bits.replace(was.encode(), became.encode(), 1))
+    backup = bridge.folder / "backup.db"
+    assert run(["--workspace", str(bridge.folder), "db", "check"]) == 5
+    assert run(["--workspace", str(bridge.folder), "db", "backup", str(backup)]) == 5
+    assert run(["--workspace", str(bridge.folder), "db", "restore", str(backup), "--replace"]) == 0
+    assert run(["--workspace", str(bridge.folder), "db", "check", "--archive"]) == 0

@@ -18,6 +18,7 @@ from shm.errors import NothingThere, SchemaOutdated, StoreError
 from shm.resources import migrations_folder
 from shm.store import Acknowledgement, Decision, Stage, Store
 from shm.store.database import make_engine
+from shm.store.schema import changed_objects
 from shm.store.tables import SCHEMA, metadata
 from shm.values import Fingerprint
 from tests.helpers.nouns import NOW, a_change
@@ -53,6 +54,7 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
     with Store.open(path) as store:
         context = MigrationContext.configure(store.engine.connect())
         assert compare_metadata(context, metadata) == []
+        assert changed_objects(context.connection) == ()
         context.connection.close()
         assert store.stage_counts()[Stage.DONE] >= 2
         assert store.stage_counts()[Stage.REFUSED] == 1
