@@ -16,11 +16,19 @@ from typing import Any, TypeGuard
 
 from shm.documents import key_meant, parse_time
 from shm.errors import BadInput
-from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode, ShapePoint
+from shm.values import (
+    LONGEST_TEST_ID,
+    NAN,
+    PLANES,
+    AddedMass,
+    ModalTest,
+    Mode,
+    ShapePoint,
+    is_test_id,
+)
 
 MODES_SCHEMA = "shm.modes/1"
 _LARGEST = 1e300
-_LONGEST_ID = 200
 _HIGHEST_ORDER = 200
 _TEST_KEYS = (
     "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
@@ -133,9 +141,9 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
 
 def _id(value: Any, label: str, file: str | Path) -> str:
     text = str(value) if isinstance(value, str | int) else ""
-    if not 0 < len(text) <= _LONGEST_ID or not text.isprintable():
+    if not is_test_id(text):
         raise BadInput(
-            f"{label}: id is not a text of 1 to {_LONGEST_ID} printable characters.",
+            f"{label}: id is not a text of 1 to {LONGEST_TEST_ID} printable characters.",
             file=file,
             remedy="Give a short one, or leave it out.",
         )

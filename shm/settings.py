@@ -31,7 +31,14 @@ class Setting:
         return f"SHM_{self.name.upper()}"
 
     def parse(self, raw: Any, source: str) -> Any:
-        """`raw` as a value of this setting's type; raises BadInput naming `source`."""
+        """`raw` as a value of this setting's type; raises BadInput naming `source`.
+
+        A list of texts is the same as these parted by commas.
+        """
+        if isinstance(raw, list) and all(isinstance(each, str) for each in raw):
+            raw = ",".join(raw)
+        if isinstance(raw, bool) or isinstance(self.default, str) > isinstance(raw, str):
+            raise self._refusal(raw, source)
         try:
             value = type(self.default)(raw)
         except (TypeError, ValueError):

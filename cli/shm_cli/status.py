@@ -32,7 +32,7 @@ from shm.store import (
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_daemon.heartbeat import seconds_since_beat, told
-from shm_daemon.spool import scan
+from shm_daemon.spool import never_taken, scan
 
 
 @click.command()
@@ -78,6 +78,9 @@ def _show(document: dict[str, Any]) -> None:
     click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
     click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
     click.echo(f"waiting: {document['spool']} in the spool, {document['under_way']} stored{since}")
+    if document["never_taken"]:
+        named = ", ".join(f"{one['path']} ({one['what']})" for one in document["never_taken"][:5])
+        click.echo(f"never taken from the spool: {len(document['never_taken'])}: {named}")
     click.echo(f"in quarantine: {document['quarantine']}")
     if document["held"]:
         click.echo(f"held until you decide: {len(document['held'])}; see `shm ingest --held`")
@@ -176,6 +179,10 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "under_way": sum(counts.values()) - ended,
         "oldest_waiting_at": store.oldest_waiting(),
         "spool": len(scan(workspace.spool)),
+        "never_taken": [
+            {"path": str(path.relative_to(workspace.spool)), "what": what}
+            for path, what in sorted(never_taken(workspace.spool).items())
+        ],
         "quarantine": sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json")),
         "alerts": len(alerts),
         "open_alerts": open_at.total(),

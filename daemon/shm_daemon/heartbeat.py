@@ -25,8 +25,22 @@ log = logging.getLogger(__name__)
 def beat(workspace: Workspace) -> None:
     """Shows that the loop of the active daemon went round."""
     with suppress(OSError):  # a full or read-only disk is waited out elsewhere
-        (workspace.folder / HEARTBEAT).touch()
+        (workspace.folder / HEARTBEAT).touch()  # what it says of a failed turn stays
     tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=watching {workspace.spool}")
+
+
+def turn_failed(workspace: Workspace, why: str) -> None:
+    """Leaves for others why the last turn failed; empty once one went well."""
+    with suppress(OSError):
+        (workspace.folder / HEARTBEAT).write_text(why, encoding="utf-8")
+
+
+def why_turn_failed(workspace: Workspace) -> str:
+    """Why the daemon's last turn failed; empty where it went well."""
+    try:
+        return (workspace.folder / HEARTBEAT).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return ""
 
 
 class Pulse:

@@ -24,7 +24,7 @@ from shm.store import Workspace
 from shm.store.active import ActiveLock
 from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
 from shm_daemon.execution import children_ended, executor_of
-from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd
+from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_failed
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
@@ -154,7 +154,8 @@ class Daemon:
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
         self._described_at = _modified_ns(flow.workspace)
-        self._once = False
+        self._once, self._failure = False, ""
+        turn_failed(flow.workspace, "")
 
     def serve(self, once: bool) -> bool:
         """Takes turns until the bell is stopped or, with `once`, until nothing is left to do.
@@ -187,11 +188,13 @@ class Daemon:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
-        """Whether anything is left to do; errors that pass are waited for."""
+        """Whether anything is left to do; errors that pass are waited for, and shown meanwhile."""
         try:
             if time.monotonic() >= self._scan_at:
                 self._scan()
-            return self._flow.advance() or self._flow.suspects_due_s() is not None
+            left = self._flow.advance() or self._flow.suspects_due_s() is not None
+            self._tell_failure("")
+            return left
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")
             self._flow.executor = self._make_executor()
@@ -199,14 +202,22 @@ class Daemon:
             if self._is_fatal(error):
                 raise
             log.warning("%s", error)
+            if not isinstance(error, StoreBusy):
+                self._tell_failure(str(error))
             self._scan_at = time.monotonic() + (error.retry_after_s or _UNREADABLE_S)
-        except Exception:
+        except Exception as error:
             if self._once:
                 raise
             # A service that ends by what it read reads it again when it is begun again.
             log.exception("this turn failed; the next one is tried in %.0f s", _UNREADABLE_S)
+            self._tell_failure(f"{type(error).__name__}: {error}")
             self._scan_at = time.monotonic() + _UNREADABLE_S
         return True
+
+    def _tell_failure(self, why: str) -> None:
+        if why != self._failure:
+            self._failure = why
+            turn_failed(self._flow.workspace, one_line(why))
 
     def _is_fatal(self, error: ShmError) -> bool:
         """Whether the service ends: not by what a damaged store answers, unless once is enough."""

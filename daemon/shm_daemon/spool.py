@@ -1,7 +1,8 @@
 """What lies in the spool, and which of it is whole.
 
 The spool is looked through with all its subfolders. Left alone are names that begin with a dot,
-uploads under way (`.part`, `.tmp`, `.filepart`), links, and sidecars, which wait for their file.
+uploads under way (`.part`, `.tmp`, `.filepart`), sidecars, which wait for their file, and what is
+no file or cannot be looked at: links, pipes, devices, folders of another user.
 A file is whole once neither it nor its sidecar has changed for some seconds; an empty one, which
 some loggers make first and fill later, is given ten times as long.
 """
@@ -34,17 +35,18 @@ class Look:
 def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Path, Look]:
     """The files of the spool that may become recordings; calls `meanwhile` at each."""
     found = {}
-    for path in _candidates(spool):
+    for path in _entries(spool):
         meanwhile()
-        look = _look(path)
-        if look is not None:
-            found[path] = look
+        if not path.name.lower().endswith((*_UNDER_WAY, _SIDECAR)):
+            look = _look(path)
+            if isinstance(look, Look):
+                found[path] = look
     return found
 
 
 def left_alone(spool: Path) -> list[Path]:
     """Uploads that are not finished, and sidecars whose file is not there."""
-    files = [path for path in spool.rglob("*") if path.is_file() and not path.is_symlink()]
+    files = [path for path in _entries(spool) if isinstance(_look(path), Look)]
     awaited = {sidecar_path(path) for path in files if not path.name.lower().endswith(_SIDECAR)}
     return [
         path
@@ -54,28 +56,63 @@ def left_alone(spool: Path) -> list[Path]:
     ]
 
 
-def _candidates(spool: Path) -> Iterator[Path]:
-    for folder, subfolders, names in os.walk(spool):
+def never_taken(spool: Path) -> dict[Path, str]:
+    """What lies in the spool and will never be taken, by what it is."""
+    unlisted: dict[Path, str] = {}
+
+    def note(error: OSError) -> None:
+        unlisted[Path(error.filename)] = f"a folder that cannot be listed ({error.strerror})"
+
+    looks = {path: _look(path) for path in _entries(spool, note)}
+    return unlisted | {path: look for path, look in looks.items() if isinstance(look, str)}
+
+
+def _entries(
+    spool: Path, note: Callable[[OSError], object] = lambda _error: None
+) -> Iterator[Path]:
+    """All but folders whose name does not begin with a dot, also of subfolders; links to folders
+    are entries, and are not gone into.
+    """
+    for folder, subfolders, names in os.walk(spool, onerror=note):
         subfolders[:] = [name for name in subfolders if not name.startswith(".")]
-        for name in names:
-            lower = name.lower()
-            if not name.startswith(".") and not lower.endswith((*_UNDER_WAY, _SIDECAR)):
+        links = [name for name in subfolders if Path(folder, name).is_symlink()]
+        for name in (*links, *names):
+            if not name.startswith("."):
                 yield Path(folder, name)
 
 
-def _look(path: Path) -> Look | None:
-    """None for what is no regular file, or was one a moment ago."""
+_KINDS = (
+    (stat.S_ISLNK, "a link"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISDIR, "a folder"),
+)
+
+
+def _look(path: Path) -> Look | str | None:
+    """What it is where it is no regular file or cannot be looked at; None where it is gone.
+
+    Whatever befalls one file, the others are seen.
+    """
     try:
         status = path.lstat()
+        if not stat.S_ISREG(status.st_mode):
+            return next((kind for is_one, kind in _KINDS if is_one(status.st_mode)), "a device")
+        sidecar = _status(sidecar_path(path))
     except FileNotFoundError:
         return None
-    if not stat.S_ISREG(status.st_mode):
-        return None
-    try:
-        sidecar = sidecar_path(path).lstat()
-    except FileNotFoundError:
+    except OSError as error:
+        return f"a file that cannot be looked at ({error.strerror})"
+    if sidecar is None:
         return Look(status.st_mtime_ns, status.st_size)
     return Look(status.st_mtime_ns, status.st_size, sidecar.st_mtime_ns, sidecar.st_size)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return path.lstat()
+    except FileNotFoundError:
+        return None
 
 
 class FileStabilityTracker:

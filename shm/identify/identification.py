@@ -34,6 +34,7 @@ from shm.values import (
     Mode,
     QualityCheck,
     Recording,
+    as_test_id,
 )
 
 
@@ -158,7 +159,7 @@ def _test(
     """The test with the earliest time and the mean temperature of its records."""
     temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
     return ModalTest(
-        id=test_id,
+        id=as_test_id(test_id),
         modes=modes,
         hanger=next((r.hanger for r in records if r.hanger is not None), None),
         time=min((r.time for r in records if r.time is not None), default=None),

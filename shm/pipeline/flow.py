@@ -122,7 +122,9 @@ class Flow:
         receipt = receive(path, self.workspace, self.store, now, sharing, self.meanwhile)
         recording = receipt.recording
         about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
-        log.info("%s: %s", recording.file.file_name, receipt.outcome, extra=about)
+        first = recording.file.file_name
+        came_as = f", known as {first}" if Path(first).name != path.name else ""
+        log.info("%s: %s%s", path.name, receipt.outcome, came_as, extra=about)
         return receipt
 
     def drain(self, after_each: Callable[[], object] = lambda: None) -> None:

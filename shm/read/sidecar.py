@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import tomllib
 from collections.abc import Iterable, Sequence
 from datetime import datetime
@@ -35,13 +36,21 @@ from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spr
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
+_SUFFIX = ".toml"
+_NAME_BYTES = 255  # the most that Linux's file systems take
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
 
 
 def sidecar_path(path: Path) -> Path:
-    """Where the sidecar of a file stands, whether it exists or not."""
+    """Where the sidecar of a file stands, whether it exists or not.
+
+    Beside a name so long that the sidecar's would be too long, it is the name cut to fit.
+    """
     plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
-    return plain.with_suffix(".toml")
+    name = os.fsencode(plain.with_suffix(_SUFFIX).name)
+    if len(name) > _NAME_BYTES:
+        name = name[: _NAME_BYTES - len(_SUFFIX)] + _SUFFIX.encode()
+    return plain.with_name(os.fsdecode(name))
 
 
 def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Header:

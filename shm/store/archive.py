@@ -46,13 +46,16 @@ def suffix_of(name: str) -> str:
 
 
 def safe_name(path: Path) -> str:
-    """A path as text that any file system and database holds: valid UTF-8, its last part short."""
-    text = os.fsencode(path.name).decode("utf-8", errors="replace")
+    """A path as text for any file system, database and log: printable UTF-8, its last part short."""
+    text = _printable(path.name)
     suffix = suffix_of(text)
-    stem = text[: len(text) - len(suffix)]
-    short = stem.encode()[: _NAME_BYTES - len(suffix)].decode("utf-8", errors="ignore")
-    parent = os.fsencode(path.parent).decode("utf-8", errors="replace")
-    return Path(parent, short + suffix).as_posix()
+    stem = text[: len(text) - len(suffix)].encode()[: _NAME_BYTES - len(suffix)]
+    return Path(_printable(path.parent), stem.decode(errors="ignore") + suffix).as_posix()
+
+
+def _printable(part: str | Path) -> str:
+    text = os.fsencode(part).decode(errors="replace")
+    return "".join(each if each.isprintable() else "_" for each in text)
 
 
 Meanwhile = Callable[[], object]

@@ -60,11 +60,14 @@ from shm.values.kinds import (
     Verdict,
 )
 from shm.values.modes import (
+    LONGEST_TEST_ID,
     ForeignMode,
     ModalTest,
     Mode,
     QualityCheck,
     ShapePoint,
+    as_test_id,
+    is_test_id,
 )
 from shm.values.posterior import (
     ENOUGH_EFFECTIVE,
@@ -101,6 +104,7 @@ from shm.values.trial import (
 
 __all__ = [
     "ENOUGH_EFFECTIVE",
+    "LONGEST_TEST_ID",
     "MOST_MISFIT_PERCENT",
     "NAN",
     "PLANES",
@@ -175,6 +179,8 @@ __all__ = [
     "WatchedQuantity",
     "WatchedTest",
     "Way",
+    "as_test_id",
     "effect_label",
+    "is_test_id",
     "leads",
 ]

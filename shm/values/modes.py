@@ -72,12 +72,28 @@ class QualityCheck:
     remedy: str = ""
 
 
+LONGEST_TEST_ID = 200
+"""Characters; as long as the name of a file may be, see `shm.store.archive.safe_name`."""
+
+
+def is_test_id(text: str) -> bool:
+    """Whether a text may name a test."""
+    return 0 < len(text) <= LONGEST_TEST_ID and text.isprintable()
+
+
+def as_test_id(name: str) -> str:
+    """An id out of any name: what cannot be printed, and would break a line or a log, is "_"."""
+    printable = "".join(each if each.isprintable() else "_" for each in name)
+    return printable[:LONGEST_TEST_ID] or "_"
+
+
 @dataclass(frozen=True)
 class ModalTest:
     """What one hammer test says about a hanger: its identified modes and the conditions.
 
-    `tension_read_n` is what a load cell or a lift-off showed during the test, with the reading's
-    standard deviation.
+    `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document
+    with another can be read back. `tension_read_n` is what a load cell or a lift-off showed during
+    the test, with the reading's standard deviation.
     """
 
     id: str
@@ -89,6 +105,10 @@ class ModalTest:
     added_mass: AddedMass | None = None
     tension_read_n: float = NAN
     tension_read_sd_n: float = NAN
+
+    def __post_init__(self) -> None:
+        if not is_test_id(self.id):
+            raise ValueError(f"{self.id!r} is no id of a test; see as_test_id")
 
     @property
     def regular_modes(self) -> tuple[Mode, ...]:

@@ -18,6 +18,7 @@ import sqlite3
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from contextlib import closing
 from pathlib import Path
@@ -127,7 +128,12 @@ def main() -> None:
             raw = sorted(workspace.archive.folder.glob("??/*"))
             flip(rng.choice(raw) if in_archive else workspace.database, rng)
             matters = in_archive or rows(workspace.database) != before
-            found = is_found(workspace)
+            try:
+                found = is_found(workspace)
+            except Exception:  # noqa: BLE001 - any end of the check is what is looked for
+                traceback.print_exc()
+                counts["check ended by an error"] += 1
+                found = False
             kind = "archive" if in_archive else "rows" if matters else "no content"
             counts[f"{kind}: {'found' if found else 'not found'}"] += 1
             if matters and not found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import sys
@@ -15,7 +16,7 @@ from shm.pipeline.intake import receive
 from shm.read import apart
 from shm.store import Archive, DeliveryState, Stage, Workspace
 from shm_daemon.doctor import Finding, Level, checks, examine
-from shm_daemon.heartbeat import HEARTBEAT, beat
+from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
 from tests.helpers.postgres import Databases
@@ -217,6 +218,29 @@ def test_files_that_wait_too_long_in_the_spool_are_told(workspace: Workspace) ->
     assert (waiting.level, "1 file in the queue" in waiting.found) == (Level.WARNING, True)
     assert "alone.toml" in forgotten.found
     assert "broken.csv.part" in forgotten.found
+
+
+def test_what_will_never_be_taken_is_told_at_once(workspace: Workspace) -> None:
+    os.mkfifo(workspace.spool / "pipe.csv")
+    (workspace.spool / "link.csv").symlink_to("/etc/hostname")
+    (workspace.spool / "campaign").symlink_to("/tmp")
+    queue, never = found(workspace, "spool", datetime.now(UTC))
+    assert queue.level is Level.OK
+    assert never.level is Level.WARNING
+    for named in ("pipe.csv is a named pipe", "link.csv is a link", "campaign is a link"):
+        assert named in never.found
+
+
+def test_a_turn_that_failed_is_a_fault_until_one_goes_well(workspace: Workspace) -> None:
+    with workspace.lock():
+        beat(workspace)
+        turn_failed(workspace, "OSError: too long")
+        beat(workspace)
+        finding = only(workspace, "daemon")
+        assert finding.level is Level.FAULT
+        assert "its last turn failed: OSError: too long" in finding.found
+        turn_failed(workspace, "")
+        assert only(workspace, "daemon").level is Level.OK
 
 
 def test_a_recording_that_stands_still_is_told(workspace: Workspace) -> None:

@@ -16,7 +16,9 @@ from shm.errors import ShmError, StoreBusy, StoreError
 from shm.pipeline import Flow, Sharing, steps
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Store, Workspace
+from shm.store.checking import check_store
 from shm_daemon import Bell, run
+from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
@@ -120,6 +122,49 @@ def test_once_takes_everything_with_its_subfolders_and_ends(workspace: Workspace
     run_once(workspace)
     assert counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: 1}
     assert list(workspace.spool.rglob("*")) == [workspace.spool / "logger"]
+
+
+_ODD_NAMES = (
+    "x" * 251 + ".csv",  # its sidecar's name would be too long
+    "y" * 244 + ".modes.json",
+    "two\nlines.csv",
+    "tab\t.csv",
+    "escape\x1b[31m.csv",
+    "turned\u202e.csv",
+    "next\x85.csv",
+)
+
+
+def test_no_name_of_a_file_holds_up_the_others(
+    workspace: Workspace, serve: Callable[..., Bell]
+) -> None:
+    serve()
+    for name in _ODD_NAMES:
+        (workspace.spool / name).write_text(f"no recording: {name!r}")
+    os.mkfifo(workspace.spool / "pipe.csv")
+    write_test(workspace.spool / "good.modes.json", workspace)
+    until(lambda: counts(workspace) == {Stage.DONE: 1, Stage.REFUSED: len(_ODD_NAMES)})
+    assert [path.name for path in workspace.spool.iterdir()] == ["pipe.csv"]
+    assert why_turn_failed(workspace) == ""
+    with workspace.store() as store:
+        assert check_store(store, lambda *_: None).troubles == ()
+        names = [event.file_name for event in store.events("refused")]
+    assert len(names) == len(_ODD_NAMES)
+    assert all(name.isprintable() and len(name) <= 200 for name in names)
+
+
+def test_a_turn_that_fails_is_shown_until_one_goes_well(
+    workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise OSError("the spool is odd")
+
+    monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
+    with monkeypatch.context() as broken:
+        broken.setattr("shm_daemon.loop.scan", fails)
+        serve()
+        until(lambda: "the spool is odd" in why_turn_failed(workspace))
+    until(lambda: why_turn_failed(workspace) == "")
 
 
 def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:

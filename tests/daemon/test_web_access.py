@@ -90,7 +90,16 @@ def test_a_wrong_token_is_refused_even_where_none_would_do(at_home: Served) -> N
 
 
 def test_a_name_that_is_not_ours_is_refused(at_home: Served) -> None:
-    for host in ("evil.example", "evil.example:8400", "127.0.0.1.evil.example", ""):
+    for host in (
+        "evil.example",
+        "evil.example:8400",
+        "127.0.0.1.evil.example",
+        "",
+        "localhost:8400@evil.example",
+        "localhost@evil.example",
+        "[::1]evil.example",
+        "localhost:8400/evil.example",
+    ):
         with at_home.client(at_home.read_token, Host=host) as client:
             assert client.get("/api/status").status_code == 400
 

@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from shm.store import Workspace
-from shm_daemon.heartbeat import beat
+from shm_daemon.heartbeat import beat, turn_failed
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace, put
@@ -47,6 +47,22 @@ def test_it_says_that_no_daemon_runs_and_then_that_work_flows(
     assert "The daemon has never run here." in page
     beat(bridge)
     assert "Work flows" in client.get("/operation").text
+
+
+def test_a_daemon_whose_turns_fail_is_no_healthy_one(
+    bridge: Workspace, client: httpx.Client
+) -> None:
+    beat(bridge)
+    assert client.get("/health").status_code == 200
+    turn_failed(bridge, "OSError: File name too long: /srv/secret")
+    beat(bridge)
+    answer = client.get("/health")
+    assert (answer.status_code, answer.json()["status"]) == (503, "failing")
+    assert "last turn failed" in answer.text
+    assert "secret" not in answer.text
+    assert "Stands still" in client.get("/operation").text
+    turn_failed(bridge, "")
+    assert client.get("/health").status_code == 200
 
 
 def test_refused_files_are_listed_with_their_reasons(client: httpx.Client) -> None:

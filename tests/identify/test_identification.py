@@ -93,6 +93,14 @@ def test_the_result_is_a_valid_modes_document(identified: Identification) -> Non
     ]
 
 
+def test_a_name_that_cannot_be_printed_makes_a_document_that_can_be_read() -> None:
+    record = recording(hanger_modes(), noise=0.02, hits=4)
+    found = identify([record], OPTIONS, test_id="two\nlines \u202e" + "x" * 300).test
+    assert found.id.startswith("two_lines _xxx")
+    (again,) = parse_modes(json.loads(dump(modes_document([found]))))
+    assert again.id == found.id
+
+
 def test_the_response_peaks_at_the_modes(identified: Identification) -> None:
     response = identified.frequency_response
     assert response.accelerance.shape == (4, len(response.frequency_hz))

@@ -50,6 +50,16 @@ def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
 
 def test_model_names_are_split_and_trimmed() -> None:
     assert load_settings({"models": " beam1, beam2,"}, {}, {}).model_names == ("beam1", "beam2")
+    assert load_settings({"models": ["beam1", "beam2"]}, {}, {}).model_names == ("beam1", "beam2")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("models", [1, 2]), ("models", 3), ("models", {}), ("web_hosts", True), ("workers", True)],
+)
+def test_a_value_of_another_kind_is_refused_where_it_is_given(name: str, value: object) -> None:
+    with pytest.raises(BadInput, match=f"setting {name} = "):
+        load_settings({name: value}, environment={})
 
 
 @pytest.mark.parametrize("name", ["identifier", "cross_check", "estimator"])

@@ -17,8 +17,8 @@ from shm.pipeline.redescribed import redescribed
 from shm.report.words import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import quick_troubles
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
-from shm_daemon.spool import left_alone, scan
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.spool import left_alone, never_taken, scan
 
 _WAITS_LONG = timedelta(minutes=10)
 _STUCK = timedelta(hours=1)
@@ -26,6 +26,7 @@ _STUCK_BEHIND_OTHERS = timedelta(days=1)
 _NOTHING_MOVES = timedelta(minutes=15)
 _FORGOTTEN = timedelta(days=1)
 _LOOKED_AT = 100
+_FAILED = "Nothing is taken in meanwhile: mend what it names; its log tells more."
 _BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
 _CLOCK_TOLERANCE = timedelta(minutes=1)
 _SYNCHRONISED = ["timedatectl", "show", "--property=NTPSynchronized", "--value"]
@@ -102,6 +103,8 @@ def check_daemon(examined: Examined) -> Iterator[Finding]:
             f"{holder} holds the store, but a daemon's loop was {seen}",
             "If that is no `shm ingest` or `shm db` at work, the daemon hangs: begin it again.",
         )
+    elif failed := why_turn_failed(workspace):
+        yield fault("daemon", f"{holder} is active, but its last turn failed: {failed}", _FAILED)
     else:
         yield ok("daemon", f"{holder} is active, {seen}")
 
@@ -117,6 +120,14 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
         late = max(ages) > _WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
+    never = never_taken(spool)
+    if never:
+        named = [f"{path.relative_to(spool)} is {what}" for path, what in sorted(never.items())]
+        yield warning(
+            "spool",
+            f"never taken: {some(named)}",
+            "Only files are taken: put the file itself there, readable by the daemon's user.",
+        )
     forgotten = [path for path in left_alone(spool) if _age(path, examined.now) > _FORGOTTEN]
     if forgotten:
         yield warning(

@@ -186,7 +186,9 @@ def _broken(name: str, error: ShmError | OSError) -> Finding:
     if isinstance(error, ShmError):
         where = f"{error.where}: " if error.where else ""
         return fault(name, f"{where}{error.message}", error.remedy)
-    return fault(name, f"{error.filename or ''}: {error.strerror or error}", "See permissions.")
+    denied = isinstance(error, PermissionError)
+    remedy = "Let this user in." if denied else "Mend or remove what it names."
+    return fault(name, f"{error.filename or ''}: {error.strerror or error}", remedy)
 
 
 _MODULES = {

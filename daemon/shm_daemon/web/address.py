@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address
@@ -68,11 +69,13 @@ def caller_of(peer: str, forwarded_for: str, proxies: str) -> str:
     return peer
 
 
+_HOST = re.compile(r"(\[(?P<number>[^\[\]]*)\]|(?P<name>[^\[\]:@/?#]*))(:\d*)?")
+
+
 def _name_of(host_header: str) -> str:
-    text = host_header.strip().lower()
-    if text.startswith("["):
-        return text[1:].partition("]")[0]
-    return text.partition(":")[0].rstrip(".")
+    """Empty for what is no host with or without a port: RFC 9110 knows no user before it."""
+    found = _HOST.fullmatch(host_header.strip().lower())
+    return (found["number"] or found["name"].rstrip(".")) if found else ""
 
 
 def _is_loopback(name: str) -> bool:

@@ -14,7 +14,8 @@ from datetime import timedelta
 from typing import Any
 
 from shm.errors import ShmError
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told
+from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.spool import never_taken
 from shm_daemon.web.site import Site
 
 _NAMED = 5  # of many: the pages list them all
@@ -45,7 +46,7 @@ def limits(site: Site) -> list[str]:
 
 def attention(site: Site) -> list[str]:
     """What a person should look at though nothing fails."""
-    return _found(site, _held)
+    return _found(site, _held, _never_taken)
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,9 @@ def _daemon(site: Site) -> list[str]:
         return ["The daemon has never run here."]
     if ago > patience_s(site.workspace):
         return [f"The daemon was last seen {told(timedelta(seconds=ago))} ago."]
-    return []
+    # Its words may name folders of the machine, and `/health` needs no token.
+    failed = why_turn_failed(site.workspace)
+    return ["The daemon's last turn failed; its log and `shm doctor` say why."] if failed else []
 
 
 def _held(site: Site) -> list[str]:
@@ -144,6 +147,11 @@ def _held(site: Site) -> list[str]:
         f"hanger {hanger}: {_recordings(ids)} held until a person decides."
         for hanger, ids in sorted(of_hangers.items())
     ]
+
+
+def _never_taken(site: Site) -> list[str]:
+    count = len(never_taken(site.workspace.spool))
+    return [f"{count} of the spool will never be taken: see `shm doctor`."] if count else []
 
 
 def _recordings(ids: Sequence[int]) -> str:
