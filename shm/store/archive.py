@@ -46,7 +46,7 @@ def suffix_of(name: str) -> str:
 
 
 def safe_name(path: Path) -> str:
-    """A path as text for any file system, database and log: printable UTF-8, its last part short."""
+    """A path as text for any file system, database, log: printable UTF-8, its last part short."""
     text = _printable(path.name)
     suffix = suffix_of(text)
     stem = text[: len(text) - len(suffix)].encode()[: _NAME_BYTES - len(suffix)]
