@@ -22,6 +22,7 @@ from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.words import model_class
 from shm.store import (
     ENDED,
+    Decision,
     DeliveryState,
     FormerPosterior,
     FormerTest,
@@ -234,12 +235,16 @@ def _hangers(
     return rows
 
 
+_OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
+
+
 def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
     """Raises NothingThere where there is no such recording or test."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recording_named(which)
         recording = store.recording(recording_id)
         steps, tests = store.steps(recording_id), store.former_tests(recording_id)
+        noticed = store.events(recording_id=recording_id)
         other_names = [n for n in store.names_of(recording_id) if n != recording.file.file_name]
     if as_json:
         show(
@@ -249,6 +254,10 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
                 "also_came_as": other_names,
                 "stage": recording.stage.value,
                 "steps": [asdict(step) for step in steps],
+                "noticed": [
+                    {"at": event.at, "kind": event.kind, "message": event.message}
+                    for event in noticed
+                ],
                 "results": [asdict(test) for test in tests],
             }
         )
@@ -257,9 +266,19 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
     title = f"recording {recording_id}: {recording.file.file_name}{also}"
     made = table(title, "stage", "test", "at")
     made.add_column("shm", justify="right")
+    by_a_person = {event.at: event.kind for event in noticed if event.kind in _OUT}
     for step in steps:
-        made.add_row(step.stage, step.test or "", f"{step.at:%Y-%m-%d %H:%M:%S}", step.version)
+        made.add_row(
+            by_a_person.get(step.at, step.stage),
+            step.test or "",
+            f"{step.at:%Y-%m-%d %H:%M:%S}",
+            step.version,
+        )
     show_table(made)
+    for event in noticed:
+        if event.message:
+            said = f"{event.at:%Y-%m-%d %H:%M:%S} {event.kind}: {event.message}"
+            click.echo(paragraph(said))
     for test in tests:
         _tell(test)
 

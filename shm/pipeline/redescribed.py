@@ -1,4 +1,5 @@
-"""What of a hanger's description has changed since its baseline, where that moves its results.
+"""What has changed since a hanger's baseline was made, of what it was made from: the description,
+where that moves results, and the tests.
 
 The description stands beside each posterior since there were such comparisons; of an older baseline
 nothing is known, and so nothing is said.
@@ -12,7 +13,7 @@ from dataclasses import MISSING, asdict, fields, is_dataclass
 from typing import Any
 
 from shm.documents import dump
-from shm.store import Baseline
+from shm.store import Baseline, Stage, Store
 from shm.values import Hanger
 
 MOVES_NOTHING = frozenset({"id", "name", "thresholds", "limits", "models", "effect_priors"})
@@ -26,6 +27,12 @@ def redescribed(hanger: Hanger, baseline: Baseline | None) -> tuple[str, ...]:
         return ()
     before, now = _comparable(baseline.described), _comparable(asdict(hanger))
     return tuple(_changes(before, now))
+
+
+def discarded_of(store: Store, baseline: Baseline | None) -> tuple[str, ...]:
+    """The tests of a baseline that count no more, by name: a person has discarded them since."""
+    tests = () if baseline is None else store.tests_of(baseline)
+    return tuple(each.test.id for each in tests if each.stage == Stage.REFUSED)
 
 
 def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import stored_pattern
 from shm.pipeline.origins import IDENTIFY_SETTINGS, settings_words, test_lineage
-from shm.pipeline.redescribed import redescribed
+from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
@@ -92,6 +92,7 @@ def hanger_now(
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),
         redescribed=redescribed(hanger, store.baseline(hanger.id)),
+        discarded=discarded_of(store, store.baseline(hanger.id)),
     )
 
 

@@ -191,7 +191,8 @@ class HangerReport:
     where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
-    hanger's description has changed since the baseline, where that moves results.
+    hanger's description has changed since the baseline, where that moves results; `discarded` names
+    the tests of the baseline that count no more.
     """
 
     bridge: str
@@ -218,6 +219,7 @@ class HangerReport:
     period: Period | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     redescribed: tuple[str, ...] = ()
+    discarded: tuple[str, ...] = ()
 
     @property
     def latest(self) -> ModalTest:

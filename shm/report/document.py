@@ -46,6 +46,7 @@ def json(data: HangerReport) -> dict[str, Any]:
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
         "redescribed": list(data.redescribed),
+        "discarded_of_baseline": list(data.discarded),
         "temperature_coefficients": temperature_documents(data.states),
         "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
         "period": period_json(data.period),

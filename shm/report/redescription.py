@@ -1,4 +1,4 @@
-"""What a report says first where the description has changed since the baseline."""
+"""What a report says first where the baseline is not what it was made from any more."""
 
 from __future__ import annotations
 
@@ -16,6 +16,21 @@ def redescribed(data: HangerReport) -> str:
     number = data.hanger.id
     return (
         f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`. "
+        f"{_anew(number)} "
         "Until then shifts and alerts compare two descriptions, not two states of the hanger."
     )
+
+
+def discarded(data: HangerReport) -> str:
+    """That tests of the baseline count no more, and what to do; empty where all do."""
+    if not data.discarded:
+        return ""
+    names, number = ", ".join(data.discarded), data.hanger.id
+    return (
+        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
+        f"change stands on what counts no more. {_anew(number)}"
+    )
+
+
+def _anew(number: int) -> str:
+    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."

@@ -12,7 +12,7 @@ from shm.report import words
 from shm.report.content import HangerReport, Interval
 from shm.report.diagnosis.summary import next_step, verdict
 from shm.report.diagnosis.tensions import AFTER, tension_of
-from shm.report.redescription import redescribed
+from shm.report.redescription import discarded, redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
@@ -59,6 +59,7 @@ def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
         redescribed(data),
+        discarded(data),
         *data.averaged.caveats,
         _tension(data),
         *_repeats_and_limits(data),

@@ -10,6 +10,7 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
+from shm.pipeline.redescribed import discarded_of
 from shm.store import Stage, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
@@ -145,7 +146,13 @@ def test_what_counts_is_discarded_with_a_reason_and_taken_back(shm: Shm, held: W
     assert "`shm ingest --confirm 1 --why TEXT`" in said
     with held.store() as store:
         assert store.tests(3) == ()
+        assert discarded_of(store, store.baseline(3)) == ("good",)
     assert shm("--workspace", held.folder, "db", "check").code == 0
+    stages = " ".join(shm("--workspace", held.folder, "status", "--of", 1).out.split())
+    assert "refused" not in stages
+    assert "withdrawn: Withdrawn by" in stages
+    doctor = " ".join(shm("--workspace", held.folder, "doctor").out.split())
+    assert "baseline made from a test that was discarded: 3" in doctor
     back = shm(*say, "--confirm", 1, "--why", "of hanger 3 after all", "--json").document
     assert (back["decision"], back["stage"]) == ("reinstated", "done")
     assert shm(*say, "--confirm", 1).code == shm(*say, "--confirm", 1, "--why", "x").code == 2

@@ -43,6 +43,28 @@ def rewritten(workspace: Workspace, old: str, new: str) -> Workspace:
     return workspace.reopened()
 
 
+def test_a_baseline_of_a_discarded_test_is_said_first_until_there_is_a_new_one(
+    shm: Shm, tmp_path: Path
+) -> None:
+    workspace = make_workspace(tmp_path / "discarded")
+    for day in (0, 30, 60):
+        write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
+    ingest(workspace)
+    say = ("--workspace", workspace.folder)
+    discard = ("ingest", "--discard", "t0", "--why", "loose sensor", "--who", "Ann")
+    assert shm(*say, *discard).code == 0
+    with workspace.store() as store:
+        data = hanger_report(workspace, store, 3, START)
+    assert data.discarded == ("t0",)
+    first = " ".join(text(data).splitlines()[:8])
+    assert "The baseline of hanger 3 was made from t0, discarded since" in first
+    assert json(data)["discarded_of_baseline"] == ["t0"]
+    anew = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}", "--why", "x")
+    assert shm(*say, *anew).code == 0
+    with workspace.store() as store:
+        assert hanger_report(workspace, store, 3, START).discarded == ()
+
+
 def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_baseline(
     before: Workspace, shm: Shm
 ) -> None:

@@ -13,7 +13,7 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
-from shm.pipeline.redescribed import redescribed
+from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.report.words import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import quick_troubles
@@ -313,24 +313,31 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
         yield warning("hangers", f"no test yet: {some(never)}", "Test them.")
     if forming:
         yield warning("hangers", f"no baseline yet: {some(forming)}", "Take more tests.")
-    changed = [
-        str(each.id) for each in bridge.hangers if redescribed(each, store.baseline(each.id))
-    ]
-    if changed:
-        yield warning(
-            "hangers",
-            f"described otherwise since the baseline: {some(changed)}",
-            f"Set a new baseline: `shm drift rebaseline --hanger {changed[0]} --since DAY --why "
-            "TEXT`.",
-        )
+    outdated = list(_outdated_baselines(examined))
+    yield from outdated
     strangers = sorted(set(latest) - set(ids))
     if strangers:
         names = some([str(each) for each in strangers])
         yield warning(
             "hangers", f"tests of hangers not described: {names}", "Describe them in bridge.toml."
         )
-    if not (quiet or never or forming or changed or strangers):
+    if not (quiet or never or forming or outdated or strangers):
         yield ok("hangers", f"{len(ids)}, with a baseline and recent tests")
+
+
+def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
+    """Baselines that are not what they were made from any more."""
+    store = examined.store
+    baselines = [(each, store.baseline(each.id)) for each in examined.workspace.bridge.hangers]
+    changed = [str(each.id) for each, made in baselines if redescribed(each, made)]
+    gone = [str(each.id) for each, made in baselines if discarded_of(store, made)]
+    for hangers, found in (
+        (changed, "described otherwise since the baseline"),
+        (gone, "baseline made from a test that was discarded"),
+    ):
+        if hangers:
+            anew = f"shm drift rebaseline --hanger {hangers[0]} --since DAY --why TEXT"
+            yield warning("hangers", f"{found}: {some(hangers)}", f"Set a new baseline: `{anew}`.")
 
 
 def _synchronised() -> bool | None:
