@@ -277,7 +277,8 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
     show_table(made)
     for event in noticed:
         if event.message:
-            said = f"{event.at:%Y-%m-%d %H:%M:%S} {event.kind}: {event.message}"
+            kind = "" if event.message.startswith(event.kind) else f"{event.kind}: "
+            said = f"{event.at:%Y-%m-%d %H:%M:%S} {kind}{event.message}"
             click.echo(paragraph(said))
     for test in tests:
         _tell(test)

@@ -150,7 +150,7 @@ def test_what_counts_is_discarded_with_a_reason_and_taken_back(shm: Shm, held: W
     assert shm("--workspace", held.folder, "db", "check").code == 0
     stages = " ".join(shm("--workspace", held.folder, "status", "--of", 1).out.split())
     assert "refused" not in stages
-    assert "withdrawn: Withdrawn by" in stages
+    assert " withdrawn by " in stages
     doctor = " ".join(shm("--workspace", held.folder, "doctor").out.split())
     assert "baseline made from a test that was discarded: 3" in doctor
     back = shm(*say, "--confirm", 1, "--why", "of hanger 3 after all", "--json").document
