@@ -250,4 +250,4 @@ def test_a_name_in_the_archive_that_became_a_number_ends_no_check(
     with closing(sqlite3.connect(bridge.database)) as connection, connection:
         connection.execute("UPDATE recordings SET archived_as = '7' WHERE id = 1")
     assert run(["--workspace", str(bridge.folder), "db", "check", "--archive"]) == 5
-    assert "archive/7" in capsys.readouterr().out
+    assert "archive/7" in capsys.readouterr().err
