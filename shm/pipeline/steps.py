@@ -31,7 +31,7 @@ from shm.values import (
     Selection,
     WatchedTest,
 )
-from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
+from shm.watch import Beside, DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
 def identify_file(
@@ -133,18 +133,22 @@ def watch_test(
     limit_years: float,
     kept: bytes | None = None,
     tension: Averaged | None = None,
+    beside: Beside | None = None,
 ) -> tuple[WatchedTest, Alert | None, bytes] | None:
     """What the watch says after a test, the alert that it calls for, and what to keep of it.
 
     The alert leads with the `tension` by the test.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
-    that one alone, with what was `kept` before it: None where nothing can go on from that.
+    that one alone, with what was `kept` before it: None where nothing can go on from that. The
+    tests `beside` it are those that it may agree with, whatever the clocks say.
     """
     since_baseline, later = tests
     options = WatchOptions(limit_years=limit_years)
     try:
-        found = watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept)
+        found = watch_newest(
+            baseline.posterior, since_baseline, later, hanger, options, kept, beside
+        )
     except BadInput:
         if kept is None:
             raise
