@@ -24,6 +24,7 @@ from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import (
     Alert,
     Averaged,
+    Beside,
     Hanger,
     ModalTest,
     Posterior,
@@ -31,7 +32,7 @@ from shm.values import (
     Selection,
     WatchedTest,
 )
-from shm.watch import Beside, DatedTest, WatchOptions, joined, watch_gap, watch_newest
+from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 
 
 def identify_file(

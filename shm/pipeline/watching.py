@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.store import Baseline, Stage, Store, StoredTest, WatchedName
-from shm.values import ModalTest
+from shm.values import Beside, ModalTest
 
 if TYPE_CHECKING:
-    from shm.watch import Beside, DatedTest
+    from shm.watch import DatedTest
 
 _BESIDE = 2  # of which two that agree have been told before
 
@@ -48,8 +48,6 @@ def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside
 
     What is held for its clock alone came in as any other: what it measured is in no doubt.
     """
-    from shm.watch.agreement import Beside
-
     by_clock = [hold.recording_id for hold in store.holds(newest.hanger) if hold.is_for_its_clock]
     came = store.tests_that_came_beside(baseline, newest, _BESIDE, by_clock)
     dated = store.tests_dated_beside(baseline, newest, _BESIDE)

@@ -34,7 +34,7 @@ from shm.store.tables import (
 from shm.values import Fingerprint, KnownSamples
 
 _MOST_COMPARED = (
-    1000  # recordings of a hanger: some 15 MB, at most 60; older ones are found by their digest
+    1000  # recordings of a hanger: some 20 MB, at most 110; older ones are found by their digest
 )
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 

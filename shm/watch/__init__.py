@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from shm.models.ends import end_stiffness
-from shm.watch.agreement import Beside
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
 from shm.watch.options import WatchOptions
 from shm.watch.watching import (
@@ -15,7 +14,6 @@ from shm.watch.watching import (
 )
 
 __all__ = [
-    "Beside",
     "DatedTest",
     "Newest",
     "WatchOptions",

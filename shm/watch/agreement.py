@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from shm.values import TENSION, Alert, Drift, Hanger, ModalTest, WatchedQuantity
+from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
@@ -37,20 +37,6 @@ _TOLD = 2
 """Tests that agree: as many as that were told when the second of them came."""
 
 Way = Literal["up", "down"]
-
-
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """The tests next to the newest, the nearest first: as they `came` in, before and after it, and
-    as they are `dated`.
-
-    Those that came may be `held` (their names) for their clock alone: what they measured counts.
-    Tests that are not watched yet are left out; each is asked of in its turn.
-    """
-
-    came: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
-    dated: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
-    held: Collection[str] = ()
 
 
 @dataclass(frozen=True)
@@ -137,7 +123,8 @@ def _read(reader: Reader, test: ModalTest, j: int, options: WatchOptions) -> _Sh
     else:
         scatter = max(options.spring_scatter_of_step) * quantity.step_sd
         per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
-    variance = float(covariance[j, j]) + scatter**2 + (per_kelvin * kelvin) ** 2
+    of_both = 2 * scatter**2  # a baseline of one test scatters as much
+    variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
     return _Shown(float(reading.mean[j]), variance)
 
 

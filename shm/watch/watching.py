@@ -25,6 +25,7 @@ from shm.errors import BadInput
 from shm.values import (
     Alert,
     AlertKind,
+    Beside,
     Change,
     Drift,
     Hanger,
@@ -34,7 +35,7 @@ from shm.values import (
     Reading,
     WatchedTest,
 )
-from shm.watch.agreement import Beside, Way, agreement
+from shm.watch.agreement import Way, agreement
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over

@@ -11,8 +11,8 @@ import pytest
 
 from shm.inference import UpdateOptions
 from shm.models import build
-from shm.values import Alert, ModalTest, Thresholds
-from shm.watch import Beside, Newest, WatchOptions, watch_newest
+from shm.values import Alert, Beside, ModalTest, Thresholds
+from shm.watch import Newest, WatchOptions, watch_newest
 from tests.helpers import quick_update
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import modelled_test
