@@ -69,9 +69,7 @@ KNOWN: dict[str, Alter] = {
     "low-passed at 0.4 of its band": lambda r: _each(
         r, lambda v: np.asarray(signal.lfilter(*_LOW_PASS, v))
     ),
-    "all but low-passed, cut to 70 %": lambda r: noisy(
-        rotated(drifting(cut(r, 0.2, 0.9)), 0.02), 0.01
-    ),
+    "noise of 1 %, a drift, axes turned": lambda r: noisy(rotated(drifting(r), 0.02), 0.01),
 }
 """What is known again."""
 
@@ -79,6 +77,7 @@ ALTERED: dict[str, Alter] = {
     **KNOWN,
     "noise of 2 %": lambda r: noisy(r, 0.02),
     "noise of 5 %": lambda r: noisy(r, 0.05),
+    "cut to 70 %, noise of 1 %": lambda r: noisy(cut(r, 0.2, 0.9), 0.01),
     "one hit of three, noise of 1 %": lambda r: noisy(cut(r, 0, 1 / 3), 0.01),
     "every other sample": lambda r: replace(
         _each(r, lambda v: v[::2]), sampling_rate_hz=r.sampling_rate_hz / 2
