@@ -34,7 +34,7 @@ from shm.store.tables import (
 from shm.values import Fingerprint, KnownSamples
 
 _MOST_COMPARED = (
-    1000  # recordings of a hanger: some 15 MB, at most 60; older ones are found by their digest
+    1000  # recordings of a hanger: some 20 MB, at most 110; older ones are found by their digest
 )
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
@@ -146,9 +146,20 @@ class Holding(Queries):
         self, hanger: int, recording_id: int, limit: int
     ) -> tuple[StoredTest, ...]:
         """The latest tests of a hanger that count, but for those of one recording, by time."""
+        return self._latest_but(hanger, recording_id, limit, tests.c.time)
+
+    def latest_tests_received(
+        self, hanger: int, recording_id: int, limit: int
+    ) -> tuple[StoredTest, ...]:
+        """Those of them that came in last, whatever their time."""
+        return self._latest_but(hanger, recording_id, limit, tests.c.recording_id)
+
+    def _latest_but(
+        self, hanger: int, recording_id: int, limit: int, order: sa.Column[Any]
+    ) -> tuple[StoredTest, ...]:
         mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
         query = plain_tests.where(mine, counts(tests), in_force(tests))
-        latest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
+        latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
         return self._tests(latest)[::-1]
 
 
