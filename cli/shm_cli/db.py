@@ -15,13 +15,21 @@ from shm.errors import DamagedRow, StoreError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
-from shm.store.checking import CheckedArchive, archived_names, check_archive, check_store
+from shm.store.checking import (
+    CheckedArchive,
+    archived_names,
+    check_archive,
+    check_store,
+    of_no_recording,
+    unknown_files,
+)
 from shm.store.copying import TableContent
 from shm.store.missing import MissingRow
 from shm_cli.common import (
     counting_bar,
     json_option,
     open_workspace,
+    paragraph,
     progress_bar,
     show,
     show_table,
@@ -201,6 +209,8 @@ def restore_command(
         _show_tables(restored.tables)
         kept_said = f" What it held before is in {restored.kept}." if restored.kept else ""
         click.echo(f"The store holds what {file} holds.{kept_said}")
+        with workspace.store() as store:
+            _say_unknown(unknown_files(store, workspace.archive))
         _say_copied(copied)
     _raise_troubles(copied.troubles if copied else (), "Fetch them from another copy.")
 
@@ -261,6 +271,12 @@ def _show_tables(tables: Sequence[TableContent]) -> None:
 def _say_copied(copied: CopiedArchive | None) -> None:
     if copied is not None:
         click.echo(f"Raw files: {copied.copied} copied, {copied.present} were there already.")
+
+
+def _say_unknown(names: Sequence[str]) -> None:
+    if names:
+        what, remedy = of_no_recording(names)
+        click.echo(paragraph(f"Raw files: {what}. {remedy}"), err=True)
 
 
 def _archive_said(archive: CheckedArchive) -> str:

@@ -16,7 +16,7 @@ from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import latest_drifts
-from shm.pipeline.rebaselining import Order
+from shm.pipeline.rebaselining import Order, changes_within
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.pipeline.reporting import hanger_states
 from shm.report.shifts import shift_cells
@@ -71,12 +71,20 @@ def rebaseline(
     order = Order(since.replace(tzinfo=UTC), why, who or getpass.getuser())
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
+        within = changes_within(store, hanger_id, order.since)
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
         alerts = [each.id for each in store.alerts(hanger_id) if each.acknowledgement is None]
     if as_json:
-        show(_document(made))
+        show({**_document(made), "changes_within": [each.began_by for each in within]})
         return
+    if within:
+        day = f"{max(each.began_by for each in within):%Y-%m-%d}"
+        said = (
+            f"These tests lie on both sides of a change that was called (by {day}): the baseline "
+        )
+        said += f"mixes two states. For that after it give `--since {day}`."
+        click.echo(paragraph(said), err=True)
     tension_n = made.posterior.tension_n
     unit = force_unit(float(tension_n.mean()))
     tension = unit.of(tension_n)

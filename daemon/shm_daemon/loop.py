@@ -155,6 +155,8 @@ class Daemon:
         self._scan_at = 0.0
         self._described_at = _modified_ns(flow.workspace)
         self._once, self._failure = False, ""
+        folders = flow.workspace.spool, flow.workspace.archive.folder
+        self._devices = {folder: _device(folder) for folder in folders}
         turn_failed(flow.workspace, "")
 
     def serve(self, once: bool) -> bool:
@@ -228,6 +230,7 @@ class Daemon:
 
     def _scan(self) -> None:
         self._heed_description()
+        self._refuse_other_disks()
         until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
         for path in self._tracker.whole(scan(self._flow.workspace.spool, self._pulse)):
             if self._bell.stopped or time.monotonic() > until:
@@ -257,6 +260,20 @@ class Daemon:
         else:
             self._tracker.forget(path)
 
+    def _refuse_other_disks(self) -> None:
+        """Raises StoreError where a folder is gone or another disk than at the beginning.
+
+        What is written under a mount point whose disk is away is hidden once it is back.
+        """
+        for folder, device in self._devices.items():
+            if _device(folder) != device:
+                raise StoreError(
+                    f"{folder.name}/ is gone, or is not on the disk that it was on when the daemon "
+                    "began: nothing is taken in.",
+                    remedy="Mount its disk. If it was moved for good, begin the daemon again.",
+                    retry_after_s=_UNREADABLE_S,
+                )
+
     def _heed_description(self) -> None:
         """Takes a changed `bridge.toml` over; a wrong one leaves the last good one in force."""
         modified = _modified_ns(self._flow.workspace)
@@ -269,6 +286,13 @@ class Daemon:
             log.error("bridge.toml is not taken over: %s", error)
         else:
             log.info("bridge.toml has changed and is taken over")
+
+
+def _device(folder: Path) -> int | None:
+    try:
+        return folder.stat().st_dev
+    except OSError:
+        return None
 
 
 def _modified_ns(workspace: Workspace) -> int:

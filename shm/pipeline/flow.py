@@ -25,7 +25,16 @@ from typing import Any, Protocol, runtime_checkable
 
 from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
 from shm.pipeline.intake import Sharing, receive
-from shm.pipeline.jobs import DELIVERIES, Clock, DeliveryRefused, Job, Jobs, Notifier, Step
+from shm.pipeline.jobs import (
+    DELIVERIES,
+    Clock,
+    DeliveryRefused,
+    Job,
+    Jobs,
+    Notifier,
+    Step,
+    wait_after,
+)
 from shm.pipeline.terms import competing, reason_document
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
@@ -36,7 +45,7 @@ _MOST_DEATHS, _MOST_KILLS = 3, 5
 """A recording is refused when so many processes died of it, or were killed at it alone in a row."""
 _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
-_LONGEST_S = 86400.0
+_LONGEST_PAUSE_S = _FIRST_PAUSE_S * _PAUSE_GROWS**_MOST_KILLS
 _AGAIN_S = 60.0
 _OF_THE_MACHINE = (*DISK_FULL, errno.EROFS, errno.EIO, errno.ENFILE)
 """What a step meets that is no fault of its recording, and passes when somebody sees to it."""
@@ -161,9 +170,9 @@ class Flow:
 
     def _begin_steps(self) -> None:
         now = self.clock()
-        held = {id_ for id_, until in self._postponed.items() if until > now}
+        held = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
         damaged: set[int | None] = {
-            hanger for hanger, until in self._damaged.items() if until > now
+            hanger for hanger, until in self._damaged.items() if _still_waits(until, now)
         }
         for job in self.jobs.waiting(2 * self.lanes, held):
             if job.hanger in damaged or job.key in self._running:
@@ -315,20 +324,27 @@ class Flow:
         One that the hook refused is given up at once.
         """
         settings, now = self.workspace.settings, self.clock()
-        wait_s = settings.hook_backoff_seconds * 2.0**delivery.attempts
+        wait = wait_after(delivery.attempts + 1, settings)
         refused = isinstance(error, DeliveryRefused)
         again = not refused and delivery.attempts + 1 < settings.hook_attempts
-        next_attempt_at = now + timedelta(seconds=min(wait_s, _LONGEST_S)) if again else None
+        next_attempt_at = now + wait if again else None
         self.store.delivery_failed(delivery, str(error), now, next_attempt_at)
         about = {**_about_alert(delivery.alert), "hook": delivery.hook}
-        log.warning(
-            "hook %s failed on %s: %s", delivery.hook, delivery.alert.key, error, extra=about
-        )
+        end = "" if again else "; given up: nobody is told of it by this hook"
+        said = "hook %s failed on %s: %s%s"
+        log.warning(said, delivery.hook, delivery.alert.key, error, end, extra=about)
+
+
+def _still_waits(until: datetime, now: datetime) -> bool:
+    """Not beyond the longest pause: there the clock was ahead when it was set, or is late now."""
+    return now < until <= now + timedelta(seconds=_LONGEST_PAUSE_S)
 
 
 def _passes_in_s(error: BaseException) -> float | None:
     """After how long a step may do what it could not; None where trying again is of no use."""
-    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+    of_the_machine = isinstance(error, OSError) and error.errno in _OF_THE_MACHINE
+    # An installation that is being replaced says nothing against a file.
+    if of_the_machine or isinstance(error, ImportError):
         return _AGAIN_S
     return error.retry_after_s if isinstance(error, ShmError) else None
 
@@ -346,7 +362,7 @@ def _is_enough(deaths: Deaths) -> bool:
 def _pause(deaths: Deaths) -> timedelta:
     """How long to wait before the next try: the longer, the more tries alone have failed."""
     failed = max(deaths.by_itself, deaths.from_outside)
-    return timedelta(seconds=min(_FIRST_PAUSE_S * _PAUSE_GROWS**failed, _LONGEST_S))
+    return timedelta(seconds=min(_FIRST_PAUSE_S * _PAUSE_GROWS**failed, _LONGEST_PAUSE_S))
 
 
 def _refusal(deaths: Deaths, error: BaseException) -> ShmError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -18,6 +18,7 @@ from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import Taught, identify_lineage, update_terms
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.resources import give_back_memory
+from shm.settings import Settings
 from shm.store import (
     Delivery,
     IdentifiedTest,
@@ -34,6 +35,8 @@ from shm.values.stated_tension import averaged_now
 
 DELIVERIES = 16
 _DELIVERIES_A_HOOK = 4
+_LONGEST_S = 86400.0
+_DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
 
 Clock = Callable[[], datetime]
 Notifier = Callable[[Hook, Alert], object]
@@ -77,6 +80,12 @@ class Job:
     names: tuple[str, ...] = ()
 
 
+def wait_after(attempts: int, settings: Settings) -> timedelta:
+    """How long a delivery waits that has failed so often: doubled each time, a day at most."""
+    seconds = settings.hook_backoff_seconds * 2.0 ** (attempts - 1) if attempts else 0.0
+    return timedelta(seconds=min(seconds, _LONGEST_S))
+
+
 @dataclass(frozen=True)
 class Jobs:
     """The jobs of a workspace, made from what its store says now."""
@@ -117,7 +126,8 @@ class Jobs:
         if taken.total() >= DELIVERIES:
             return
         ids = [delivery.id for delivery in under_way]
-        for delivery in self.store.due_deliveries(self.clock(), 2 * DELIVERIES, ids):
+        waits = [wait_after(count, self.workspace.settings) for count in range(_DOUBLINGS)]
+        for delivery in self.store.due_deliveries(self.clock(), 2 * DELIVERIES, ids, waits):
             if taken[delivery.hook] < _DELIVERIES_A_HOOK and taken.total() < DELIVERIES:
                 taken[delivery.hook] += 1
                 prepare = partial(self._deliver, notifier, delivery)

@@ -17,7 +17,7 @@ from shm.models import build
 from shm.pipeline.calibrating import options_of
 from shm.pipeline.terms import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
-from shm.values import Hanger
+from shm.values import Change, Hanger
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,17 @@ def rebaseline(
     )
     record = (order.who, order.why, order.since)
     return store.rebaseline(before, posterior, chosen, record, lineage, at)
+
+
+def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, ...]:
+    """The changes called of a hanger that lie among its tests since then: a baseline of these would
+    be made of two states."""
+    times = [test.time for test in store.tests(hanger) if test.time >= since]
+    return tuple(
+        each
+        for each in store.called_changes().get(hanger, ())
+        if times and min(times) <= each.began_after and max(times) >= each.began_by
+    )
 
 
 def _since(store: Store, hanger: Hanger, since: datetime) -> tuple[StoredTest, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sqlalchemy as sa
@@ -256,6 +256,22 @@ def archived_names(store: Database) -> tuple[str, ...]:
         rows = connection.execute(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
         # A flipped bit in the schema may make a name a number.
     return tuple(sorted({str(name) for row in rows for name in row if name is not None}))
+
+
+def unknown_files(store: Database, archive: Archive) -> tuple[str, ...]:
+    """Raw files that no recording refers to, by their path in the archive; no sidecars."""
+    found = _unreferenced(archive, archived_names(store))
+    return tuple(name for name in found if not name.endswith(".toml"))
+
+
+def of_no_recording(names: Sequence[str]) -> tuple[str, str]:
+    """What is said of such files, and what to do."""
+    return (
+        f"{len(names)} of the archive belong to no recording: {names[0]}"
+        + (" and others" if names[1:] else ""),
+        "They came after the backup that was restored, or while a process ended. Take each in "
+        f"again: `shm ingest archive/{names[0]}`.",
+    )
 
 
 def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import fields
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
 import sqlalchemy as sa
@@ -162,10 +162,21 @@ class Watching(Database):
         return self._deliveries(query)
 
     def due_deliveries(
-        self, now: datetime, limit: int, excluding: Collection[int] = ()
+        self,
+        now: datetime,
+        limit: int,
+        excluding: Collection[int] = (),
+        waits: Sequence[timedelta] = (),
     ) -> tuple[Delivery, ...]:
-        """Deliveries whose time has come, the longest due first."""
-        due = (deliveries.c.state == DeliveryState.WAITING) & (deliveries.c.next_attempt_at <= now)
+        """Deliveries whose time has come, the longest due first.
+
+        Also those that would wait longer than `waits` says for so many attempts, its last for more:
+        the clock was ahead when they were put off.
+        """
+        at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
+        counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
+        too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
+        due = (deliveries.c.state == DeliveryState.WAITING) & sa.or_(at <= now, *too_far)
         query = _outbox.where(due, deliveries.c.id.not_in(excluding))
         return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
 

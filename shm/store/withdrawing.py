@@ -54,8 +54,10 @@ class Withdrawing(Database):
             recording = by_id(connection, recording_id)
             chosen = _chosen(connection, recording_id, counts(tests), test)
             if not chosen or recording.stage == Stage.RECEIVED:
+                out = any(each.is_out for each in holds_of(connection, recording_id)[-1:])
+                now = "was discarded" if out else f"is {recording.stage}"
                 raise UsageError(
-                    f"recording {recording_id} does not count: it is {recording.stage}.",
+                    f"recording {recording_id} does not count: it {now}.",
                     remedy="See `shm ingest --held`.",
                 )
             own = of_baselines(connection, chosen)

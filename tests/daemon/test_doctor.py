@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sqlite3
 import sys
@@ -15,13 +16,15 @@ import pytest
 from shm.pipeline.intake import receive
 from shm.read import apart
 from shm.store import Archive, DeliveryState, Stage, Workspace
+from shm_cli.main import run
 from shm_daemon.doctor import Finding, Level, checks, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
+from tests.helpers.flows import ingest
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
 from tests.helpers.postgres import Databases
 from tests.helpers.taken_over import obeying_readers
-from tests.helpers.workspaces import make_workspace, put
+from tests.helpers.workspaces import make_workspace, put, write_test
 
 
 def found(workspace: Workspace, check: str, now: datetime | None = None) -> list[Finding]:
@@ -214,10 +217,33 @@ def test_files_that_wait_too_long_in_the_spool_are_told(workspace: Workspace) ->
     (workspace.spool / "alone.toml").write_text("hanger = 3\n")
     (workspace.spool / "broken.csv.part").write_text("x")
     assert only(workspace, "spool").level is Level.OK
-    waiting, forgotten = found(workspace, "spool", datetime.now(UTC) + timedelta(days=2))
+    waiting, alone = found(workspace, "spool", datetime.now(UTC) + timedelta(minutes=20))
+    assert "sidecars without their file: alone.toml" in alone.found
+    later = datetime.now(UTC) + timedelta(days=2)
+    waiting, alone, broken = found(workspace, "spool", later)
     assert (waiting.level, "1 file in the queue" in waiting.found) == (Level.WARNING, True)
-    assert "alone.toml" in forgotten.found
-    assert "broken.csv.part" in forgotten.found
+    assert "alone.toml" in alone.found
+    assert "broken.csv.part" in broken.found
+
+
+def test_raw_files_that_came_after_a_restored_backup_are_named_and_can_be_taken_in(
+    workspace: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_test(workspace.spool / "a.modes.json", workspace)
+    ingest(workspace)
+    say = ["--workspace", str(workspace.folder)]
+    assert run([*say, "db", "backup", str(workspace.folder / "backup.db")]) == 0
+    write_test(workspace.spool / "b.modes.json", workspace, day=30)
+    ingest(workspace)
+    restore = [*say, "db", "restore", str(workspace.folder / "backup.db"), "--replace"]
+    assert run(restore) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Raw files: 1 of the archive belong to no recording" in said
+    there, unknown = found(workspace, "raw files", NOW)
+    assert (there.level, unknown.level) == (Level.OK, Level.WARNING)
+    (name,) = re.findall(r"`shm ingest (archive/\S+)`", unknown.remedy)
+    assert run([*say, "ingest", str(workspace.folder / name)]) == 0
+    assert only(workspace, "raw files").level is Level.OK
 
 
 def test_what_will_never_be_taken_is_told_at_once(workspace: Workspace) -> None:

@@ -153,6 +153,23 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert all(name.isprintable() and len(name) <= 200 for name in names)
 
 
+def test_nothing_is_taken_while_a_folder_is_on_another_disk(
+    workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve()
+    write_test(workspace.spool / "a.modes.json", workspace)
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
+    monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
+    away = workspace.archive.folder.rename(workspace.folder / "away")
+    write_test(workspace.spool / "b.modes.json", workspace, day=30)
+    until(lambda: "archive/ is gone" in why_turn_failed(workspace))
+    assert not workspace.archive.folder.exists()
+    assert [path.name for path in workspace.spool.iterdir()] == ["b.modes.json"]
+    away.rename(workspace.archive.folder)
+    until(lambda: counts(workspace) == {Stage.DONE: 2})
+    assert why_turn_failed(workspace) == ""
+
+
 def test_a_turn_that_fails_is_shown_until_one_goes_well(
     workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
 ) -> None:

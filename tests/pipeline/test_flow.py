@@ -210,6 +210,23 @@ def test_a_hook_that_recovers_is_told(workspace: Workspace) -> None:
     assert len(postman.told) == 2
 
 
+def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
+    workspace: Workspace,
+) -> None:
+    write_loss(workspace.spool, workspace)
+    ahead = 400 * 86400.0
+    clock, postman = Clock(), Postman(failures=1)
+    clock.pass_by(ahead)
+    with a_flow(workspace, clock=clock, notifier=postman) as flow:
+        receive_all(flow)
+        flow.drain()
+        assert flow.store.deliveries(DeliveryState.WAITING)
+        clock.pass_by(-ahead)
+        flow.drain()
+        (delivery,) = flow.store.deliveries()
+    assert delivery.state is DeliveryState.DELIVERED
+
+
 def test_a_hook_that_is_no_longer_described_fails_and_says_so(workspace: Workspace) -> None:
     write_loss(workspace.spool, workspace)
     ingest(workspace)
@@ -324,14 +341,20 @@ def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
         assert workspace.archive.holds(refused.file)
 
 
+@pytest.mark.parametrize(
+    "error",
+    [ShmError("not now.", retry_after_s=30.0), ModuleNotFoundError("No module named 'scipy'")],
+)
+@pytest.mark.parametrize("later_s", [61, -86400])
 def test_passing_trouble_is_waited_out_and_holds_up_nobody(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, error: Exception, later_s: float
 ) -> None:
+    """Also where the clock was a day ahead meanwhile; an upgrade under way is such trouble."""
     read_modes, trouble = steps.load_modes, [True]
 
     def fail_once(path, limits):  # type: ignore[no-untyped-def]
         if path.name.startswith("a") and trouble.pop():
-            raise ShmError("not now.", retry_after_s=30.0)
+            raise error
         return read_modes(path, limits)
 
     monkeypatch.setattr(steps, "load_modes", fail_once)
@@ -343,7 +366,7 @@ def test_passing_trouble_is_waited_out_and_holds_up_nobody(
         receive_all(flow)
         flow.drain()
         assert list(stages(workspace).values()) == [Stage.RECEIVED, Stage.DONE]
-        clock.pass_by(31)
+        clock.pass_by(later_s)
         flow.drain()
     assert set(stages(workspace).values()) == {Stage.DONE}
 

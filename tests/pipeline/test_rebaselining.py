@@ -12,7 +12,7 @@ from shm.errors import NothingThere
 from shm.inference import UpdateOptions
 from shm.models import Model
 from shm.pipeline import rebaselining
-from shm.pipeline.rebaselining import Order, rebaseline
+from shm.pipeline.rebaselining import Order, changes_within, rebaseline
 from shm.store import Baseline, Stage, Workspace
 from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
@@ -122,3 +122,14 @@ def test_without_a_baseline_there_is_none_to_replace(
 def test_the_sampler_itself_takes_such_an_order(history: Workspace) -> None:
     made = anew(history, 31)
     assert made.posterior.tension_n.mean() == pytest.approx(0.9 * 711e3, rel=0.02)
+
+
+def test_a_baseline_over_a_called_change_is_known_as_such(
+    history: Workspace, hints: list[Posterior]
+) -> None:
+    with history.store() as store:
+        (called,) = changes_within(store, 3, START)
+        assert START + timedelta(days=1) <= called.began_after
+        assert called.began_by <= START + timedelta(days=32)
+        assert changes_within(store, 3, START + timedelta(days=31)) == ()
+        assert changes_within(store, 4, START) == ()

@@ -123,6 +123,22 @@ def test_a_delivery_that_failed_is_due_later(store: Store, updated: list[StoredT
     assert store.due_deliveries(later, 10, excluding=[again.id]) == ()
 
 
+def test_a_delivery_put_off_by_a_clock_that_was_ahead_is_due_once_it_is_right(
+    store: Store, updated: list[StoredTest]
+) -> None:
+    watch(store, updated[0], an_alert(), "mail")
+    waits = [timedelta(0), timedelta(seconds=5), timedelta(seconds=10)]
+    before = NOW - timedelta(days=400)
+    assert store.due_deliveries(before, 10) == ()
+    (delivery,) = store.due_deliveries(before, 10, (), waits)
+    for tries in range(1, 5):
+        wait = waits[min(tries, 2)]
+        store.delivery_failed(delivery, "exit code 1", NOW, NOW + wait)
+        (again,) = store.due_deliveries(before, 10, (), waits)
+        assert again.attempts == tries
+        assert store.due_deliveries(NOW, 10, (), waits) == ()
+
+
 def test_an_ended_delivery_is_not_due_again(store: Store, updated: list[StoredTest]) -> None:
     watch(store, updated[0], an_alert(), "mail", "siren")
     mail, siren = store.due_deliveries(NOW, 10)

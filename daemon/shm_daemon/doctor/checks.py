@@ -16,15 +16,16 @@ from pathlib import Path
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.report.words import counted
 from shm.store import Stage, Store, Workspace
-from shm.store.checking import quick_troubles
+from shm.store.checking import of_no_recording, quick_troubles, unknown_files
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
-from shm_daemon.spool import left_alone, never_taken, scan
+from shm_daemon.spool import SIDECAR, left_alone, never_taken, scan
 
 _WAITS_LONG = timedelta(minutes=10)
 _STUCK = timedelta(hours=1)
 _STUCK_BEHIND_OTHERS = timedelta(days=1)
 _NOTHING_MOVES = timedelta(minutes=15)
-_FORGOTTEN = timedelta(days=1)
+_FORGOTTEN = timedelta(days=1)  # some uploads take hours
+_ALONE = timedelta(minutes=10)  # whoever writes a sidecar first writes its file soon
 _LOOKED_AT = 100
 _FAILED = "Nothing is taken in meanwhile: mend what it names; its log tells more."
 _BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
@@ -128,12 +129,20 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
             f"never taken: {some(named)}",
             "Only files are taken: put the file itself there, readable by the daemon's user.",
         )
-    forgotten = [path for path in left_alone(spool) if _age(path, examined.now) > _FORGOTTEN]
-    if forgotten:
+    left = [(path, _age(path, examined.now)) for path in left_alone(spool)]
+    sidecars = [p.name for p, age in left if p.name.lower().endswith(SIDECAR) and age > _ALONE]
+    if sidecars:
         yield warning(
             "spool",
-            f"left alone there for more than a day: {some([path.name for path in forgotten])}",
-            "Uploads that broke off, or sidecars without their file: send again, or delete them.",
+            f"sidecars without their file: {some(sidecars)}",
+            "One that came after its file says nothing: drop that file again beside it.",
+        )
+    broken = [p.name for p, age in left if p.name not in sidecars and age > _FORGOTTEN]
+    if broken:
+        yield warning(
+            "spool",
+            f"uploads that broke off more than a day ago: {some(broken)}",
+            "Send them again, or delete them.",
         )
 
 
@@ -207,6 +216,8 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
         )
     else:
         yield ok("raw files", f"the latest {len(latest)} are there")
+    if names := unknown_files(store, archive):
+        yield warning("raw files", *of_no_recording(names))
 
 
 def _without_baseline(examined: Examined) -> set[int]:
