@@ -14,7 +14,7 @@ from shm.store.blobs import change_from
 from shm.store.checksums import decoding, loads, note_damage
 from shm.store.files import counts, in_force
 from shm.store.glances import EventKind, HangerEvent, TestRow
-from shm.store.queries import Queries, baselines_now, plain_tests
+from shm.store.queries import Queries, baselines_now, compared_with, plain_tests
 from shm.store.rows import Baseline, Stage, StoredTest, StoredWatch
 from shm.store.tables import acknowledgements, adoptions, alerts, baselines, tests, watches
 from shm.store.watching import Watching
@@ -67,6 +67,33 @@ class Listing(Queries, Watching):
                 remedy=f"The latest: {latest or 'none'}.",
             )
         return found[0]
+
+    def tests_dated_beside(
+        self, baseline: Baseline, test: StoredTest, limit: int
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        """So many tests watched since a baseline before a test and after it, by time, the nearest
+        first."""
+        query = plain_tests.where(*compared_with(baseline), tests.c.id != test.id)
+        order = sa.tuple_(tests.c.time, tests.c.id)
+        return self._beside(query, order, (test.time, test.id), limit)
+
+    def tests_that_came_beside(
+        self, baseline: Baseline, test: StoredTest, limit: int, held: Collection[int] = ()
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        """The same as they came in, those among them that are held of the recordings `held`."""
+        is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
+        is_held &= tests.c.recording_id.in_(held) & in_force(tests)
+        counted = sa.and_(*compared_with(baseline))
+        query = plain_tests.where(counted | is_held, tests.c.id != test.id)
+        order = sa.tuple_(tests.c.recording_id, tests.c.id)
+        return self._beside(query, order, (test.recording_id, test.id), limit)
+
+    def _beside(
+        self, query: sa.Select[Any], order: sa.Tuple, here: tuple[object, int], limit: int
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        down, up = ([getattr(each, way)() for each in order.clauses] for way in ("desc", "asc"))
+        before = self._tests(query.where(order < here).order_by(*down).limit(limit))
+        return before, self._tests(query.where(order > here).order_by(*up).limit(limit))
 
     def beside(self, test: StoredTest) -> tuple[str | None, str | None]:
         """The names of the tests of the same hanger before and after one, by time."""

@@ -115,40 +115,13 @@ class Queries(Database):
         Tests that were watched against an earlier baseline count, but for those before a day since
         which the hanger is compared anew.
         """
-        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*_compared_with(baseline))
+        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*compared_with(baseline))
         if before is not None:
             at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
             query = query.where((tests.c.time < before.time) | at_once)
         with self.reading() as connection:
             rows = connection.execute(query.order_by(tests.c.time, tests.c.id)).all()
         return tuple(WatchedName(row.id, row.name, row.time) for row in rows)
-
-    def tests_dated_beside(
-        self, baseline: Baseline, test: StoredTest, limit: int
-    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-        """So many tests watched since a baseline before a test and after it, by time, the nearest
-        first."""
-        query = plain_tests.where(*_compared_with(baseline), tests.c.id != test.id)
-        order = sa.tuple_(tests.c.time, tests.c.id)
-        return self._beside(query, order, (test.time, test.id), limit)
-
-    def tests_that_came_beside(
-        self, baseline: Baseline, test: StoredTest, limit: int, held: Collection[int] = ()
-    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-        """The same as they came in, those among them that are held of the recordings `held`."""
-        is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
-        is_held &= tests.c.recording_id.in_(held) & in_force(tests)
-        counted = sa.and_(*_compared_with(baseline))
-        query = plain_tests.where(counted | is_held, tests.c.id != test.id)
-        order = sa.tuple_(tests.c.recording_id, tests.c.id)
-        return self._beside(query, order, (test.recording_id, test.id), limit)
-
-    def _beside(
-        self, query: sa.Select[Any], order: sa.Tuple, here: tuple[object, int], limit: int
-    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-        down, up = ([getattr(each, way)() for each in order.clauses] for way in ("desc", "asc"))
-        before = self._tests(query.where(order < here).order_by(*down).limit(limit))
-        return before, self._tests(query.where(order > here).order_by(*up).limit(limit))
 
     def test(self, test_id: int) -> StoredTest:
         """One test by its row number; raises NothingThere."""
@@ -295,14 +268,10 @@ class Queries(Database):
             return tuple(_test(row) for row in connection.execute(query))
 
 
-def _compared_with(baseline: Baseline) -> list[sa.ColumnElement[bool]]:
-    """Tests that were watched since a baseline."""
-    found = [
-        tests.c.hanger == baseline.hanger,
-        tests.c.stage == Stage.WATCHED,
-        tests.c.name.not_in(baseline.posterior.tests),
-        in_force(tests),
-    ]
+def compared_with(baseline: Baseline) -> list[sa.ColumnElement[bool]]:
+    """Tests watched since a baseline."""
+    own = tests.c.hanger == baseline.hanger, tests.c.stage == Stage.WATCHED, in_force(tests)
+    found = [*own, tests.c.name.not_in(baseline.posterior.tests)]
     return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
 
 
