@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
 
 from shm.plausibility import fingerprint_of
 from shm.plausibility.copies import is_copy
@@ -38,7 +39,7 @@ KINDS: dict[str, dict[str, float]] = {
     },
     "by machine, 16 bits": {"hits": 3, **MACHINE, "adc_bits": 16},
 }
-REAL = Path("/work/shared/data/pyfrf_hits")
+REAL = ROOT.parent / "shared" / "data" / "pyfrf_hits"
 
 
 def made(seed: int, plan: dict[str, float]) -> Recording:
