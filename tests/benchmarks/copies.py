@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.plausibility import fingerprint_of
 from shm.plausibility.copies import is_copy
@@ -39,7 +38,7 @@ KINDS: dict[str, dict[str, float]] = {
     },
     "by machine, 16 bits": {"hits": 3, **MACHINE, "adc_bits": 16},
 }
-REAL = ROOT.parent / "shared" / "data" / "pyfrf_hits"
+REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "pyfrf_hits"
 
 
 def made(seed: int, plan: dict[str, float]) -> Recording:
