@@ -13,13 +13,12 @@ from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
-from shm.inference.priors import reading_of
+from shm.inference.priors import DECADES, reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import Hint, hinted, search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
 from shm.models import THESIS, AsMade, Model
-from shm.models.as_made import RESTRAINT
 from shm.values import ENOUGH_EFFECTIVE, NAN, ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]
@@ -166,7 +165,7 @@ def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     if not isinstance(model, AsMade) or model.springs:
         return 0.0
     planes = {mode.plane for test in tests for mode in test.regular_modes}
-    one = 1 / (1 + np.log10(RESTRAINT[1] / RESTRAINT[0]))
+    one = 1 / (1 + DECADES)
     # Springs each by itself, all alike, alike in each plane, or made to clamp (`EndDetails`): as
     # many of these are beyond the stiffest decade as are in it. Round ends each by itself or alike.
     shares = [one ** (2 * len(planes)), one, one ** len(planes), 0.5]
