@@ -21,8 +21,9 @@ from shm.resources import KILLING, memory_in_use, memory_of_machine, one_thread_
 from shm.settings import Settings
 
 _STEPS = "shm.pipeline.steps"
-_LOOK_S = 0.1
-_BEGIN_AGAIN_S = 5.0
+_LOOK_S = 0.1  # technical: how seldom memory is read of a step that takes seconds
+AGAIN_S = 5.0
+"""Technical: after so long a place to work in is looked for again; files wait meanwhile."""
 _MOST_OF_MEMORY = 0.8
 """One step may have so much of the machine's memory; beyond, it is told that there is none."""
 _LARGE = 0.4
@@ -125,7 +126,7 @@ class _Worker:
             raise ShmError(
                 f"no process can be begun to work in: {error!r}.",
                 remedy="See memory and processes of this machine; it is tried again.",
-                retry_after_s=_BEGIN_AGAIN_S,
+                retry_after_s=AGAIN_S,
             ) from error
         finally:
             theirs.close()

@@ -17,9 +17,9 @@ from pathlib import Path
 
 from shm.read import sidecar_path
 
-_UNDER_WAY = (".part", ".tmp", ".filepart")
-_SIDECAR = ".toml"
-_PATIENCE_WITH_EMPTY = 10.0
+UNDER_WAY = (".part", ".tmp", ".filepart")
+SIDECAR = ".toml"
+_PATIENCE_WITH_EMPTY = 10.0  # judgement: times as long: some loggers open a file before they write
 
 
 @dataclass(frozen=True, order=True)
@@ -37,7 +37,7 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
     found = {}
     for path in _entries(spool):
         meanwhile()
-        if not path.name.lower().endswith((*_UNDER_WAY, _SIDECAR)):
+        if not path.name.lower().endswith((*UNDER_WAY, SIDECAR)):
             look = _look(path)
             if isinstance(look, Look):
                 found[path] = look
@@ -47,12 +47,12 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
 def left_alone(spool: Path) -> list[Path]:
     """Uploads that are not finished, and sidecars whose file is not there."""
     files = [path for path in _entries(spool) if isinstance(_look(path), Look)]
-    awaited = {sidecar_path(path) for path in files if not path.name.lower().endswith(_SIDECAR)}
+    awaited = {sidecar_path(path) for path in files if not path.name.lower().endswith(SIDECAR)}
     return [
         path
         for path in files
-        if path.name.lower().endswith(_UNDER_WAY)
-        or (path.name.lower().endswith(_SIDECAR) and path not in awaited)
+        if path.name.lower().endswith(UNDER_WAY)
+        or (path.name.lower().endswith(SIDECAR) and path not in awaited)
     ]
 
 
