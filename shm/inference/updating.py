@@ -23,10 +23,16 @@ from shm.values import ENOUGH_EFFECTIVE, NAN, ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]
 
+# Technical: few particles do, since the last step weighs (`shm.inference.tmcmc`); 200 are
+# twenty or more for each parameter.
 _SAMPLES_A_PARTICLE = 5
 _FEWEST_PARTICLES = 200
+
 _DRAWS_WITHOUT_READING = 1000  # for the quartiles
-_ENOUGH = 0.5
+
+ENOUGH = 0.5
+"""Effective draws for each sample to keep; fewer repeat draws, more cost in proportion."""
+
 _AGAIN = (3, 9)
 """Times as many particles in a second and a third attempt, where the draws were too few."""
 
@@ -118,7 +124,7 @@ def _weighted(
     progress(problem.model.name, 0.2)
     *wider, population = sample(problem, anchors, particles, rng, near)
     progress(problem.model.name, 0.7)
-    return weigh(problem, population, anchors, _ENOUGH * samples, rng, wider)
+    return weigh(problem, population, anchors, ENOUGH * samples, rng, wider)
 
 
 def select(
