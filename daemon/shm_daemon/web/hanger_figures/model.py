@@ -38,7 +38,7 @@ PAIRS = HangerFigure(
     lambda view: OF_PAIRS.draw(report_of(view)),
     lambda view: OF_PAIRS.caption(report_of(view)),
     lambda view: OF_PAIRS.alt(report_of(view)),
-    height_px=760,  # as wide as the page's column: its grid is square
+    height_px=760,  # judgement: a grid of a panel for each pair, nearly square
     is_wide=True,
 )
 
