@@ -45,7 +45,7 @@ _MOST_DEATHS, _MOST_KILLS = 3, 5
 """A recording is refused when so many processes died of it, or were killed at it alone in a row."""
 _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
-_LONGEST_PAUSE_S = _FIRST_PAUSE_S * _PAUSE_GROWS**_MOST_KILLS
+_LONGEST_PAUSE_S = 86400.0  # judgement: what stands still for a day, somebody has looked at
 _AGAIN_S = 60.0
 _OF_THE_MACHINE = (*DISK_FULL, errno.EROFS, errno.EIO, errno.ENFILE)
 """What a step meets that is no fault of its recording, and passes when somebody sees to it."""
