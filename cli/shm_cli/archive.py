@@ -24,7 +24,7 @@ from shm.store.retention import (
 )
 from shm_cli.common import json_option, opened_store, progress_bar, show
 
-_DAYS = click.IntRange(1, 36500)
+_DAYS = click.IntRange(1, 36500)  # technical: a century, which dates can bear
 
 
 @click.group()

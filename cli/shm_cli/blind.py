@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _trial_argument = click.argument(
     "directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path)
 )
+# Technical: more processes than that are a mistake of typing.
 _jobs_option = click.option(
     "--jobs",
     type=click.IntRange(1, 256),

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from shm.report.table import Table as Texts
     from shm.store import Store, Workspace
 
+# Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
 
@@ -49,6 +50,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="One JSON doc
 seed_option = click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed."
 )
+# Judgement: below 100 no 90 % interval has five draws beyond each end; a million fill the memory.
 samples_option = click.option(
     "--samples",
     type=click.IntRange(100, 1_000_000),

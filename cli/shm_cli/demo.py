@@ -34,15 +34,16 @@ from shm.values import Hanger, Posterior
 from shm_cli import thesis
 from shm_cli.common import counting_bar
 
+# A story: the thesis's hanger among twenty, another that loses as much as nobody overlooks. Tests
+# take place on a Monday morning, short enough that the demo takes a minute or two.
 HANGERS = 20
 MEASURED = 3
 LOSING = 7
 LOSS = 0.08
-
 _START = datetime(2026, 3, 2, 9, tzinfo=UTC)
 _PLAN = HammerPlan(seconds_per_hit=8.0, acceleration_noise_m_s2=0.05)
 _SEED = 2026
-_TENSION_SCATTER = 0.003
+_TENSION_SCATTER = 0.003  # judgement: traffic and warmth between two tests of one hanger
 
 
 @dataclass(frozen=True)
@@ -162,8 +163,8 @@ def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[Plan
 
 
 _MARK = ".shm-demo"
-_DAEMON_LIMIT_S = 600.0
-_POLL_S = 0.3
+_DAEMON_LIMIT_S = 600.0  # technical: several times what a slow machine takes
+_POLL_S = 0.3  # technical: a bar that moves
 
 
 @click.command()

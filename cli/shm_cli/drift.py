@@ -1,6 +1,8 @@
 """`shm drift`: how far tension and end stiffness have moved from their baseline, and setting it.
 
 `shm drift rebaseline`: a hanger is compared with itself as it is since some day.
+
+`shm drift bridge`: which hangers gained and lost tension, and what explains it.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import getpass
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rich_click as click
@@ -15,17 +18,19 @@ import rich_click as click
 from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import latest_drifts
+from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
 from shm.pipeline.rebaselining import Order, changes_within
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.pipeline.reporting import hanger_states
+from shm.report.bridge.document import pattern_json
+from shm.report.bridge.tables import pattern_tables
+from shm.report.figures.bridge_shift import bridge_illustration
 from shm.report.shifts import shift_cells
 from shm.report.states import NOTHING_WATCHED
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.store import Baseline
 from shm.values import Drift
 from shm.values.force_units import force_unit
-from shm_cli.bridge_pattern import command as bridge
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -38,8 +43,43 @@ from shm_cli.common import (
     table,
 )
 from shm_cli.record import Words
+from shm_cli.writable import NewFile
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
+
+
+@click.command("bridge")
+@json_option
+@click.option(
+    "--figure",
+    type=NewFile(),
+    metavar="FILE.png",
+    help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
+)
+@click.pass_context
+def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
+    """Which hangers gained and which lost, and whether it is the bridge at all.
+
+    Compares the latest tension shift of each hanger with its neighbours': one hanger that sheds
+    load, one that gains it, all alike (a temperature or a clock), or each by itself. Hangers stand
+    along the bridge as in bridge.toml; tests more than 30 days older than the newest are left out.
+    `shm report --bridge --out bridge.html` shows the same with the elevation of the bridge.
+
+    \b
+    Example: shm drift bridge
+    """
+    with opened_store(ctx) as (workspace, store):
+        pattern = stored_pattern(store, [hanger.id for hanger in workspace.bridge.hangers])
+    if figure is not None:
+        figure.write_bytes(bridge_illustration(pattern).png())
+        click.echo(f"Wrote {figure}.", err=True)
+    if as_json:
+        show(pattern_json(pattern))
+        return
+    for each in pattern_tables(pattern, bars=True):
+        show_texts(each)
+    for sentence in (pattern.sentence, *pattern.remarks):
+        click.echo(paragraph(sentence))
 
 
 @click.command()

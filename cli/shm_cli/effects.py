@@ -6,28 +6,22 @@ import inspect
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import rich_click as click
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.markup import escape
 
+from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
-from shm.values import PLANES, Hanger
-from shm_cli import completion
+from shm.values import PLANES
+from shm_cli import completion, thesis
 from shm_cli.common import json_option, markdown, show, show_table, table
 
-_AREA_M2 = math.pi * 0.130**2 / 4
-_HANGER = Hanger(
-    id=3,
-    length_m=12.0,
-    elastic_modulus_pa=200e9,
-    area_m2=_AREA_M2,
-    second_moment_m4=math.pi * 0.130**4 / 64,
-    mass_per_length_kg_m=7800 * _AREA_M2,
-    nominal_tension_n=711e3,
-    diameter_m=0.130,
-)
+_HANGER = replace(load_hanger(thesis.HANGER_FILE), plate=None)
+
+# Two tests that differ in all that an effect may follow, and one that shows the least.
 _EVERYTHING = Survey(("t1", "t2"), PLANES, (1.2, 2.4, 3.6), True, (5.0, 20.0), (0.5, 1.0), ())
 _LEAST = Survey(("t1",), PLANES[:1], (), False, (), (), ())
 

@@ -23,6 +23,7 @@ from shm.simulate import (
 from shm.simulate.reality import GLOBAL
 from shm.values import AddedMass, Hanger
 
+# Of the temperatures and levels of `CampaignPlan` the usual ones are left.
 LACKS: dict[str, dict[str, Any]] = {
     "shapes": {"shapes": False},
     "longitudinal": {"planes": ("transverse",)},

@@ -23,7 +23,7 @@ from shm_cli.common import (
     table,
 )
 
-_MOST_POINTS = 10_000
+_MOST_POINTS = 10_000  # technical: a table that a person can still open, in seconds
 
 
 @click.command()

@@ -24,9 +24,9 @@ from distributed.comm import CommClosedError
 
 import shm
 from shm.errors import ShmError
+from shm_daemon.execution import AGAIN_S
 
-_CONNECTING_S = 5.0
-_AGAIN_S = 5.0
+_CONNECTING_S = 5.0  # technical: a scheduler in one's own network answers in a fraction of that
 _LOST = (CancelledError, FutureCancelledError, CommClosedError)
 
 P = ParamSpec("P")
@@ -94,7 +94,7 @@ def _connect(scheduler: str) -> Client:
         raise ShmError(
             f"the scheduler {scheduler} cannot be reached: {error}.",
             remedy="Begin it with `dask scheduler`, or correct the setting `scheduler`.",
-            retry_after_s=_AGAIN_S,
+            retry_after_s=AGAIN_S,
         ) from error
     try:
         found = client.run(traits, on_error="return")
@@ -119,7 +119,7 @@ def _unlike(worker: str, how: str) -> ShmError:
     return ShmError(
         f"the worker {worker} {how}.",
         remedy="Install the same there, set OMP_NUM_THREADS=1, and begin it again.",
-        retry_after_s=_AGAIN_S,
+        retry_after_s=AGAIN_S,
     )
 
 
@@ -142,5 +142,5 @@ def _lost(scheduler: str) -> ShmError:
     return ShmError(
         f"a step was lost with the connection to {scheduler}.",
         remedy="It is tried again.",
-        retry_after_s=_AGAIN_S,
+        retry_after_s=AGAIN_S,
     )

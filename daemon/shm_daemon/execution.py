@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
-from importlib import import_module
 from multiprocessing.connection import Connection, wait
 from typing import Any, ParamSpec, TypeVar
 
@@ -20,9 +19,9 @@ from shm.errors import ShmError, WorkerDied
 from shm.resources import KILLING, memory_in_use, memory_of_machine, one_thread_a_process
 from shm.settings import Settings
 
-_STEPS = "shm.pipeline.steps"
-_LOOK_S = 0.1
-_BEGIN_AGAIN_S = 5.0
+_LOOK_S = 0.1  # technical: how seldom memory is read of a step that takes seconds
+AGAIN_S = 5.0
+"""Technical: after so long a place to work in is looked for again; files wait meanwhile."""
 _MOST_OF_MEMORY = 0.8
 """One step may have so much of the machine's memory; beyond, it is told that there is none."""
 _LARGE = 0.4
@@ -115,8 +114,10 @@ class _Worker:
     begun = False
 
     def __init__(self, prepare: Callable[[], object] | None):
+        from shm.pipeline import steps  # in a thread: nobody waits for it
+
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload([_STEPS])  # in a thread: nobody waits for it
+        context.set_forkserver_preload([steps.__name__])
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
         try:
@@ -125,7 +126,7 @@ class _Worker:
             raise ShmError(
                 f"no process can be begun to work in: {error!r}.",
                 remedy="See memory and processes of this machine; it is tried again.",
-                retry_after_s=_BEGIN_AGAIN_S,
+                retry_after_s=AGAIN_S,
             ) from error
         finally:
             theirs.close()
@@ -235,7 +236,7 @@ def children_ended() -> Iterator[None]:
 def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the daemon, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    import_module("shm.pipeline.steps")
+    from shm.pipeline import steps as steps  # what most will be asked for
 
 
 def _end_with_parent() -> None:

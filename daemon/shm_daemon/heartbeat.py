@@ -16,8 +16,8 @@ HEARTBEAT = "daemon.heartbeat"
 """A file of the workspace that the active daemon touches at each turn."""
 LONGEST_REST_S = 2.0
 """How long at most between two signs, whatever there is to do or to wait for."""
-_PATIENCE_S = 60.0
-_BEATS_A_WATCHDOG = 3
+_PATIENCE_S = 60.0  # judgement: thirty missed signs; a machine that swaps misses a few
+_BEATS_A_WATCHDOG = 3  # sd_watchdog_enabled(3) asks for two at least: one may be late
 
 log = logging.getLogger(__name__)
 

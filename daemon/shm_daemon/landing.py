@@ -28,9 +28,10 @@ from shm.store.archive import (
     suffix_of,
     sync,
 )
+from shm_daemon.spool import SIDECAR, UNDER_WAY
 
-_LEFT_ALONE = (".part", ".tmp", ".filepart", ".toml")
-_LEFTOVER_S = 86400.0
+_LEFT_ALONE = (*UNDER_WAY, SIDECAR)
+_LEFTOVER_S = 86400.0  # judgement: a day; no sender that is cut off after a minute is at it still
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 Described = Mapping[str, object]

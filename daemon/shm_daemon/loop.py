@@ -30,6 +30,7 @@ from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
 
+# Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0
 _HINT_DELAY_S = 0.1
 _UNREADABLE_S = 60.0

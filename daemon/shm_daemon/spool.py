@@ -17,9 +17,9 @@ from pathlib import Path
 
 from shm.read import sidecar_path
 
-_UNDER_WAY = (".part", ".tmp", ".filepart")
+UNDER_WAY = (".part", ".tmp", ".filepart")
 SIDECAR = ".toml"
-_PATIENCE_WITH_EMPTY = 10.0
+_PATIENCE_WITH_EMPTY = 10.0  # judgement: times as long: some loggers open a file before they write
 
 
 @dataclass(frozen=True, order=True)
@@ -37,7 +37,7 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
     found = {}
     for path in _entries(spool):
         meanwhile()
-        if not path.name.lower().endswith((*_UNDER_WAY, SIDECAR)):
+        if not path.name.lower().endswith((*UNDER_WAY, SIDECAR)):
             look = _look(path)
             if isinstance(look, Look):
                 found[path] = look
@@ -51,7 +51,7 @@ def left_alone(spool: Path) -> list[Path]:
     return [
         path
         for path in files
-        if path.name.lower().endswith(_UNDER_WAY)
+        if path.name.lower().endswith(UNDER_WAY)
         or (path.name.lower().endswith(SIDECAR) and path not in awaited)
     ]
 

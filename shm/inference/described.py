@@ -40,6 +40,7 @@ from shm.models.as_made import (
 from shm.models.beam import Beam, Beam3
 from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
 
+# c = sqrt(e/mu)/l^2 with e ~ modulus section^2 and mu ~ density section.
 _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
 _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 """ln c and ln(mu l^2) by the deviations."""
@@ -47,7 +48,7 @@ _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 _EFFECTIVE_FACTOR = (0.27, 1.15)
 """Of a strand: the range of the factor, widened by what tolerances and length do to c."""
 
-_MOST_REDRAWN = 20
+_MOST_REDRAWN = 20  # a factor that is inside in half of its draws is left outside by 1e-6 of them
 
 
 class DescribedCoordinates:

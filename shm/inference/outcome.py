@@ -20,12 +20,12 @@ from shm.inference.other_answers import (
     fitted,
     other_answers,
 )
-from shm.inference.problem import Problem
+from shm.inference.problem import DIFFERENCE, Problem
 from shm.inference.tmcmc import Mover
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"
-_FINAL_STEPS = 5
+_FINAL_STEPS = 5  # technical: parts equal copies of resampled draws; the posterior is kept by each
 
 _EDGE, _MANY = 0.02, 5.0
 """A parameter is at its bound where the outermost 2 % of its range hold five times the draws that
@@ -154,9 +154,9 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     variance[:known] += common**2
     precision = slopes.T @ (slopes / variance[:, None]) + np.eye(slopes.shape[1])
     gain = np.linalg.solve(precision, (slopes / variance[:, None]).T)[:, :known]
-    step = 1e-4 * np.eye(slopes.shape[1])
+    step = DIFFERENCE * np.eye(slopes.shape[1])
     tension_n = coordinates.tension_n(np.vstack([middle, middle + step]))
-    rise = (tension_n[1:] - tension_n[0]) / 1e-4
+    rise = (tension_n[1:] - tension_n[0]) / DIFFERENCE
     return float(np.sqrt(((rise @ gain * own[:known]) ** 2).sum()))
 
 

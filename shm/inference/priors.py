@@ -25,9 +25,19 @@ from shm.values import FloatArray, Hanger, IntArray, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)
 
-_ALIKE_WITHIN, _MIDDLES = 0.09, 32
-_SAME_WITHIN = 0.02 / math.log10(RESTRAINT[1] / RESTRAINT[0])
-_STIFFEST = 1 / math.log10(RESTRAINT[1] / RESTRAINT[0])
+DECADES = math.log10(RESTRAINT[1] / RESTRAINT[0])
+"""Of end stiffness, over which its prior is even."""
+_STIFFEST = 1 / DECADES
+
+# Assumed (judgement), as shares of these decades: 0.4 decades, a factor of 2.5, between two joints
+# of one drawing, and 0.02, 5 %, between the two axes of a round end.
+_ALIKE_WITHIN = 0.09
+_SAME_WITHIN = 0.02 / DECADES
+
+_UNSTATED_BENDING_SD = 0.3  # of the logarithm of a factor anywhere from 0.3 to 1: 0.2 of 0.65
+
+# Numerical: steps of 0.35 `_ALIKE_WITHIN`, for which sums over bells of four springs are exact.
+_MIDDLES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +104,7 @@ class Deviations:
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
         taught = calibration is not None and BENDING in calibration.names
         if stated or (model.is_strand and taught):
-            sds[BENDING] = scatter.bending_factor if stated else 0.3
+            sds[BENDING] = scatter.bending_factor if stated else _UNSTATED_BENDING_SD
         self.names = tuple(sds)
         self.mean: FloatArray = np.zeros(len(self.names))
         covariance = np.diag(np.array(list(sds.values())) ** 2)

@@ -17,14 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.inference.importance import Weighted
+from shm.inference.mixture import Normal
 from shm.inference.other_answers import Outcome
 from shm.inference.problem import Points, Problem
 from shm.inference.tmcmc import normalised
 from shm.values import BoolArray, FloatArray, IntArray
 
+# Ching and Chen (2007), thesis 4.3: scale of the random walk, variation of a stage's weights.
 _SCALE = 0.2
 _TARGET_VARIATION = 1.0
-_REGULAR = 1e-12
 
 
 class BiasedEvidenceWarning(UserWarning):
@@ -100,8 +101,8 @@ def _moved(
 ) -> _Particles:
     """The next population: each chosen particle leads a chain as long as it was chosen often."""
     covariance = np.cov(population.theta.T, aweights=weights)
-    regular = _REGULAR * np.eye(len(covariance))
-    factor = np.asarray(np.linalg.cholesky(_SCALE**2 * covariance + regular), dtype=float)
+    walk = Normal(np.zeros(len(covariance)), _SCALE**2 * covariance)
+    factor = np.asarray(walk.factor, dtype=float)
     lengths = rng.multinomial(len(weights), weights)
     chains, visited = population.take(np.flatnonzero(lengths)), []
     lengths = lengths[lengths > 0]

@@ -22,10 +22,14 @@ from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, Hint
 from shm.values import FloatArray, IntArray
 
+# Technical: longer strides than the textbook's 1, since the last step corrects what they leave.
 _TARGET_VARIATION = 2.0
-_TARGET_ACCEPTANCE = 0.3
 _ROUNDS = 4
-_DEGREES_OF_FREEDOM = 5.0
+_DEGREES_OF_FREEDOM = 5.0  # judgement: heavier tails than a normal, with a finite variance
+
+_TARGET_ACCEPTANCE = 0.3  # between 0.44 in one dimension and 0.23 in many (Roberts, Rosenthal 2001)
+
+# Below any error of a frequency; where the likelihood is flat.
 _SMALLEST_FLOOR = 1e-9
 _LARGEST_FLOOR = 1e3
 

@@ -13,21 +13,26 @@ from shm.inference.importance import Weighted, weigh
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
-from shm.inference.priors import reading_of
+from shm.inference.priors import DECADES, reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import Hint, hinted, search
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
 from shm.models import THESIS, AsMade, Model
-from shm.models.as_made import RESTRAINT
 from shm.values import ENOUGH_EFFECTIVE, NAN, ModalTest, Posterior, Selection
 
 __all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]
 
+# Technical: few particles do, since the last step weighs (`shm.inference.tmcmc`); 200 are
+# twenty or more for each parameter.
 _SAMPLES_A_PARTICLE = 5
 _FEWEST_PARTICLES = 200
+
 _DRAWS_WITHOUT_READING = 1000  # for the quartiles
-_ENOUGH = 0.5
+
+ENOUGH = 0.5
+"""Effective draws for each sample to keep; fewer repeat draws, more cost in proportion."""
+
 _AGAIN = (3, 9)
 """Times as many particles in a second and a third attempt, where the draws were too few."""
 
@@ -119,7 +124,7 @@ def _weighted(
     progress(problem.model.name, 0.2)
     *wider, population = sample(problem, anchors, particles, rng, near)
     progress(problem.model.name, 0.7)
-    return weigh(problem, population, anchors, _ENOUGH * samples, rng, wider)
+    return weigh(problem, population, anchors, ENOUGH * samples, rng, wider)
 
 
 def select(
@@ -166,7 +171,7 @@ def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     if not isinstance(model, AsMade) or model.springs:
         return 0.0
     planes = {mode.plane for test in tests for mode in test.regular_modes}
-    one = 1 / (1 + np.log10(RESTRAINT[1] / RESTRAINT[0]))
+    one = 1 / (1 + DECADES)
     # Springs each by itself, all alike, alike in each plane, or made to clamp (`EndDetails`): as
     # many of these are beyond the stiffest decade as are in it. Round ends each by itself or alike.
     shares = [one ** (2 * len(planes)), one, one ** len(planes), 0.5]

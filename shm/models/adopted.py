@@ -33,8 +33,10 @@ from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
 from shm.models.registry import MODELS
 from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest, Plane
 
-_HALF_WIDTH_IN_SD = math.sqrt(3)
-_ALONG = 101
+_HALF_WIDTH_IN_SD = math.sqrt(3)  # of a uniform distribution
+_ALONG = 101  # ten points a half wave of order 10: the largest deflection is within 1.2 %
+
+# What was measured: nothing but a test, and all that makes every effect visible.
 _ONE_TEST = Survey(("test",), PLANES, (), False, (), (), ())
 _ANYTHING = Survey((), PLANES, (), True, (0.0, 20.0), (0.5, 1.0), ())
 _REFERENCE = "reference_c"

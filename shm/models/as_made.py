@@ -44,7 +44,7 @@ BENDING_FACTOR = (0.3, 1.0)
 SHEAR_SHARE = (0.0, 1.5)
 """Of a strand, over a solid bar's shear: none, as of wires that each bend alone, to more."""
 
-_MOST_SD = 6.0
+_MOST_SD = 6.0  # a normal distribution has 2e-9 beyond
 
 
 class AsMade(Model):

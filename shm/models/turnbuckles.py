@@ -15,7 +15,7 @@ from shm.errors import UsageError
 from shm.models.hanger import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
-_ALIKE = 1e-9
+_ALIKE = 1e-9  # rounding
 
 
 def coupled_bar(hanger: Hanger, length_m: FloatArray, tension_n: FloatArray) -> PhysicalHanger:

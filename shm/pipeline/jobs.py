@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 from shm.bridge import Hook
@@ -15,9 +14,9 @@ from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.judging import judge
 from shm.pipeline.parcel import Opens, Parcel
+from shm.pipeline.registry import registered, run_step
 from shm.pipeline.terms import Taught, identify_lineage, update_terms
 from shm.pipeline.watching import tests_beside, to_watch
-from shm.resources import give_back_memory
 from shm.settings import Settings
 from shm.store import (
     Delivery,
@@ -44,14 +43,6 @@ Notifier = Callable[[Hook, Alert], object]
 
 class DeliveryRefused(ShmError):
     """A hook has said for good that it does not take an alert: no use in trying again."""
-
-
-def run_step(name: str, *arguments: Any) -> Any:
-    """Runs a step of `shm.pipeline.steps`, which is imported in the process that computes."""
-    try:
-        return getattr(import_module("shm.pipeline.steps"), name)(*arguments)
-    finally:
-        give_back_memory()
 
 
 @dataclass(frozen=True)
@@ -173,8 +164,8 @@ class Jobs:
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
             archive = Parcel.of(workspace.archive, recording.file, settings.max_file_bytes)
-        step = partial(run_step, "identify_file", recording, archive)
-        run = partial(step, workspace.bridge, settings, selected)
+        step = registered().identify
+        run = partial(run_step, step, recording, archive, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))
 
     def _keep_tests(self, recording: StoredRecording, found: Sequence[IdentifiedTest]) -> object:
@@ -190,7 +181,7 @@ class Jobs:
         taught = self.taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
         plain = [test.test for test in tests]
-        run = partial(run_step, "select_model", plain, hanger, names, terms)
+        run = partial(run_step, registered().select, plain, hanger, names, terms)
 
         def keep(found: Selection) -> None:
             self.store.selected(hanger.id, tests, found, lineage, self.clock())
@@ -204,7 +195,8 @@ class Jobs:
         known = baseline.posterior if baseline else None
         settings, taught = self.workspace.settings, self.taught(hanger, test.time)
         terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
-        run = partial(run_step, "update_test", test.test, hanger, model, known, terms)
+        step = registered().update
+        run = partial(run_step, step, test.test, hanger, model, known, terms)
         makes_baseline = self._makes_baseline(test, model)
 
         def keep(found: Posterior) -> None:
@@ -252,8 +244,9 @@ class Jobs:
         selection = self.store.selection(hanger.id)
         compared = None if selection is None else selection.selection
         tension = averaged_now(current, compared, hanger.limits)
-        step = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
         beside = tests_beside(self.store, baseline, test)
+        of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
+        run = partial(run_step, registered().watch, *of_test)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -263,7 +256,7 @@ class Jobs:
             state = KeptWatch(needed.key, test.time, content)
             return self.store.watched(test, baseline, watched, alert, hooks, self.clock(), state)
 
-        return Step(partial(step, needed.kept, tension, beside), keep)
+        return Step(run, keep)
 
     def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

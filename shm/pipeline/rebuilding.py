@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from shm.pipeline.jobs import Jobs, run_step
+from shm.pipeline.jobs import Jobs
+from shm.pipeline.registry import registered, run_step
 from shm.pipeline.terms import identify_lineage, update_terms
 from shm.store import Store, Workspace
 
@@ -27,7 +28,7 @@ def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime)
     if damaged:
         recording, selected = store.recording(recording_id), store.selected_models()
         terms = (workspace.bridge, workspace.settings, selected)
-        found = run_step("identify_file", recording, workspace.archive, *terms)
+        found = run_step(registered().identify, recording, workspace.archive, *terms)
         lineage = identify_lineage(recording, found[0].test.hanger, workspace)
         store.heal_tests(damaged, found, lineage)
         said.append(f"Damaged tests, identified again from the archive: {len(damaged)}.")
@@ -40,7 +41,7 @@ def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime)
             hanger, [each.model], tests, workspace.settings, taught=taught
         )
         plain = [test.test for test in tests]
-        selection = run_step("select_model", plain, hanger, [each.model], options)
+        selection = run_step(registered().select, plain, hanger, [each.model], options)
         store.heal_posterior(each.id, selection.selected, tests, lineage, at)
     if posteriors:
         said.append(f"Damaged posteriors, made again from their tests: {len(posteriors)}.")

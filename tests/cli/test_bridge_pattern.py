@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from shm.errors import NothingThere, UsageError
 from shm.store import IdentifiedTest, Lineage, Store, Workspace
 from shm.values import Drift, Selection, WatchedTest
-from shm_cli.bridge_pattern import command
+from shm_cli.drift import bridge
 from shm_cli.report import command as report
 from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
 from tests.helpers.workspaces import make_workspace
@@ -52,7 +52,7 @@ def arch(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 def call(workspace: Workspace, *arguments: str) -> Result:
-    return CliRunner().invoke(command, arguments, obj=str(workspace.folder))
+    return CliRunner().invoke(bridge, arguments, obj=str(workspace.folder))
 
 
 def test_the_document_names_the_hanger_that_shed_load(arch: Workspace) -> None:

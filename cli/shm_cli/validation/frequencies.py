@@ -13,9 +13,13 @@ from shm.models import THESIS, build
 from shm.values import FloatArray, Hanger
 from shm_cli import thesis
 
+# Of the thesis's tables A.1 to A.7: modes, springs of a class.
 _MODES = 6
 _SPRINGS = {"solid1": 8, "solid2": 4}
-_STIFFEST_SOLVED = 1e13
+
+_STIFFEST_SOLVED = 1e13  # numerical: a clamp; table A.4 goes on to 1e26 with the same frequencies
+
+# Found: what makes tables A.2, A.6 and A.7 come out (docs/trials/validation.md).
 _CORNERS_OF_TABLE_A_2 = 10
 _TENSIONS_OF_BEAM_TABLES_N = {"length_12": 745e3, "length_9_817": 724e3}
 _MISPRINT = {("length_9_817", 2)}

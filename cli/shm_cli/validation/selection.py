@@ -13,7 +13,7 @@ from shm.modes_document import load_modes
 from shm.values import Hanger, Posterior, Selection
 from shm_cli import thesis
 
-_REPEATS = (1, 10)
+_REPEATS = (1, 10)  # once, and N_D of the thesis's evidence (docs/trials/validation.md)
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,17 @@ from shm.store.checking import of_no_recording, quick_troubles, unknown_files
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import SIDECAR, left_alone, never_taken, scan
 
-_WAITS_LONG = timedelta(minutes=10)
+# Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
+# looked into; shorter ones would warn of a burst of files, longer ones hide a fault for a shift.
+WAITS_LONG = timedelta(minutes=10)
+"""Of a file, or an alert, that nobody takes."""
 _STUCK = timedelta(hours=1)
 _STUCK_BEHIND_OTHERS = timedelta(days=1)
 _NOTHING_MOVES = timedelta(minutes=15)
 _FORGOTTEN = timedelta(days=1)  # some uploads take hours
 _ALONE = timedelta(minutes=10)  # whoever writes a sidecar first writes its file soon
-_LOOKED_AT = 100
+
+_LOOKED_AT = 100  # technical: the latest files, which takes a blink; a lost disk has lost all
 _FAILED = "Nothing is taken in meanwhile: mend what it names; its log tells more."
 _BEGIN = "Begin it: `shm daemon`, or the service (docs/operation.md)."
 _CLOCK_TOLERANCE = timedelta(minutes=1)
@@ -118,7 +122,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
         yield ok("spool", "empty")
     else:
         found = f"{counted(len(ages), 'file')} in the queue, the oldest for {told(max(ages))}"
-        late = max(ages) > _WAITS_LONG
+        late = max(ages) > WAITS_LONG
         remedy = "Is a daemon active, and what does its log say of these files?"
         yield warning("spool", found, remedy) if late else ok("spool", found)
     never = never_taken(spool)

@@ -34,6 +34,7 @@ from shm.store import Workspace
 from shm.store.rows import DeliveryState
 from shm.store.workspace import FOLDERS
 from shm_daemon.doctor.checks import (
+    WAITS_LONG,
     Check,
     Examined,
     Finding,
@@ -56,8 +57,7 @@ from shm_daemon.doctor.checks import (
 from shm_daemon.heartbeat import told
 from shm_daemon.hooks import HookFailed, HookNotifier
 
-_LATE = timedelta(minutes=10)
-_REMEMBERED = timedelta(days=30)
+_REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator looks here
 
 
 def check_hooks(workspace: Workspace) -> Iterator[Finding]:
@@ -78,7 +78,7 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.deliveries(DeliveryState.WAITING)
-    late = [each for each in waiting if each.attempts or now - each.next_attempt_at > _LATE]
+    late = [each for each in waiting if each.attempts or now - each.next_attempt_at > WAITS_LONG]
     if late:
         worst = max(late, key=lambda each: each.attempts)
         said = worst.last_error or "not tried yet: is a daemon active?"
@@ -261,8 +261,7 @@ def _version(name: str) -> str:
         return "unknown"
 
 
-_GIGABYTE = 1e9
-_NEARLY_FULL = 0.1
+_NEARLY_FULL = 0.1  # judgement: of the room that is wanted; a warning comes ten times earlier
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:
@@ -320,7 +319,7 @@ def check_disks(folder: Path, settings: Settings) -> Iterator[Finding]:
 
 def _room(what: str, path: Path, wanted_bytes: int) -> Finding:
     usage = shutil.disk_usage(path)
-    found = f"{what}: {usage.free / _GIGABYTE:.1f} of {usage.total / _GIGABYTE:.0f} GB free"
+    found = f"{what}: {usage.free / 1e9:.1f} of {usage.total / 1e9:.0f} GB free"
     remedy = "Free some space; `shm archive prune --dry-run` says what could go."
     if usage.free < _NEARLY_FULL * wanted_bytes:
         return fault("disk", found, remedy)

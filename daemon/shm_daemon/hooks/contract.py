@@ -10,7 +10,7 @@ from typing import Protocol
 from shm.errors import ShmError
 from shm.values import Alert
 
-SHOWN_CHARACTERS = 500
+SHOWN_CHARACTERS = 500  # technical: of a stranger's words, what a line of the log may hold
 
 
 class HookFailed(ShmError):

@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address
 
-DEFAULT_PORT = 8400
+DEFAULT_PORT = 8400  # technical: above 1024, for which one must be root, and not the usual 8080
 UPLOADS = "/api/recordings"
 """Where recordings are sent to."""
 

@@ -10,11 +10,9 @@ from shm.pipeline import utc_now
 from shm.store import AlertRow
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import answers
-from shm_daemon.web.models import Acknowledge, Alerts, AlertState
+from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, Acknowledge, Alerts, AlertState
 
 router = APIRouter(prefix="/api/alerts", tags=["alerts"])
-_LARGEST = 2**31 - 1
-_MOST = 1000
 
 
 @router.get(
@@ -26,14 +24,17 @@ _MOST = 1000
 def alerts(
     site: AtSite,
     _: Reader,
-    hanger: Annotated[int | None, Query(ge=0, le=_LARGEST)] = None,
+    hanger: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
     open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
     limit: Annotated[
-        int | None, Query(ge=1, le=_MOST, description="So many of the newest, the newest first.")
+        int | None,
+        Query(ge=1, le=MOST_ROWS, description="So many of the newest, the newest first."),
     ] = None,
     before: Annotated[
         int | None,
-        Query(ge=0, le=_LARGEST, description="With `limit`: `next_before` of the answer before."),
+        Query(
+            ge=0, le=LARGEST_NUMBER, description="With `limit`: `next_before` of the answer before."
+        ),
     ] = None,
 ) -> Any:
     """With their deliveries. Without `limit` all that were ever raised, the oldest first.
@@ -60,7 +61,7 @@ def alerts(
 def acknowledge(
     site: AtSite,
     writer: Writer,
-    alert_id: Annotated[int, Path(ge=0, le=_LARGEST)],
+    alert_id: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)],
     told: Acknowledge,
 ) -> Any:
     """Notes on the record that somebody has seen an alert to its end: once an alert."""

@@ -12,10 +12,12 @@ from pathlib import Path
 from shm.store import Workspace
 from shm_daemon.web.__main__ import command
 from shm_daemon.web.address import Address
-from shm_daemon.web.serving import context_of, refuse_unguarded, refuse_uninstalled
+from shm_daemon.web.serving import ENDING_S, context_of, refuse_unguarded, refuse_uninstalled
 
+# Technical: at once where it died by chance, each minute where it cannot live, to spare the log.
 _FIRST_WAIT_S, _LONGEST_WAIT_S, _LIVED_WELL_S = 1.0, 60.0, 60.0
-_ENDING_S = 10.0
+
+_ENDING_S = 2 * ENDING_S  # its callers have been cut off by then
 
 log = logging.getLogger(__name__)
 

@@ -31,7 +31,7 @@ DEADLINE_S = 10.0
 """From the first moment to the last byte of a request that is no upload; also for TLS to begin."""
 FROM_AN_ADDRESS = 64
 """So many may wait from one address: a browser holds six, a proxy keeps some tens open."""
-FROM_ALL = 256
+FROM_ALL = 4 * FROM_AN_ADDRESS  # technical: with the largest headers 4 MB of memory
 _LEAST_PROGRESS_BYTES = 10_000
 """Who takes this much of a long answer before each deadline may take it to the end."""
 

@@ -19,6 +19,7 @@ from shm_daemon.web.frame import for_a_person, problem
 
 log = logging.getLogger(__name__)
 
+# Statuses as RFC 9110 defines them, 429 as RFC 6585.
 _STATUS: tuple[tuple[type[ShmError], int], ...] = (
     (TooLarge, 413),
     (NothingThere, 404),

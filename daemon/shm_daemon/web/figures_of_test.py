@@ -56,6 +56,7 @@ class TestFigure:
         return {**with_plotly.document(found), **words}
 
 
+# Judgement: a figure of one panel fits a laptop's screen with its caption, one of several fills it.
 MEMBERS: tuple[TestFigure, ...] = (
     TestFigure(RESPONSE, "both", lambda sheet: 620),
     TestFigure(TIME_HISTORY, "file", lambda sheet: 680),

@@ -29,6 +29,8 @@ HEALTH, METRICS = "/health", "/metrics"
 
 log = logging.getLogger(__name__)
 
+# Technical: within the 10 s that Prometheus waits by default; many times the few seconds that
+# loading takes; a few askings meanwhile.
 _LONGEST_CHECK_S = 5.0
 _LONGEST_LOADING_S = 120.0
 _AGAIN_S = 5

@@ -18,14 +18,12 @@ from shm_daemon.web.hanger_models import FigureDocument, HangerTests, HangerTren
 from shm_daemon.web.hanger_tests import TestLine, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS
 from shm_daemon.web.plotting import answer, plain
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import workshop_of
+from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
-
-_AGAIN_S = "2"
-_MOST_TESTS = 1000
 
 
 @router.get(
@@ -72,9 +70,10 @@ def some_tests(
     site: AtSite,
     _: Reader,
     hanger_id: Number,
-    limit: Annotated[int, Query(ge=1, le=_MOST_TESTS)] = 50,
+    limit: Annotated[int, Query(ge=1, le=MOST_ROWS)] = 50,
     before: Annotated[
-        int | None, Query(ge=0, le=2**31 - 1, description="`next_before` of the answer before.")
+        int | None,
+        Query(ge=0, le=LARGEST_NUMBER, description="`next_before` of the answer before."),
     ] = None,
 ) -> Any:
     """The newest first; those before a test where `before` names its number."""
@@ -118,7 +117,7 @@ def _view(request: Request, site: Site, hanger_id: int) -> HangerView:
 
 
 def _headers(view: HangerView) -> dict[str, str]:
-    return {"Retry-After": _AGAIN_S} if view.states is None else {}
+    return RETRY_AFTER if view.states is None else {}
 
 
 def _point(point: TrendPoint) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from shm.store import (
 from shm.values import Hanger
 from shm_daemon.web.working_out import Workshop
 
-_BYTES_A_TEST = 1_000
+_BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
 
 log = logging.getLogger(__name__)
 

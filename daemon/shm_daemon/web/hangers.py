@@ -17,11 +17,11 @@ from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.models import Hangers, HangerState, Status
+from shm_daemon.web.models import LARGEST_NUMBER, Hangers, HangerState, Status
 from shm_daemon.web.plotting import plain
 
 router = APIRouter(prefix="/api", tags=["state"])
-Number = Annotated[int, Path(ge=0, le=2**31 - 1, description="The number of the hanger.")]
+Number = Annotated[int, Path(ge=0, le=LARGEST_NUMBER, description="The number of the hanger.")]
 _SHIFT = ("quantity", "shift_mean", "shift_sd", "threshold", "probability")
 
 

@@ -29,7 +29,7 @@ from shm_daemon.web.site import Site
 __all__ = ["CONTENT_TYPE", "Exposition"]
 
 _LATELY = timedelta(hours=1)
-_QUANTILES = (0.5, 0.95, 1.0)
+_QUANTILES = (0.5, 0.95, 1.0)  # the usual, the slow and the slowest
 
 log = logging.getLogger(__name__)
 

@@ -15,7 +15,14 @@ def _written(text: str) -> str:
     return text.strip()
 
 
-Written = Annotated[str, Field(max_length=2000), AfterValidator(_written)]
+MOST_WRITTEN = 2000
+"""Technical: characters of a reason or of a list, more than anybody reads."""
+MOST_ROWS = 1000
+"""Technical: of one answer, which `limit` may ask for; some hundred kilobytes."""
+LARGEST_NUMBER = 2**31 - 1
+"""Of the store's integers: PostgreSQL refuses larger ones."""
+
+Written = Annotated[str, Field(max_length=MOST_WRITTEN), AfterValidator(_written)]
 
 
 class Uploaded(BaseModel):

@@ -9,7 +9,7 @@ from shm.report.table import Table
 from shm.store import FormerTest, Lineage, Step
 from shm_daemon.web.view_of_test import TestView
 
-_AT_ONCE_S = 0.05
+_AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
 
 def origin(view: TestView) -> Table:

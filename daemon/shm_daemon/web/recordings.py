@@ -20,10 +20,16 @@ from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import UPLOADS
 from shm_daemon.web.address_of_test import test_page
 from shm_daemon.web.faults import Refused, answers
-from shm_daemon.web.models import Recordings, RecordingStatus, Uploaded
+from shm_daemon.web.models import (
+    LARGEST_NUMBER,
+    MOST_WRITTEN,
+    Recordings,
+    RecordingStatus,
+    Uploaded,
+)
 
-_PIECE_BYTES = 1 << 20
-_SILENCE_S = 60.0
+_PIECE_BYTES = 1 << 20  # technical: memory of an upload, against a change of threads for each piece
+_SILENCE_S = 60.0  # judgement: a mobile connection comes back within that or begins anew
 _BODY = {
     "requestBody": {
         "required": True,
@@ -34,12 +40,12 @@ _BODY = {
 
 router = APIRouter(prefix=UPLOADS, tags=["recordings"])
 
-List = Annotated[str | None, Query(max_length=2000)]
+List = Annotated[str | None, Query(max_length=MOST_WRITTEN)]
 Number = Annotated[float | None, Query(allow_inf_nan=False)]
 
 
 def described_by(
-    hanger: Annotated[int | None, Query(ge=0, le=2**31 - 1)] = None,
+    hanger: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
     time: Annotated[str | None, Query(max_length=40, description="ISO 8601")] = None,
     temperature_c: Number = None,
     added_mass_kg: Number = None,

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     import uvicorn
     from starlette.types import ASGIApp
 
-_HEADERS_BYTES = 16_384
-_OPEN_FILES = 8192
-_ENDING_S = 5
+_HEADERS_BYTES = 16_384  # technical: h11's own default; ours with token and cookie are below 2,000
+_OPEN_FILES = 8192  # technical: many times the connections that may wait
+ENDING_S = 5
+"""Technical: who is being answered at the end may take so long; a page takes less."""
 
 log = logging.getLogger(__name__)
 
@@ -132,7 +133,7 @@ def make_server(
         server_header=False,
         proxy_headers=False,
         h11_max_incomplete_event_size=_HEADERS_BYTES,
-        timeout_graceful_shutdown=_ENDING_S,
+        timeout_graceful_shutdown=ENDING_S,
     )
     logging.getLogger("uvicorn.access").disabled = True
     return uvicorn.Server(config)

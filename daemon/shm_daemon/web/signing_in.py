@@ -15,8 +15,8 @@ from shm_daemon.web.frame import page
 
 router = APIRouter(include_in_schema=False)
 
-_KEPT_S = 30 * 86400
-_LONGEST_FORM_BYTES = 8192
+_KEPT_S = 30 * 86400  # judgement: a month; the token behind it can be revoked at any time
+_LONGEST_FORM_BYTES = 8192  # technical: a token and the address to go on to have some hundreds
 
 
 @router.get("/sign-in")

@@ -19,7 +19,7 @@ from shm_daemon.web.address import Address, network_of
 
 MOST_WRONG, WITHIN_S = 10, 60.0
 """A person mistypes a few; a program with an old token comes again and again."""
-_ADDRESSES_KEPT, _PROVEN_KEPT = 4096, 1024
+_ADDRESSES_KEPT, _PROVEN_KEPT = 4096, 1024  # technical: below a megabyte of memory
 
 
 class WrongTokens:

@@ -24,7 +24,7 @@ from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
 from shm_daemon.web.origin_of_test import formers_of, steps_of
 from shm_daemon.web.view_of_test import AT_WORK, TestView, as_bytes
-from shm_daemon.web.working_out import workshop_of
+from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 
 class Waiting(BaseModel):
@@ -141,7 +141,7 @@ class PlotlyFigure(BaseModel):
     alt: str
 
 
-RETRY_AFTER = {"Retry-After": "2"}
+# Statuses as RFC 9110 defines them.
 _FAULTS = answers(400, 401, 403, 404, 422, 503)
 _LATER: dict[int | str, dict[str, Any]] = {
     202: {"model": Waiting, "description": "It is being worked out; `Retry-After` says how long."}
@@ -149,9 +149,14 @@ _LATER: dict[int | str, dict[str, Any]] = {
 _OF_TEST = "/hangers/{hanger_id}/tests/{test:path}"
 
 router = APIRouter(prefix="/api", tags=["state"])
+# Technical: a file name of 255 bytes has 765 characters when encoded; no test has more responses.
 Name = Annotated[str, Path(max_length=1000, description="The test's name, percent-encoded.")]
+MOST_RESPONSES = 100_000
 Point = Annotated[
-    int, Query(ge=0, le=100_000, description="Which response, from 0 in the order of `responses`.")
+    int,
+    Query(
+        ge=0, le=MOST_RESPONSES, description="Which response, from 0 in the order of `responses`."
+    ),
 ]
 
 

@@ -30,11 +30,12 @@ _GAP, _GAP_NUMBERED, _GAP_BESIDE, _GAP_GRID = 0.045, 0.13, 0.08, 0.03
 side, of a grid."""
 _SHARE_OF_ROW = 0.74
 """Height of a panel of a grid; its title takes the rest."""
+# 96 px and 72 points an inch; marks look as large as matplotlib's (judgement, by eye).
 _PX_A_POINT, _PX_A_POINT_OF_MARKS = 4 / 3, 1.65
 _ABOVE_PX, _BELOW_PX = 76, 26
 """Room for a legend above a title that begins where it does; for the numbers below a grid."""
-_DIGITS = 6
-_LONGEST_LINE = 60
+_DIGITS = 6  # technical: frequencies to their identification, 1e-5; half of the bytes of a double
+_LONGEST_LINE = 60  # judgement: characters that are read with ease, and fit beside a cursor
 _SYMBOLS = {
     "circle": "circle", "square": "square", "diamond": "diamond", "cross": "x",
     "thin cross": "x-thin", "triangle": "triangle-up", "triangle down": "triangle-down",

@@ -22,12 +22,17 @@ from fastapi import Request
 from shm.errors import ShmError
 from shm_daemon.execution import children_ended, process_pool
 
+# Technical: each order takes seconds; the process goes when nobody looks at pages. Judgement: after
+# ten minutes it hangs, and who asks again within a minute is told why it failed.
 _MOST_WAITING = 8
 _MOST_KEPT_BYTES = 64_000_000
 _IDLE_S = 60.0
 _LONGEST_S = 600.0
 _FAILURE_LASTS_S = 60.0
 _LOOK_S = 0.2
+
+RETRY_AFTER = {"Retry-After": "2"}
+"""Seconds after which to ask again for what takes some of them to work out."""
 
 log = logging.getLogger(__name__)
 

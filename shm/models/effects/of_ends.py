@@ -73,6 +73,8 @@ class RotationalEndFlexibility(Effect):
         return replace(physical, rotational_compliance_rad_n_m=compliance)
 
 
+# Judgement: three decades from a support about as soft as the bar to one that gives way by less
+# than the noise of frequencies.
 _SOFT, _STIFF = 3.0, 3000.0
 
 

@@ -50,7 +50,7 @@ class DistributedMass(Effect):
         return replace(physical, mass_per_length_kg_m=mass)
 
 
-GYRATION_M = 0.1
+GYRATION_M = 0.1  # judgement: a clamp or coupler some 0.35 m long, whose length is sqrt(12) of it
 
 
 class UnknownPointMass(Effect):

@@ -63,7 +63,7 @@ class Timebase(Effect):
         return replace(physical, clock_factor=physical.clock_factor * (1 + values[:, 0]))
 
 
-_FEWEST_DECIMALS, _MOST_DECIMALS = 2, 9
+_FEWEST_DECIMALS, _MOST_DECIMALS = 2, 9  # technical: a tape's centimetre, and what ends the search
 
 
 class SensorMisalignment(Effect):

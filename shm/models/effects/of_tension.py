@@ -12,12 +12,18 @@ from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
+_STEEL_EXPANSION_1_K = 1.2e-5  # EN 1993-1-1, 3.2.6
+
+# Judgement: by less, thermometers at one spot (0.5 K) and hits (10 %) scatter themselves.
 _LEAST_RANGE_K = 1.0
-_STEEL_EXPANSION_1_K = 1.2e-5
-_DYING = 1.5
-_LOSS_AT_REFERENCE_LEVEL = 0.1
-_SLIP = 0.5
 _LEAST_RATIO = 1.2
+
+# Powers of other laws of the level, which `other_laws` words: what a diagnosis owes to the law.
+_DYING = 1.5
+_SLIP = 0.5
+
+# Judgement: bolted joints lose a few per cent to tens of them. No diagnosis uses the damping.
+_LOSS_AT_REFERENCE_LEVEL = 0.1
 
 
 class TemperatureTension(Effect):

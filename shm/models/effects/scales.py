@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
+from shm.models.as_made import RESTRAINT
 from shm.models.base import Model
 from shm.models.effects.base import Parameter
 from shm.values import Hanger
 
-_MIDDLE_ORDER = 4
-_SOFT, _STIFF = 0.03, 1000.0
+_MIDDLE_ORDER = 4  # of the seven or so orders that a hammer test finds
 
 
 def mass_kg(hanger: Hanger) -> float:
@@ -28,8 +28,8 @@ def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Para
     return Parameter(
         name,
         "N m/rad",
-        math.log10(_SOFT * own),
-        math.log10(_STIFF * own),
+        math.log10(RESTRAINT[0] * own),
+        math.log10(RESTRAINT[1] * own),
         -np.inf if hinge else np.inf,
         "0.03 to 1000 times EI p, what the bar itself resists with in mode 4: softer is a hinge, "
         "stiffer a clamp; nobody knows the order of magnitude.",

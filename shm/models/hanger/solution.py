@@ -15,9 +15,9 @@ from shm.models.hanger.motion import Motion, motion
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
 from shm.models.hanger.supports import are_coupled, rotational_n_m_rad
 from shm.models.hanger.system import System, system
-from shm.values import FloatArray
+from shm.values import PLANES, FloatArray
 
-_PLANES = 2
+_PLANES = len(PLANES)
 
 
 def solve(

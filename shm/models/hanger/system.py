@@ -17,7 +17,7 @@ from shm.models.hanger.physical import PhysicalHanger
 from shm.models.hanger.supports import Swing, bending_unit, on_swings, rotational_n_m_rad, swings
 from shm.values import FloatArray, IntArray
 
-_RIGID_IN_SHEAR = 1e12
+_RIGID_IN_SHEAR = 1e12  # numerical: a share of shear below 1e-12 is lost in rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,9 @@ from shm.models.solid.geometry import (
 )
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
-_SPRING_BOUNDS = (5.0, 12.0)
-_BLOCK = 500
-_ROUND_WITHIN = 0.01
+_SPRING_BOUNDS = (5.0, 12.0)  # thesis 5.2
+_BLOCK = 500  # technical: matrices of some 10 MB at once
+_ROUND_WITHIN = 0.01  # tolerance of a rolled bar's area (EN 10060), as the default scatter
 
 # The two plates are alike but for a quarter turn. Seen from the arch end and with the planes
 # exchanged, the hanger is the same, so that one basis serves both planes.

@@ -23,7 +23,7 @@ import numpy as np
 
 from shm.values import EndPlate, FloatArray, Plane
 
-_WING_GRADING = 1.4
+_WING_GRADING = 1.4  # judgement: elements get smaller towards the rod, where stress gathers
 AXIAL: dict[str, Edge] = {
     "log10_k1": (False, True),
     "log10_k2": (False, False),

@@ -19,9 +19,14 @@ from scipy.sparse import csc_array
 from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
 from shm.values import BoolArray, FloatArray
 
+# Numerical: amid its range; a mode's part below 1e-6 of its energy's root changes no frequency by
+# 1e-12; a mass below 1e-14 of the largest is rounding.
 _REFERENCE_SPRING_N_M = 1e8
 _NEGLIGIBLE = 1e-6
 _LOST_IN_ROUNDING = 1e-14
+
+# Technical: together they keep 100 held-out points and 100 corners within 0.007 % of the full model
+# (tests/benchmarks/solid_models.py). More of any cost full solutions, once a description.
 _CANDIDATES = 300
 _MOST_CORNERS = 128
 _MOST_POINTS = 200

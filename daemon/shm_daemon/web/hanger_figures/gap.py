@@ -27,7 +27,7 @@ GAP_MAP = HangerFigure(
     lambda view: gap_map.specify(_sheet(view), is_on_screen=True),
     lambda view: gap_map.caption(_sheet(view), is_on_screen=True),
     lambda view: gap_map.FIGURE.alt(_sheet(view)),
-    height_px=480,
+    height_px=480,  # judgement: a row for each plane and test
 )
 
 
@@ -50,7 +50,7 @@ GAP_PLACES = HangerFigure(
         "kind, with the share of the misfit that it would explain there."
     ),
     _alt_of_places,
-    height_px=300,
+    height_px=300,  # judgement: one low panel
 )
 
 
@@ -62,7 +62,7 @@ CAUSES = HangerFigure(
     lambda view: causes.specify_on_screen(_sheet(view)),
     lambda view: causes.caption(_sheet(view), is_on_screen=True),
     lambda view: causes.FIGURE.alt(_sheet(view)),
-    height_px=430,
+    height_px=430,  # some 20 px, a line of text, for each of 20 effects
 )
 
 
@@ -80,5 +80,5 @@ BEFORE_AND_AFTER = HangerFigure(
     lambda view: before_and_after.specify(_sheet(view), is_on_screen=True),
     lambda view: before_and_after.FIGURE.caption(_sheet(view)),
     lambda view: before_and_after.FIGURE.alt(_sheet(view)),
-    height_px=480,
+    height_px=480,  # judgement: a panel for each plane
 )

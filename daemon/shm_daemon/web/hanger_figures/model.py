@@ -26,7 +26,7 @@ FREQUENCIES = HangerFigure(
     lambda view: OF_REPORT.draw(report_of(view)),
     lambda view: OF_REPORT.caption(report_of(view)),
     lambda view: OF_REPORT.alt(report_of(view)),
-    height_px=380,
+    height_px=380,  # judgement: the usual, with words below the axis
 )
 
 
@@ -38,7 +38,7 @@ PAIRS = HangerFigure(
     lambda view: OF_PAIRS.draw(report_of(view)),
     lambda view: OF_PAIRS.caption(report_of(view)),
     lambda view: OF_PAIRS.alt(report_of(view)),
-    height_px=760,
+    height_px=760,  # judgement: a grid of a panel for each pair, nearly square
     is_wide=True,
 )
 
@@ -76,5 +76,5 @@ MODELS = HangerFigure(
         f"probable before. Blue: the class in force, {_chosen(view)}."
     ),
     _alt_of_models,
-    height_px=240,
+    height_px=240,  # judgement: a bar for each of a few classes
 )

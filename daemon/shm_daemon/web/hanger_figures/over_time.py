@@ -20,7 +20,6 @@ from shm.values.force_units import ForceUnit, force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 
-_FEWEST = 2
 _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
     EventKind.BASELINE: ("baseline set", "square", True, "green"),
     EventKind.ADOPTED: ("effect adopted", "diamond", True, "purple"),
@@ -74,7 +73,7 @@ TREND = HangerFigure(
     lambda view: trend.specify(_course(view)),
     lambda view: trend.caption(_course(view)),
     lambda view: trend.alt(_course(view)),
-    height_px=440,
+    height_px=440,  # judgement: the usual, with signs of what people did above it
     shows_states=True,
 )
 
@@ -123,7 +122,7 @@ STIFFNESS = HangerFigure(
         " The state over time is being worked out." if view.states is None else "",
     ),
     lambda view: stiffness.alt(_courses(view)),
-    height_px=520,
+    height_px=520,  # judgement: a low panel for each of up to four springs
     shows_states=True,
 )
 
@@ -187,7 +186,7 @@ TEMPERATURE = HangerFigure(
     "temperature",
     "Tension and temperature",
     "trends",
-    lambda view: len(_with_temperature(view)) >= _FEWEST,
+    lambda view: len(_with_temperature(view)) > 1,
     _over_temperature,
     _caption_of_temperature,
     _alt_of_temperature,

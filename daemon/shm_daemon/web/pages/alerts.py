@@ -11,12 +11,13 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import test_page
 from shm_daemon.web.alerts import alert_document
 from shm_daemon.web.frame import page
+from shm_daemon.web.models import LARGEST_NUMBER
 
 router = APIRouter(include_in_schema=False)
 
-_SHOWN = 50
+_SHOWN = 50  # technical: alerts on a page, which links to older ones
 _MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert"}
-Number = Annotated[int | None, Query(ge=0, le=2**31 - 1)]
+Number = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
 
 
 @router.get("/alerts")

@@ -36,11 +36,11 @@ from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import BridgeState, Moved, Underway
+from shm_daemon.web.working_out import RETRY_AFTER
 
 router = APIRouter(tags=["state"])
 
-_AGAIN_S = 2
-_MOST_DECIMALS = 2
+_MOST_DECIMALS = 2  # judgement: of a per cent; no test tells tensions to a hundredth of that
 _COMPARING = "The hangers are being compared …"
 
 
@@ -181,7 +181,7 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
 
 
 def _underway() -> JSONResponse:
-    return JSONResponse({"message": _COMPARING}, 202, {"Retry-After": str(_AGAIN_S)})
+    return JSONResponse({"message": _COMPARING}, 202, RETRY_AFTER)
 
 
 def _interval(interval: Interval | None) -> dict[str, float] | None:
@@ -199,8 +199,11 @@ CLASSES = (
     ("unknown", "not known: no test since a baseline"),
 )
 """The classes of shift from the baseline, each with its words."""
+# Judgement: 1 % is what one test tells by, and each class is about twice the one before.
 _LIMITS = (0.01, 0.03, 0.06)
 
+# Judgement: drawing units, of which a laptop's page has about 1100. Hangers are so far apart that
+# their numbers (every second, fifth ... where 30 units are too few) can be read.
 _MOST_STEP, _LEAST_STEP, _WIDEST = 34.0, 9.0, 1100.0
 _TALLEST, _TOP, _BELOW, _BESIDE = 220.0, 48.0, 60.0, 36.0
 _BETWEEN_NUMBERS = 30.0

@@ -28,10 +28,12 @@ from shm_daemon.web.hanger_tests import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.held import held_documents
+from shm_daemon.web.models import LARGEST_NUMBER
 from shm_daemon.web.working_out import workshop_of
 
 router = APIRouter(include_in_schema=False)
 
+# Technical: what is read at a glance, and what a page has of the older ones.
 _LATEST_TESTS = 10
 _TESTS_A_PAGE = 100
 _LATEST_EVENTS = 20
@@ -88,7 +90,7 @@ def all_tests(
     site: AtSite,
     _: Reader,
     hanger_id: Number,
-    before: Annotated[int | None, Query(ge=0, le=2**31 - 1)] = None,
+    before: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
 ) -> HTMLResponse:
     """All tests of a hanger, the newest first, some a page."""
     one = described(site.workspace, hanger_id)

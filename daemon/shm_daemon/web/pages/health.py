@@ -32,13 +32,12 @@ from shm_daemon.web.health import troubles
 from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import Examination, Operation, Underway
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import workshop_of
+from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 router = APIRouter(tags=["operation"])
 
-_SHOWN = 100
-_FRESH_S = 300
-_AGAIN_S = 2
+_SHOWN = 100  # technical: refused files on a page
+_FRESH_S = 300  # technical: looking at all takes seconds and a trial of each hook; read by people
 _BEING_LOOKED = {"message": "All is being looked at …"}
 _MARKS = {
     Level.OK: "good",
@@ -248,4 +247,4 @@ def _findings(findings: Sequence[Finding]) -> Table:
 
 
 def _underway() -> JSONResponse:
-    return JSONResponse(_BEING_LOOKED, 202, {"Retry-After": str(_AGAIN_S)})
+    return JSONResponse(_BEING_LOOKED, 202, RETRY_AFTER)

@@ -24,12 +24,13 @@ from shm_daemon.web.address_of_test import test_json, test_page
 from shm_daemon.web.figures_of_test import TestFigure
 from shm_daemon.web.frame import page
 from shm_daemon.web.origin_of_test import origin, steps, superseded
-from shm_daemon.web.tests import RETRY_AFTER, View
+from shm_daemon.web.tests import MOST_RESPONSES, View
 from shm_daemon.web.view_of_test import AT_WORK, TestView
+from shm_daemon.web.working_out import RETRY_AFTER
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
-Response = Annotated[int | None, Query(ge=0, le=100_000)]
+Response = Annotated[int | None, Query(ge=0, le=MOST_RESPONSES)]
 _STYLES: dict[Verdict, str] = {
     "good": "steady",
     "warning": "watch",
