@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.chances import Family, Tried, doubted, families, missed, probabilities
+from shm.gap.calibration import CALIBRATION
+from shm.gap.chances import Family, Tried, families, missed, probabilities
 from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
@@ -28,11 +29,6 @@ from shm.values import FloatArray, Leads, leads
 WITHIN_REACH = 7.0
 AS_GOOD_A_FIT = 1.0
 """What a cause may fit worse than the best one, in log likelihood, and still fit as well."""
-FAINT = 0.075
-"""A second cause is faint that moves the data by less than this share of what the first does."""
-LAW_TO_CAUSE = 5.0
-"""Odds that a faint second cause is the first one's law. In blind trials eight pairs so faint were
-one effect and none was two; of ten with a second cause of up to a fifth, eight were two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +139,9 @@ def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
-    chances, passing = probabilities(kinds)
-    chances = without_faint(search.problem, search.baseline, kinds, chances)
     p_value = search.p_value(likeliest)
-    chances, passing = doubted(kinds, chances, passing, p_value)
+    chances, passing = probabilities(kinds, p_value)
+    chances = without_faint(search.problem, search.baseline, kinds, chances)
     each = [float(chance) for chance in missed(kinds, chances)]
     return _attribution(search, tried, kinds, each, passing, p_value)
 
@@ -258,19 +253,19 @@ def without_faint(
     A fault of the law is the same in all tests: what differs from test to test is a cause. To an
     effect that was not worth a fit nothing is given: its law is not nearly right.
     """
-    moved = chances.copy()
+    moved, odds = chances.copy(), CALIBRATION.minor_law_odds
     plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
     alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
     for i in plain:
-        leant_on = _leant_on(problem, baseline, kinds[i].best.fit)
-        if leant_on in alone:
-            share = chances[i] * LAW_TO_CAUSE / (1 + LAW_TO_CAUSE)
+        larger = leant_on(problem, baseline, kinds[i].best.fit)
+        if larger in alone:
+            share = chances[i] * odds / (1 + odds)
             moved[i] -= share
-            moved[alone[leant_on]] += share
+            moved[alone[larger]] += share
     return moved
 
 
-def _leant_on(problem: GapProblem, baseline: Fit, fit: Fit | None) -> str | None:
+def leant_on(problem: GapProblem, baseline: Fit, fit: Fit | None) -> str | None:
     """The name of the larger effect of a pair whose other one is faint; None where none is."""
     if fit is None or len(fit.hypothesis.effects) != 2:
         return None
@@ -278,7 +273,8 @@ def _leant_on(problem: GapProblem, baseline: Fit, fit: Fit | None) -> str | None
     large = int(np.argmax(moves))
     (name, _), (second, variant) = fit.hypothesis.effects[large], fit.hypothesis.effects[1 - large]
     differs = bool(EFFECTS[second].follows or variant.test)
-    return None if differs or moves[1 - large] > FAINT * moves[large] else name
+    plain = moves[1 - large] > CALIBRATION.minor_below * moves[large]
+    return None if differs or plain else name
 
 
 def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
