@@ -250,31 +250,33 @@ def without_faint(
 ) -> FloatArray:
     """The probabilities (families,) with those of pairs given to the one effect that they lean on.
 
-    A fault of the law is the same in all tests: what differs from test to test is a cause. To an
-    effect that was not worth a fit nothing is given: its law is not nearly right.
+    To an effect that was not worth a fit nothing is given: its law is not nearly right.
     """
     moved, odds = chances.copy(), CALIBRATION.minor_law_odds
     plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
     alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
     for i in plain:
-        larger = leant_on(problem, baseline, kinds[i].best.fit)
-        if larger in alone:
+        larger, part = second_cause(problem, baseline, kinds[i].best.fit)
+        if larger in alone and part <= CALIBRATION.minor_below:
             share = chances[i] * odds / (1 + odds)
             moved[i] -= share
             moved[alone[larger]] += share
     return moved
 
 
-def leant_on(problem: GapProblem, baseline: Fit, fit: Fit | None) -> str | None:
-    """The name of the larger effect of a pair whose other one is faint; None where none is."""
+def second_cause(problem: GapProblem, baseline: Fit, fit: Fit | None) -> tuple[str, float]:
+    """The name of the larger effect of a pair, and how far the other moves the data against it.
+
+    A fault of the law is the same in all tests: what differs from test to test is a cause, and as
+    large as the first (1); so is what is no pair, of name "".
+    """
     if fit is None or len(fit.hypothesis.effects) != 2:
-        return None
+        return "", 1.0
     moves = [_added(problem, baseline, fit, index) for index in (0, 1)]
     large = int(np.argmax(moves))
     (name, _), (second, variant) = fit.hypothesis.effects[large], fit.hypothesis.effects[1 - large]
     differs = bool(EFFECTS[second].follows or variant.test)
-    plain = moves[1 - large] > CALIBRATION.minor_below * moves[large]
-    return None if differs or plain else name
+    return name, 1.0 if differs else moves[1 - large] / max(moves[large], np.finfo(float).tiny)
 
 
 def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:

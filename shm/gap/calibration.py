@@ -28,11 +28,12 @@ class Share(NamedTuple):
 
 @dataclass(frozen=True)
 class Provenance:
-    """The trial that taught the values."""
+    """The trial that taught the values, and how many answers spoke for them."""
 
     trial: str
     seeds: str
     cases: str
+    answers: str
     date: date
     command: str
 
@@ -88,7 +89,7 @@ def _values(told: dict[str, Any]) -> Calibration:
         with_turned_sensors=mimic["with_turned_sensors"],
         undetected_share=told["undetected"]["share"],
         minor_below=told["minor"]["below"],
-        minor_law_odds=told["minor"]["law_odds"],
+        minor_law_odds=float(told["minor"]["law_odds"]),
         exact=Share(**law["exact"]),
         of_a_mode={each.pop("fraction"): Share(**each) for each in law["of_a_mode"]},
         on_the_whole={each.pop("fraction"): Share(**each) for each in law["on_the_whole"]},
