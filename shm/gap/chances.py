@@ -28,12 +28,13 @@ from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis, Method
 from shm.values import FloatArray
 
+# Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
+# than two. Blind trials plant the same mix; where it is another, odds are off by the ratio.
 NO_GAP = 0.25
 SINGLE = 0.5
 PAIR = 0.125
 UNKNOWN = 0.125
-"""Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
-than two. Blind trials plant the same mix; where it is another, odds are off by the ratio."""
+
 AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""

@@ -16,18 +16,23 @@ from shm.gap.coordinates import Branch
 from shm.gap.landscape import Landscape, Views, log_normal
 from shm.values import BoolArray, FloatArray
 
-_MOST_STEPS, _MOST_LAST_STEPS = 15, 5
-_LONGEST_STEP = 1.0
-_FAR = 0.03
-_FIRST_DAMPING, _LESS, _MORE = 1e-2, 0.2, 8.0
-_FIRST_REFUSAL = 0.1
+# Technical, as Marquardt's method goes to the same optima: steps of at most one standard deviation
+# of the prior, the damping of which falls fast and rises faster; after so many of them a point is
+# taken as it is.
+_MOST_STEPS, _MOST_LAST_STEPS, _LONGEST_STEP = 15, 5, 1.0
+_FIRST_DAMPING, _LESS, _MORE, _FIRST_REFUSAL = 1e-2, 0.2, 8.0, 0.1
 _LEAST_DAMPING, _MOST_DAMPING = 1e-8, 1e6
-_CONVERGED_GAIN = 0.02
-_HOPELESS = 7.0
+# Of the tension, in standard deviations of its prior: from there on slopes are computed anew.
+_FAR = 0.03
+
+# A log evidence is then known to 0.02; one that is a thousand times smaller counts for nothing.
+_CONVERGED_GAIN, _HOPELESS = 0.02, 7.0
+# Judgement: two normal peaks half a standard deviation apart are one (their overlap is 0.97).
 _SAME = 0.5
+# The prior's own curvature is 1: a posterior flatter than a third of it is no peak.
 _FLATTEST = 0.3
-_ROUNDING = 1e-13
-_NEVER = -1e300
+# Technical: some hundred roundings of a double; and a log probability that no sum feels.
+_ROUNDING, NEVER = 1e-13, -1e300
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +211,7 @@ def _branch(landscape: Landscape, z: FloatArray) -> Branch:
 def _downhill(landscape: Landscape, views: Views) -> _Downhill:
     columns = np.concatenate([views.slopes, views.residual[..., None]], axis=2)
     log = landscape.likelihood.by_node(views.residual)
-    log = np.where(np.isfinite(log), log, _NEVER)
+    log = np.where(np.isfinite(log), log, NEVER)
     gram = landscape.likelihood.gram(columns)
     probability = np.exp(log - logsumexp(log, axis=1, keepdims=True))
     mean = np.einsum("mk,mkij->mij", probability, gram)

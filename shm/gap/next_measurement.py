@@ -18,14 +18,15 @@ from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, NextMeasurement
 
 NO_GAP = "no gap"
-_CONTENDERS = 4
-_OUT_OF_THE_RACE = 10.0
-_WORTH_IT = 0.5
-_LISTED = 8
-_AS_GOOD_AS_CERTAIN = 100.0
-_CANDIDATE_PLACES = 11
-_NEW_SENSORS = 2
-_APART = 1 / 6
+# Technical: the leader against three rivals, as far behind as 20,000 to one, and a list that a
+# person reads.
+_CONTENDERS, _OUT_OF_THE_RACE, _LISTED = 4, 10.0, 8
+# Judgement: half a unit of log evidence turns even odds into 0.62 and is not worth a day's work;
+# 100 are more than any model's errors leave true.
+_WORTH_IT, _AS_GOOD_AS_CERTAIN = 0.5, 100.0
+# Judgement: every twelfth of the length, which one finds with a tape; two sensors that a person can
+# carry, no nearer than a sixth, half a wave of the sixth mode, lest they see the same.
+_CANDIDATE_PLACES, _NEW_SENSORS, _APART = 11, 2, 1 / 6
 
 _Promise = tuple[Proposal, float]
 
@@ -141,8 +142,8 @@ def _differences(problem: GapProblem, pair: tuple[Fit, Fit], design: Design) -> 
     )
 
 
-_USUAL_SHAPE_SD = 0.01
-_STEP_IN_SDS = 0.1
+_USUAL_SHAPE_SD = 0.01  # judgement: of a unit shape, twice that of our simulated campaigns
+_STEP_IN_SDS = 0.1  # technical: far from rounding, near enough for slopes to hold
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from shm.values.posterior import Averaged
 End = Literal["deck", "arch"]
 
 TENSION = "tension"
-_INFORMED = 0.7
+_INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
 @dataclass(frozen=True, eq=False)

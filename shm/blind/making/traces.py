@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
+# Any instant does, if it is one for all.
 _INSTANT = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
 
 

@@ -15,6 +15,7 @@ from shm.blind.scoring.marks import marks
 from shm.blind.scoring.questions import figures, leading
 from shm.values import Answer, Bin, CaseScore, Richness, TrialScore, TrueCase
 
+# Factors of 2 where detection rises, of 4 where it is sure: technical, bins of a figure.
 _SIZES = (0.0, 2.0, 4.0, 8.0, 32.0, 128.0, np.inf)
 
 
