@@ -212,7 +212,7 @@ class Pair:
         """The w of a spring that gives so much."""
         stiffness = self.own + np.log(1 / give - 1) / np.log(10)
         share = (stiffness - self.lower) / (self.upper - self.lower)
-        return ndtri(share.clip(ndtr(-_FARTHEST), ndtr(_FARTHEST)))
+        return np.asarray(ndtri(share.clip(ndtr(-_FARTHEST), ndtr(_FARTHEST))))
 
 
 class Straight:

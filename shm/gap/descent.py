@@ -141,7 +141,8 @@ def _climbed(landscape: Landscape, w: FloatArray, signs: FloatArray, steps: int)
         walkers = walkers.take(~ready & _promising(walkers, done))
         if len(walkers.signs):
             walkers = _moved(landscape, walkers)
-    return _counting(_distinct(done))
+    best = _distinct(done)
+    return [each for each in best if each.log_evidence > best[0].log_evidence - _HOPELESS]
 
 
 def _moved(landscape: Landscape, walkers: _Walkers) -> _Walkers:
@@ -197,11 +198,6 @@ def _linear_step(gram: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArra
     ridge = 1 + _ROUNDING * np.trace(inner, axis1=2, axis2=3)[..., None, None]
     step = np.linalg.solve(inner + ridge * np.eye(w.shape[1]), pull[..., None])[..., 0]
     return np.asarray(step), np.asarray((pull * step).sum(axis=2) / 2)
-
-
-def _counting(found: list[Optimum]) -> list[Optimum]:
-    """Those, the best first, whose evidence counts beside the best."""
-    return [each for each in found if each.log_evidence > found[0].log_evidence - _HOPELESS]
 
 
 def _branch(landscape: Landscape, z: FloatArray) -> Branch:

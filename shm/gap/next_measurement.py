@@ -54,7 +54,8 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
     found = []
     for fit, seen in zip(contenders[1:], foresights[1:], strict=True):
         pair = (contenders[0], fit)
-        promises = _promises(general, foresights[0], seen)
+        pairs = zip(general, foresights[0], seen, strict=True)
+        promises = [(each, _expected(*both)) for each, *both in pairs]
         promises += [_promise(problem, pair, each, errors) for each in _sensors(problem, pair)]
         found += [_named(pair, promise) for promise in _worth_it(promises)]
     found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
@@ -73,12 +74,6 @@ def _contenders(fits: Sequence[Fit]) -> list[Fit]:
     best = max((fit.log_evidence for fit in distinct.values()), default=0.0)
     racing = [f for f in distinct.values() if f.log_evidence > best - _OUT_OF_THE_RACE]
     return racing[:_CONTENDERS]
-
-
-def _promises(
-    general: Sequence[Proposal], one: Sequence[Foresight], other: Sequence[Foresight]
-) -> list[_Promise]:
-    return [(each, _expected(*pair)) for each, *pair in zip(general, one, other, strict=True)]
 
 
 def _promise(

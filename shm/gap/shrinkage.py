@@ -238,7 +238,8 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
     misfit = _misfits(parts, z, predicted)
     length = np.ones(len(parts))
     for _ in range(_STEPS):
-        steps = length[:, None] * _steps(parts, z, predicted)
+        whole = [part.step(*each) for part, *each in zip(parts, z, predicted, strict=True)]
+        steps = length[:, None] * np.array(whole)
         large = [part.sds(step) > _STEP_IN_SDS for part, step in zip(parts, steps, strict=True)]
         if not any(large):
             break
@@ -250,10 +251,6 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
         misfit = np.where(better, tried, misfit)
         length = np.where(better, 1.0, _SHORTER * length)
     return predicted
-
-
-def _steps(parts: list[_Part], z: FloatArray, predicted: FloatArray) -> FloatArray:
-    return np.array([part.step(*each) for part, *each in zip(parts, z, predicted, strict=True)])
 
 
 def _misfits(parts: list[_Part], z: FloatArray, predicted: FloatArray) -> FloatArray:

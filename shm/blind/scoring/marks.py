@@ -127,7 +127,7 @@ def _by_effect(
 LARGE = 4.0
 """Sizes above this are what a diagnosis is held to: log evidence of 8 is to be expected, and chance
 moves it by 4 either way (docs/trials/gap_trial.md). Held-out data are fewer: twice that."""
-VERY_LARGE = 2 * LARGE
+VERY_LARGE = 2 * LARGE  # of held-out data, which are fewer
 
 _ONE, _TWO, _UNKNOWN = of_kind("one"), of_kind("two"), of_kind("unknown")
 _RIGHT = figures(lambda case: case.right)
