@@ -16,9 +16,9 @@ from shm.gap.coordinates import Branch
 from shm.gap.landscape import Landscape, Views, log_normal
 from shm.values import BoolArray, FloatArray
 
-# Technical, as Marquardt's method goes to the same optima: steps of at most one standard deviation
-# of the prior, the damping of which falls fast and rises faster; after so many of them a point is
-# taken as it is.
+# Judgement, as Marquardt's method mostly goes to the same optima: steps of at most one standard
+# deviation of the prior, whose damping falls fast and rises faster; after so many of them a point
+# is taken as it is.
 _MOST_STEPS, _MOST_LAST_STEPS, _LONGEST_STEP = 15, 5, 1.0
 _FIRST_DAMPING, _LESS, _MORE, _FIRST_REFUSAL = 1e-2, 0.2, 8.0, 0.1
 _LEAST_DAMPING, _MOST_DAMPING = 1e-8, 1e6

@@ -213,7 +213,7 @@ def _summary(samples: FloatArray) -> tuple[float, float, float, float]:
 # By five points a half wave a spline follows its square, as local causes act, to 2 % (5/384 h^4 / 2
 # with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`places._EXTENT`).
 _PLACES_A_HALF_WAVE, _FEWEST_PLACES = 5, 31
-# Technical: to first order and once more at the size found; an end goes through decades.
+# Judgement: to first order and once more at the size found; an end goes through decades.
 _PASSES, _PASSES_OF_AN_END = 2, 16
 # Technical: as many stretches as a page shows, eight points in each.
 _BINS = 180

@@ -24,7 +24,7 @@ from shm.gap.sensitivity import scan
 from shm.values import FloatArray
 
 _DRAWS = 256  # technical: a mean to 6 % of its sd, as the likeliest fits are sampled afterwards
-# Technical: each start costs a descent. From 3 points of a scan; and over 93 % of the prior of the
+# Judgement: each start costs a descent. From 3 points of a scan; and over 93 % of the prior of the
 # tension one of four lies within half a standard deviation.
 STARTS = 3
 _BASELINE_STARTS = (-2.0, -1.0, 0.0, 1.0)

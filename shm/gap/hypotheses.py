@@ -23,7 +23,7 @@ IN_BASELINE = {
     "solid2": ("rotational_end_flexibility",),
 }
 """Effects that a baseline class has as parameters of its own."""
-# Technical: what a scan puts 150 times (a coarse one 1100 times) behind is not fitted. A smaller
+# Judgement: what a scan puts 150 times (a coarse one 1100 times) behind is not fitted. A smaller
 # reach loses causes, a larger one costs a fit each.
 HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
 NOTHING_SEEN = 1.0

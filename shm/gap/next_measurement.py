@@ -18,7 +18,7 @@ from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, NextMeasurement
 
 NO_GAP = "no gap"
-# Technical: the leader against three rivals, as far behind as 20,000 to one, and a list that a
+# Judgement: the leader against three rivals, as far behind as 20,000 to one, and a list that a
 # person reads.
 _CONTENDERS, _OUT_OF_THE_RACE, _LISTED = 4, 10.0, 8
 # Judgement: half a unit of log evidence turns even odds into 0.62 and is not worth a day's work;

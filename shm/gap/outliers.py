@@ -42,7 +42,7 @@ LARGEST_SHARE = 0.1
 what is usual (`GROSS_ERROR`)."""
 
 _FEWEST_LEFT = 4  # frequencies: tension, stiffness, and two that can disagree with them
-# Technical: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
+# Judgement: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
 _REACH = 2.5
 # Judgement: a datum ten standard deviations out has pulled the fit out of where it is linear.
 _DRAGGED = 10.0

@@ -28,7 +28,7 @@ from shm.gap.sensitivity import Scan
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
-# Technical, time against the chance to miss a cause. Sampled is what Laplace's method puts within
+# Judgement, time against the chance to miss a cause. Sampled is what Laplace's method puts within
 # 55 to one of the likeliest, five at most.
 MOST_FITS = 30
 SAMPLED_WITHIN, MOST_SAMPLED = 4.0, 5
@@ -40,7 +40,7 @@ THOROUGH_WITHIN = 3.0
 """Of the likeliest, by Laplace's method: the samplers of others stop after their first attempt. An
 evidence that is off by 0.6 changes a probability of 0.05 by 0.03."""
 
-# Technical, too: each leader costs a scan of all its pairs, each pair a fit.
+# Judgement, too: each leader costs a scan of all its pairs, each pair a fit.
 LEADERS, LEADING_PAIRS, MOST_PAIRS, MOST_ROUNDS = 3, 2, 8, 3
 MANY_LEADERS, MANY_PAIRS, ALIKE = 6, 30, 2
 

@@ -21,20 +21,20 @@ from shm.values import BoolArray, FloatArray, IntArray
 VISIBLE = 1.5
 """Standard deviations, of all data together, from which on an effect counts as one."""
 
-# Technical, points (powers of 2, as Sobol's are even only there) against time: eight along each of
+# Judgement, points (powers of 2, as Sobol's are even only there) against time: eight along each of
 # two parameters, then 32 in a quarter and a twelfth of the range about the best. In eight bins of a
 # size four points and more make a median.
 _POINTS = {1: 32, 2: 64}
 _MOST_POINTS = 128
 _HALVES, _CLOSER_POINTS = (0.12, 0.04), 32
 _BINS = 8
-# Technical: log evidence by which a scan may be wrong in any case, so that it needs no closer look.
+# Judgement: log evidence by which a scan may be wrong in any case, so that it needs no closer look.
 _ORDINARY = 6.0
-# Technical: starts within 99 % of a prior, no nearer to each other than closer points reach, none
+# Judgement: starts within 99 % of a prior, no nearer to each other than closer points reach, none
 # 3000 times worse than the best, nor by a third of the gap: a scan is linear, gaps are not.
 LONGEST_STEP, _FARTHEST, _APART = 2.5, 4.0, _HALVES[0]
 _HOPELESS, HOPELESS_SHARE = 8.0, 0.3
-# Technical: curvature is worth two more solutions where the bar's deviations go along for more than
+# Judgement: curvature is worth two more solutions where the bar's deviations go along for more than
 # one standard deviation, not for eight, which the prior forbids, and leave a seventh visible.
 _BENT_STEPS, _STRAIGHT, _HOPELESSLY_FAR, _MOSTLY_FOLLOWED = 2, 1.0, 8.0, 0.15
 

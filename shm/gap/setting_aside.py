@@ -27,7 +27,7 @@ from shm.gap.outliers import (
 from shm.gap.problem import GapProblem
 from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 
-_ROUNDS = 2  # technical: one error may hide another
+_ROUNDS = 2  # judgement: one error may hide another
 _LIKELIER_THAN_NOT = 0.5  # even odds
 
 

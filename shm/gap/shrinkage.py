@@ -18,7 +18,7 @@ from shm.models.effects import Conditions
 from shm.values import NAN, BoolArray, FloatArray, IntArray, Shrinkage
 
 _FEWEST = 4  # frequencies: three to fit (tension, stiffness and a size), one to predict
-# Technical: each fold is refitted; inner orders in thirds leave neighbours of each.
+# Judgement: each fold is refitted; inner orders in thirds leave neighbours of each.
 _ORDER_FOLDS, _TEST_FOLDS = 3, 6
 
 

@@ -40,7 +40,7 @@ from shm.simulate.recorded import Recorder, recorded
 from shm.values import Hanger, Richness, TrueCase, TrueEffect
 
 BASELINE = "beam1"
-_DRAWS = 5  # technical: of an effect or its place, until one can have the size; then another's turn
+_DRAWS = 5  # judgement: of an effect or its place, until one can have the size; then another's turn
 
 
 def make_case(directory: Path, draft: Draft, seed: np.random.SeedSequence) -> TrueCase:
