@@ -335,7 +335,8 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     given = arguments()
     lines = given.keep.read_text().splitlines() if given.keep.exists() else []
-    lessons = [_kept(line) for line in lines]
+    name = f"{given.cases} of seed {given.seed}, {given.way}: "
+    lessons = [each for each in map(_kept, lines) if each.case.startswith(name)]
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(given.jobs) as pool:
         trial = Path(folder) / "trial"
         ways = WAYS if given.way == "both" else (given.way,)
@@ -343,12 +344,12 @@ def main() -> int:
             trial, Path(folder) / "key", given.cases, seed=given.seed, ways=ways, jobs=given.jobs
         )
         known = {each.case for each in lessons}
-        missing = [each for each in made.cases if each.case not in known]
+        missing = [each for each in made.cases if name + each.case not in known]
         places = [trial / "cases" / each.case for each in missing]
         with given.keep.open("a") as kept:
             for each in pool.map(lesson, places, missing):
-                lessons.append(each)
-                print(json.dumps(asdict(each)), file=kept, flush=True)
+                lessons.append(replace(each, case=name + each.case))
+                print(json.dumps(asdict(lessons[-1])), file=kept, flush=True)
     command = (
         f"python tests/benchmarks/gap_calibration.py --cases {given.cases} --seed {given.seed} "
         f"--way {given.way} --write"
