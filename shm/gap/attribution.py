@@ -27,7 +27,7 @@ from shm.models.effects import EFFECTS
 from shm.values import FloatArray, Leads, leads
 
 WITHIN_REACH = 7.0
-"""Log odds of a thousand to one: what is farther behind the best cause has no chance beside it."""
+"""Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
 AS_GOOD_A_FIT = 1.0
 """What a cause may fit worse than the best one, in log likelihood, and still fit as well."""
 

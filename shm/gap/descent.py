@@ -22,14 +22,14 @@ from shm.values import BoolArray, FloatArray
 _MOST_STEPS, _MOST_LAST_STEPS, _LONGEST_STEP = 15, 5, 1.0
 _FIRST_DAMPING, _LESS, _MORE, _FIRST_REFUSAL = 1e-2, 0.2, 8.0, 0.1
 _LEAST_DAMPING, _MOST_DAMPING = 1e-8, 1e6
-# Of the tension, in standard deviations of its prior: from there on slopes are computed anew.
+# Technical: a step of the tension, in sds of its prior, from which on slopes are computed anew.
 _FAR = 0.03
 
 # A log evidence is then known to 0.02; one that is a thousand times smaller counts for nothing.
 _CONVERGED_GAIN, _HOPELESS = 0.02, 7.0
 # Judgement: two normal peaks half a standard deviation apart are one (their overlap is 0.97).
 _SAME = 0.5
-# The prior's own curvature is 1: a posterior flatter than a third of it is no peak.
+# Judgement: the prior's own curvature is 1, and a posterior flatter than a third of it is no peak.
 _FLATTEST = 0.3
 # Technical: some hundred roundings of a double; and a log probability that no sum feels.
 _ROUNDING, NEVER = 1e-13, -1e300

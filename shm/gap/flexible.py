@@ -28,7 +28,7 @@ SMALLEST_SDS = 1.0  # a smaller one drowns in the errors
 FREQUENCY_SIZES, SHAPE_SIZES, PLAIN_NODES = 6, 4, 3
 # Judgement: causes act on neighbouring modes alike (a spring, a mass near an end), not on far ones.
 SMOOTH_ORDERS = 2.0
-SD_UNKNOWN = 1e-3  # of frequencies, where none is stated: a hammer test of fair quality
+SD_UNKNOWN = 1e-3  # judgement, of what states none: a hammer test of fair quality
 
 
 def flexible_nodes(

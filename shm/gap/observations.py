@@ -26,7 +26,7 @@ from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
-_SAME_PLACE_M = 1e-3  # places are written in mm; no two sensors fit nearer
+_SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
 _FEWEST_FREQUENCIES = _FEWEST_READINGS = 2  # of one there is no difference
 
 

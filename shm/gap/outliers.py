@@ -41,7 +41,7 @@ LARGEST_SHARE = 0.1
 """Never more of the frequencies than this are set aside (one at least may be): the upper end of
 what is usual (`GROSS_ERROR`)."""
 
-_FEWEST_LEFT = 4  # frequencies: tension, stiffness, and two that can disagree with them
+_FEWEST_LEFT = 4  # judgement: tension, stiffness, and two that can disagree with them
 # Judgement: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
 _REACH = 2.5
 # Judgement: a datum ten standard deviations out has pulled the fit out of where it is linear.

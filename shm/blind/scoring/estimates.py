@@ -15,7 +15,7 @@ Samples = tuple[FloatArray, ...]
 
 CONFIDENCE = 0.9  # as all intervals of ours
 ENDS = (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2
-_RESAMPLES = 1000  # Efron and Tibshirani 1993, 13.3: enough for 90 %
+_RESAMPLES = 1000  # technical: 5 % quantiles of 1000 draws err by 0.7 %
 
 
 @dataclass(frozen=True, eq=False)
