@@ -19,7 +19,7 @@ from shm.values import FloatArray, IntArray
 # draws and time, and which draws come, but no bias. Defensive shares (Hesterberg 1995): in vain are
 # one draw in twenty from the prior, one in ten from the fit's peaks, and a fiftieth on a sign.
 _FROM_PRIOR, _FROM_FIRST, _LEAST_SHARE = 0.05, 0.1, 0.02
-# Technical as well: a part is drawn wider than its points, as too narrow a proposal has unbounded weights.
+# A part is drawn wider than its points, as too narrow a proposal has unbounded weights.
 _INFLATION = 1.3
 # Points a parameter from which a covariance, and from fewer of unequal weight a cluster, is known.
 _FEWEST_TO_FIT, _TO_CLUSTER = 12, 6
