@@ -28,8 +28,8 @@ from shm.values import (
 )
 
 MODES_SCHEMA = "shm.modes/1"
-_LARGEST = 1e300
-_HIGHEST_ORDER = 200
+_LARGEST = 1e300  # technical: a square root or two of what follows from it must not overflow
+_HIGHEST_ORDER = 200  # technical: models solve for every order below; no hammer reaches it
 _TEST_KEYS = (
     "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
     "tension_read_sd_n", "modes",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from shm.report.content import Interval
     from shm.values import Diagnosis, Hanger, Posterior, Selection
 
-_CAUSES_SHOWN = 5
+_CAUSES_SHOWN = 5  # technical: rows of a cell's table
 
 
 def load_ipython_extension(shell: Any) -> None:

@@ -40,6 +40,7 @@ _LEAST_FACTOR = 1e-6
 _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 """Rubber, and twice a diamond: what lies beyond was written in another unit."""
 
+# Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
 _FALSE_CALL_YEARS = (0.1, 1e6)
 
 
@@ -259,7 +260,7 @@ def _support_kind(table: Table, key: str, usual: Support) -> Support:
     )
 
 
-_LARGEST_SCATTER = 0.5
+_LARGEST_SCATTER = 0.5  # judgement: who is half off wrote another unit
 
 
 def scatter_of(table: Table | None) -> Scatter:

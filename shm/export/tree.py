@@ -197,7 +197,7 @@ def unit_of(name: str, model: str) -> str:
     return _UNITS.get(name.rpartition("_")[2], "")
 
 
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-6  # technical: rounding through a store and back, far below another likelihood
 _NATS = 0.2
 """The covariance was settled near the optimum that the sampler found, not at the most probable
 draw: between the two the joint likelihood differs by 0.06 nats."""

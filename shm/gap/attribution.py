@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.chances import Family, Tried, doubted, families, missed, probabilities
+from shm.gap.calibration import CALIBRATION
+from shm.gap.chances import Family, Tried, families, missed, probabilities
 from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
@@ -26,13 +27,9 @@ from shm.models.effects import EFFECTS
 from shm.values import FloatArray, Leads, leads
 
 WITHIN_REACH = 7.0
+"""Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
 AS_GOOD_A_FIT = 1.0
 """What a cause may fit worse than the best one, in log likelihood, and still fit as well."""
-FAINT = 0.075
-"""A second cause is faint that moves the data by less than this share of what the first does."""
-LAW_TO_CAUSE = 5.0
-"""Odds that a faint second cause is the first one's law. In blind trials eight pairs so faint were
-one effect and none was two; of ten with a second cause of up to a fifth, eight were two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +140,9 @@ def _weighed(search: Search, tried: list[Tried]) -> Attribution:
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
-    chances, passing = probabilities(kinds)
-    chances = without_faint(search.problem, search.baseline, kinds, chances)
     p_value = search.p_value(likeliest)
-    chances, passing = doubted(kinds, chances, passing, p_value)
+    chances, passing = probabilities(kinds, p_value)
+    chances = without_faint(search.problem, search.baseline, kinds, chances)
     each = [float(chance) for chance in missed(kinds, chances)]
     return _attribution(search, tried, kinds, each, passing, p_value)
 
@@ -255,30 +251,33 @@ def without_faint(
 ) -> FloatArray:
     """The probabilities (families,) with those of pairs given to the one effect that they lean on.
 
-    A fault of the law is the same in all tests: what differs from test to test is a cause. To an
-    effect that was not worth a fit nothing is given: its law is not nearly right.
+    To an effect that was not worth a fit nothing is given: its law is not nearly right.
     """
-    moved = chances.copy()
+    moved, odds = chances.copy(), CALIBRATION.minor_law_odds
     plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
     alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
     for i in plain:
-        leant_on = _leant_on(problem, baseline, kinds[i].best.fit)
-        if leant_on in alone:
-            share = chances[i] * LAW_TO_CAUSE / (1 + LAW_TO_CAUSE)
+        larger, part = second_cause(problem, baseline, kinds[i].best.fit)
+        if larger in alone and part <= CALIBRATION.minor_below:
+            share = chances[i] * odds / (1 + odds)
             moved[i] -= share
-            moved[alone[leant_on]] += share
+            moved[alone[larger]] += share
     return moved
 
 
-def _leant_on(problem: GapProblem, baseline: Fit, fit: Fit | None) -> str | None:
-    """The name of the larger effect of a pair whose other one is faint; None where none is."""
+def second_cause(problem: GapProblem, baseline: Fit, fit: Fit | None) -> tuple[str, float]:
+    """The name of the larger effect of a pair, and how far the other moves the data against it.
+
+    A fault of the law is the same in all tests: what differs from test to test is a cause, and as
+    large as the first (1); so is what is no pair, of name "".
+    """
     if fit is None or len(fit.hypothesis.effects) != 2:
-        return None
+        return "", 1.0
     moves = [_added(problem, baseline, fit, index) for index in (0, 1)]
     large = int(np.argmax(moves))
     (name, _), (second, variant) = fit.hypothesis.effects[large], fit.hypothesis.effects[1 - large]
     differs = bool(EFFECTS[second].follows or variant.test)
-    return None if differs or moves[1 - large] > FAINT * moves[large] else name
+    return name, 1.0 if differs else moves[1 - large] / max(moves[large], np.finfo(float).tiny)
 
 
 def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:

@@ -1,14 +1,17 @@
-"""From evidences to probabilities: priors over families of effects, evidence averaged over places.
+"""From evidences to probabilities: Bayes' rule, once.
 
-A family (one effect, wherever it may act) has the same prior however many variants it has, so that
-an effect does not become likelier by being tried in more places (Scott and Berger, Ann. Stat. 38,
-2010).
+    P(h | data) ~ prior(h) x evidence(h) x P(misfit | h)
+    P(cause | data) = sum over h of P(cause | h) P(h | data)
 
-How freely each pair of effects imitates what is not in the catalogue.
-
-Some effects can act anywhere and take many forms: a mass and a loss of section together come near
-to almost anything. Others can do one thing only. So of what passes for a pair, a few pairs have
-the most: each as the product of what its effects were seen to do in blind trials.
+Hypotheses h are families (one effect or pair, wherever it may act), each with or without something
+unknown beside it, and something unknown that passes for a family. A family has the same prior
+however many variants it has, so that an effect does not become likelier by being tried in more
+places (Scott and Berger, Ann. Stat. 38, 2010); its evidence is the mean over them. The misfit (a
+p-value) is what the evidence does not hold: whether even the likeliest explanation fits
+(`probabilities`). What a hypothesis is in truth, P(cause | h), trials have taught
+(`calibration.toml`): a pair with a minor second cause is for the most part one cause with an error
+of its law (`without_faint` in `shm.gap.attribution`), and a free remainder sometimes a cause that
+was not found (`missed`); every other h is what its name says.
 """
 
 from __future__ import annotations
@@ -21,29 +24,30 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
+from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis, Method
 from shm.values import FloatArray
 
+# Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
+# than two. Blind trials plant the same mix; where it is another, odds are off by the ratio.
 NO_GAP = 0.25
 SINGLE = 0.5
 PAIR = 0.125
 UNKNOWN = 0.125
-"""Before any data: half of the hangers have one effect, a quarter none."""
+
 AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
 """How often something unknown comes with an effect or a pair, to how often these come alone: as
 often as a second cause comes at all, and as seldom as a cause is unknown."""
 
-PASSES_FOR_ONE, PASSES_FOR_PAIR = 0.5, 0.2
-PASSES_FOR_NONE = 1 - PASSES_FOR_ONE - PASSES_FOR_PAIR
-"""Of what is not in the catalogue so much does to data about what one of its effects does, or two,
-or resembles nothing in it: as effects do that are left out of the catalogue, in blind trials."""
-
-MISSED = 0.2
-"""Where a free remainder explains what no cause does, so likely is a cause nevertheless: its place
-was not found, or its law is farther off than allowed for. In blind trials 20 of 56 such answers."""
-
 LEAST_P_VALUE = 1e-4
 """Of smaller ones no more is known than that they are small: tails are not that normal."""
+
+EVEN = 0.2
+"""Judgement: so much of what mimics pairs is shared evenly by all, as what is unknown need not
+resemble the catalogue's effects, from which the counts are. At 0 a pair that never led falsely
+would be claimed without doubt; at 1 the counts would say nothing."""
+
+_SENSORS = "sensor_misalignment"
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,19 +128,23 @@ def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, 
     return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
 
 
-def probabilities(candidates: Sequence[Family]) -> tuple[FloatArray, float]:
+def probabilities(candidates: Sequence[Family], p_value: float = 1.0) -> tuple[FloatArray, float]:
     """Of each family, (families,), and of something unknown that passes for one of them.
 
-    All add to 1.
+    All add to 1. `p_value` is that of the likeliest family without something unknown: an effect
+    that errs in its law may be given what it does not explain, while the flexible remainder pays
+    for every form that it could take, so of a bad fit the evidence alone says too little.
     """
     evidence, passing, prior, odds = (
         np.array([getattr(each, name) for each in candidates])
         for name in ("log_evidence", "log_passing", "log_prior", "passing_odds")
     )
-    kept = np.array([PASSES_FOR_NONE if each.flexible else 1.0 for each in candidates])
+    bad = misfit_odds(p_value)
+    mimics = CALIBRATION.mimics_one + CALIBRATION.mimics_two
+    kept = np.array([bad * (1 - mimics) if each.flexible else 1.0 for each in candidates])
     top = float((evidence + prior).max())
     weight = kept * np.exp(evidence + prior - top)
-    unknown = float(np.sum(odds * np.exp(passing + prior - top)))
+    unknown = bad * float(np.sum(odds * np.exp(passing + prior - top)))
     whole = weight.sum() + unknown
     return np.asarray(weight / whole), unknown / whole
 
@@ -151,21 +159,6 @@ def misfit_odds(p_value: float) -> float:
     return max(1.0, -1 / (np.e * p * np.log(p))) if p < 1 / np.e else 1.0
 
 
-def doubted(
-    candidates: Sequence[Family], chances: FloatArray, passing: float, p_value: float
-) -> tuple[FloatArray, float]:
-    """Chances (families,) and `passing`, once the likeliest explanation fits no better than that.
-
-    An effect that errs in its law may be given what it does not explain; the flexible remainder
-    pays for every form that it could take. So of a bad fit the evidence says too little.
-    """
-    unknown = np.array([each.flexible for each in candidates])
-    odds = misfit_odds(p_value)
-    weight, passing = chances * np.where(unknown, odds, 1.0), passing * odds
-    whole = float(weight.sum() + passing)
-    return np.asarray(weight / whole), passing / whole
-
-
 def missed(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
     """Chances (families,) by which a remainder rules out no cause beyond what may be missed.
 
@@ -173,15 +166,13 @@ def missed(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
     """
     unknown = np.array([each.flexible for each in candidates])
     cause = np.array([each.effects > 0 for each in candidates]) & ~unknown
-    of_both = chances[unknown | cause].sum()
-    if not cause.any() or chances[cause].sum() >= MISSED * of_both:
+    least = CALIBRATION.undetected_share * chances[unknown | cause].sum()
+    if not cause.any() or chances[cause].sum() >= least:
         return chances
     speaks = np.array([each.log_evidence + each.log_prior for each in candidates])
     share = np.exp(np.where(cause, speaks - logsumexp(speaks[cause]), -np.inf))
-    left = (1 - MISSED) * of_both / chances[unknown].sum()
-    return np.asarray(
-        np.where(cause, MISSED * of_both * share, chances * np.where(unknown, left, 1))
-    )
+    left = (chances[unknown | cause].sum() - least) / chances[unknown].sum()
+    return np.asarray(np.where(cause, least * share, chances * np.where(unknown, left, 1)))
 
 
 def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:
@@ -209,8 +200,8 @@ def _passing_odds(hypothesis: Hypothesis, catalogue: Collection[str]) -> float:
     if hypothesis.flexible or not names:
         return 0.0
     if len(names) == 1:
-        return PASSES_FOR_ONE * UNKNOWN / SINGLE
-    return PASSES_FOR_PAIR * UNKNOWN / PAIR * imitation(names, catalogue)
+        return CALIBRATION.mimics_one * UNKNOWN / SINGLE
+    return CALIBRATION.mimics_two * UNKNOWN / PAIR * imitation(names, catalogue)
 
 
 def _prior(hypothesis: Hypothesis, effects: int) -> float:
@@ -221,42 +212,13 @@ def _prior(hypothesis: Hypothesis, effects: int) -> float:
     return AND_UNKNOWN * known if hypothesis.flexible else known
 
 
-LED_FALSELY = {
-    "point_mass": 45,
-    "section_loss": 42,
-    "intermediate_support": 38,
-    "stiff_end_zones": 31,
-    "effective_length": 27,
-    "rotational_end_flexibility": 27,
-    "sag": 16,
-    "support_motion": 16,
-    "bending_stiffness": 12,
-    "shear_and_rotary_inertia": 12,
-    "translational_end_flexibility": 10,
-    "distributed_mass": 8,
-    "timebase": 6,
-    "skewed_principal_axes": 1,
-    "temperature_tension": 1,
-}
-"""In how many of 146 pairs that led in blind trials each effect was, where the true effect had been
-taken out of the catalogue."""
-
-SENSORS = "sensor_misalignment"
-LED_WITH_TURNED_SENSORS = {
-    "rotational_end_flexibility": 19 / 168,
-    "stiff_end_zones": 2 / 168,
-    "translational_end_flexibility": 1 / 168,
-}
-"""Principal axes that are skewed do what turned sensors and ends that yield in one plane do: of all
-such cases, in how many turned sensors led with each."""
-
-EVEN = 0.2
-"""So much is shared evenly by all pairs: what is unknown need not resemble the catalogue's effects,
-from which the counts are."""
-
-
 def imitation(effects: Collection[str], catalogue: Collection[str]) -> float:
-    """How often something unknown passes for this pair, to the mean over pairs of `catalogue`."""
+    """How often something unknown passes for this pair, to the mean over pairs of `catalogue`.
+
+    Some effects can act anywhere and take many forms: a mass and a loss of section together come
+    near to almost anything. Others can do one thing only. So of what passes for a pair, a few pairs
+    have the most: each as the product of what its effects were seen to do in blind trials.
+    """
     pair, names = frozenset(effects), frozenset(catalogue)
     if (freedoms := _sum_of_freedoms(names)) == 0:
         return 1.0
@@ -267,13 +229,16 @@ def imitation(effects: Collection[str], catalogue: Collection[str]) -> float:
 
 
 def _with_turned_sensors(names: frozenset[str]) -> dict[frozenset[str], float]:
-    pairs = {frozenset((SENSORS, end)): led for end, led in LED_WITH_TURNED_SENSORS.items()}
-    return {pair: led for pair, led in pairs.items() if pair <= names}
+    """Skewed principal axes do what turned sensors do with ends that yield in one plane."""
+    led, of = CALIBRATION.with_turned_sensors, CALIBRATION.mimicking_pairs
+    pairs = {frozenset((_SENSORS, end)): count / of for end, count in led.items()}
+    return {pair: share for pair, share in pairs.items() if pair <= names}
 
 
 def _freedom(pair: Collection[str]) -> int:
     one, other = pair
-    return LED_FALSELY.get(one, 0) * LED_FALSELY.get(other, 0)
+    led = CALIBRATION.in_mimicking_pairs
+    return led.get(one, 0) * led.get(other, 0)
 
 
 @cache

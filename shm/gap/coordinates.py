@@ -26,15 +26,16 @@ from scipy.special import ndtr, ndtri
 from shm.models.effects import Parameter
 from shm.values import FloatArray, IntArray, Scatter
 
-DEVIATIONS = 4
+DEVIATIONS = 4  # of section, density, length and modulus: the fields of `Scatter`
 TENSION = "theta_F"
-_EDGE = 1e-12
-_INSIDE = 1e-3
+# Technical: quantiles beyond 1e-12 (7 standard deviations) lose their last digits; a start comes no
+# nearer to the end of a prior than 1e-3 (3 standard deviations), where slopes are a hundredth.
+_EDGE, _INSIDE = 1e-12, 1e-3
+# Judgement: a tenth of a size's range stays, or an effect that is hardly seen would have no prior.
 _MOST_CUT = 0.9
-_LOG_10 = float(np.log(10))
 _FARTHEST = 7.0
 """Beyond this w, of a probability of 1e-12, springs no longer differ in the last digit."""
-_HALVINGS = 40
+_HALVINGS = 40  # of 14 at most: to 1e-11, the rounding of `_FARTHEST`
 _WIDENED, _NARROWED = 3.0, (0.3, 1.0)
 """From posteriors of a hanger of 8 and 6 modes: 3 to 4 times as wide, 0.2 to 0.5 as long."""
 
@@ -200,7 +201,7 @@ class Pair:
     def give(self, w: FloatArray) -> FloatArray:
         """How much an end gives way, from 0 to 1."""
         stiffness = self.lower + (self.upper - self.lower) * ndtr(w)
-        return np.asarray(1 / (1 + np.exp(_LOG_10 * (stiffness - self.own))))
+        return np.asarray(1 / (1 + np.exp(np.log(10) * (stiffness - self.own))))
 
     def log_slope(self, w: FloatArray) -> FloatArray:
         """Log of how fast that falls with w, but for a constant."""
@@ -209,9 +210,9 @@ class Pair:
 
     def alike(self, give: FloatArray) -> FloatArray:
         """The w of a spring that gives so much."""
-        stiffness = self.own + np.log(1 / give - 1) / _LOG_10
+        stiffness = self.own + np.log(1 / give - 1) / np.log(10)
         share = (stiffness - self.lower) / (self.upper - self.lower)
-        return ndtri(share.clip(ndtr(-_FARTHEST), ndtr(_FARTHEST)))
+        return np.asarray(ndtri(share.clip(ndtr(-_FARTHEST), ndtr(_FARTHEST))))
 
 
 class Straight:

@@ -16,18 +16,23 @@ from shm.gap.coordinates import Branch
 from shm.gap.landscape import Landscape, Views, log_normal
 from shm.values import BoolArray, FloatArray
 
-_MOST_STEPS, _MOST_LAST_STEPS = 15, 5
-_LONGEST_STEP = 1.0
-_FAR = 0.03
-_FIRST_DAMPING, _LESS, _MORE = 1e-2, 0.2, 8.0
-_FIRST_REFUSAL = 0.1
+# Judgement, as Marquardt's method mostly goes to the same optima: steps of at most one standard
+# deviation of the prior, whose damping falls fast and rises faster; after so many of them a point
+# is taken as it is.
+_MOST_STEPS, _MOST_LAST_STEPS, _LONGEST_STEP = 15, 5, 1.0
+_FIRST_DAMPING, _LESS, _MORE, _FIRST_REFUSAL = 1e-2, 0.2, 8.0, 0.1
 _LEAST_DAMPING, _MOST_DAMPING = 1e-8, 1e6
-_CONVERGED_GAIN = 0.02
-_HOPELESS = 7.0
+# Technical: a step of the tension, in sds of its prior, from which on slopes are computed anew.
+_FAR = 0.03
+
+# A log evidence is then known to 0.02; one that is a thousand times smaller counts for nothing.
+_CONVERGED_GAIN, _HOPELESS = 0.02, 7.0
+# Judgement: two normal peaks half a standard deviation apart are one (their overlap is 0.97).
 _SAME = 0.5
+# Judgement: the prior's own curvature is 1, and a posterior flatter than a third of it is no peak.
 _FLATTEST = 0.3
-_ROUNDING = 1e-13
-_NEVER = -1e300
+# Technical: some hundred roundings of a double; and a log probability that no sum feels.
+_ROUNDING, NEVER = 1e-13, -1e300
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +141,8 @@ def _climbed(landscape: Landscape, w: FloatArray, signs: FloatArray, steps: int)
         walkers = walkers.take(~ready & _promising(walkers, done))
         if len(walkers.signs):
             walkers = _moved(landscape, walkers)
-    return _counting(_distinct(done))
+    best = _distinct(done)
+    return [each for each in best if each.log_evidence > best[0].log_evidence - _HOPELESS]
 
 
 def _moved(landscape: Landscape, walkers: _Walkers) -> _Walkers:
@@ -194,11 +200,6 @@ def _linear_step(gram: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArra
     return np.asarray(step), np.asarray((pull * step).sum(axis=2) / 2)
 
 
-def _counting(found: list[Optimum]) -> list[Optimum]:
-    """Those, the best first, whose evidence counts beside the best."""
-    return [each for each in found if each.log_evidence > found[0].log_evidence - _HOPELESS]
-
-
 def _branch(landscape: Landscape, z: FloatArray) -> Branch:
     return next(b for b in landscape.coordinates.branches if b.holds(z[None])[0])
 
@@ -206,7 +207,7 @@ def _branch(landscape: Landscape, z: FloatArray) -> Branch:
 def _downhill(landscape: Landscape, views: Views) -> _Downhill:
     columns = np.concatenate([views.slopes, views.residual[..., None]], axis=2)
     log = landscape.likelihood.by_node(views.residual)
-    log = np.where(np.isfinite(log), log, _NEVER)
+    log = np.where(np.isfinite(log), log, NEVER)
     gram = landscape.likelihood.gram(columns)
     probability = np.exp(log - logsumexp(log, axis=1, keepdims=True))
     mean = np.einsum("mk,mkij->mij", probability, gram)

@@ -210,14 +210,16 @@ def _summary(samples: FloatArray) -> tuple[float, float, float, float]:
     return float(samples.mean()), float(samples.std(ddof=1)), float(low), float(high)
 
 
-_PLACES_A_HALF_WAVE = 5
-_FEWEST_PLACES = 31
-_PASSES = 2
-_PASSES_OF_AN_END = 16
-_FINE = 1440
+# By five points a half wave a spline follows its square, as local causes act, to 2 % (5/384 h^4 / 2
+# with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`places._EXTENT`).
+_PLACES_A_HALF_WAVE, _FEWEST_PLACES = 5, 31
+# Judgement: to first order and once more at the size found; an end goes through decades.
+_PASSES, _PASSES_OF_AN_END = 2, 16
+# Technical: as many stretches as a page shows, eight points in each.
 _BINS = 180
-_LEAST_GAIN = 6.0
-_OUTSIDE = 0.05
+_FINE = 8 * _BINS
+_LEAST_GAIN = 6.0  # of chi-square, for a size and a place: 95 % of chance alone
+_OUTSIDE = 0.05  # on either side of a 90 % interval
 
 
 def places(problem: GapProblem, before: Fit) -> tuple[GapPlace, ...]:

@@ -14,7 +14,7 @@ from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis, Progress
 from shm.gap.marginal import marginal
 from shm.gap.problem import GapProblem
-from shm.gap.sensitivity import Scan, scan, superposed, truncate
+from shm.gap.sensitivity import HOPELESS_SHARE, Scan, scan, superposed, truncate
 from shm.models.effects import EFFECTS
 
 IN_BASELINE = {
@@ -23,9 +23,9 @@ IN_BASELINE = {
     "solid2": ("rotational_end_flexibility",),
 }
 """Effects that a baseline class has as parameters of its own."""
+# Judgement: what a scan puts 150 times (a coarse one 1100 times) behind is not fitted. A smaller
+# reach loses causes, a larger one costs a fit each.
 HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
-HOPELESS_SHARE = 0.3
-STARTS = 3
 NOTHING_SEEN = 1.0
 
 

@@ -12,7 +12,7 @@ from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.values import BoolArray, FloatArray
 
-_DIFFERENCE = 1e-4
+_DIFFERENCE = 1e-4  # technical: forward differences err by half of it times the curvature
 _STEEPEST = 1e3
 """Slopes beyond this are cliffs: where a support's own mode crosses one of the bar, the names of
 the two change places. Nothing can be followed over them."""

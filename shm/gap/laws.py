@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
+from shm.gap.calibration import CALIBRATION, Share
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
 from shm.gap.fit import fitted, scattered
 from shm.gap.flexible import alike_in_planes, smooth_over_orders
@@ -54,13 +55,15 @@ class ByLaws:
     `gain` is what its log evidence gains, never less than the log of the prior probability that the
     laws are exact; `passing` is the gain if it is something unknown that passes for the effects.
     `fit` is that with the likeliest allowance where the data show that the laws are off. `draws`
-    (n, d) are of the posterior by all allowances.
+    (n, d) are of the posterior by all allowances. `log_evidences` (1 + allowances,) are of exact
+    laws and of each allowance.
     """
 
     gain: float
     passing: float
     fit: Fit
     draws: FloatArray
+    log_evidences: FloatArray
 
 
 def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator) -> ByLaws:
@@ -86,6 +89,7 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
         passing=float(logsumexp(passing) - exact.log_evidence),
         fit=about,
         draws=mixed([fit.draws, *draws], normalised(weight), rng),
+        log_evidences=evidence,
     )
 
 
@@ -117,7 +121,7 @@ def otherwise(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
 
 def _allowed(fit: Fit, allowance: Allowance) -> Covariance:
     """The errors of a fit with those of its law."""
-    off, alike, _ = allowance
+    off, alike = allowance.off, allowance.alike
     count = len(alike)
     return replace(
         fit.noise,
@@ -187,93 +191,72 @@ def _fitted_anew(
     return replace(moved, log_evidence=fit.log_evidence, method=fit.method, peaks=fit.peaks)
 
 
-class Share(NamedTuple):
-    """Prior probabilities: that an effect's own law is off by so much, and that something unknown
-    is that passes for it."""
-
-    own: float
-    unknown: float
-
-
-EXACT = Share(0.45, 0.17)
-FRACTIONS = {
-    0.003: Share(0.2, 0.18),
-    0.03: Share(0.1, 0.11),
-    0.1: Share(0.05, 0.05),
-    0.2: Share(0.015, 0.06),
-    0.4: Share(0.005, 0.16),
-}
-"""How often an effect's law is off by such a fraction of what it does to a mode; as likely from
-mode to mode as smooth over the orders. What is not in the catalogue but passes for an effect is off
-by more. Shares as found in blind trials: of effects that were planted, and of effects that took the
-blame for others, which had been left out."""
-FRACTIONS_ON_THE_WHOLE = {
-    0.01: Share(0.12, 0.13),
-    0.03: Share(0.045, 0.08),
-    0.1: Share(0.015, 0.06),
-}
-"""The same of what the effect does to the modes of a test and plane on the whole."""
-ROUGH = 0.5
-"""How often the law of an effect that goes with the level is only roughly known: a level is one
-number of a test, while every mode rings at its own and dies away at its own pace. So it is for what
-passes for such an effect."""
-FRACTIONS_WHERE_ROUGH = {0.1: 0.3, 0.2: 0.35, 0.4: 0.35}
-"""How often it then is off by such a fraction of what the effect does to a mode."""
+Way = tuple[Literal["exact", "mode", "whole", "rough"], float]
+_Off = tuple[Way, FloatArray, Share]
 
 
 class Allowance(NamedTuple):
-    """By how much data are off (data,), how frequencies go together (F, F), how likely that is."""
+    """By how much data are off (data,), how frequencies go together (F, F), how likely that is.
+
+    `way` is what the law is off by: a fraction of the effect in a `mode`, on the `whole`, or where
+    the law is `rough`.
+    """
 
     off: FloatArray
     alike: FloatArray
     share: Share
+    way: Way
 
 
 def allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> list[Allowance]:
-    """For the laws of a fit's effects; with `exactly`, their shares add to 1."""
-    design, shift = problem.design, fit.predicted - baseline.predicted
+    """For the laws of a fit's effects; with `exactly`, their shares add to 1.
+
+    All are as likely from mode to mode as smooth over the orders. A level is one number of a test,
+    while every mode rings at its own and dies away at its own pace: so the law of an effect that
+    goes with it may be rough, and so may be what passes for such an effect.
+    """
+    told, design, shift = CALIBRATION, problem.design, fit.predicted - baseline.predicted
     whole = _on_the_whole(design, shift)
-    off = [(fraction * shift, share) for fraction, share in FRACTIONS.items()]
-    off += [(fraction * whole, share) for fraction, share in FRACTIONS_ON_THE_WHOLE.items()]
+    off: list[_Off] = [(("mode", f), f * shift, share) for f, share in told.of_a_mode.items()]
+    off += [(("whole", f), f * whole, share) for f, share in told.on_the_whole.items()]
     in_a_plane = same_mode(design), smooth_over_orders(design)
-    if not _with_level(fit.hypothesis):
+    if not goes_with_level(fit.hypothesis):
         return list(_each(off, in_a_plane))
     raised = _by_levels(problem, fit)
-    by_level = [(f * raised, Share(ROUGH * s, ROUGH * s)) for f, s in FRACTIONS_WHERE_ROUGH.items()]
-    off = [(error, _unless_rough(share)) for error, share in off]
-    return [*_each(off, in_a_plane), *_each(by_level, (*in_a_plane, alike_in_planes(design)))]
+    rough: list[_Off] = [
+        (("rough", f), f * raised, Share(told.rough * share, told.rough * share))
+        for f, share in told.where_rough.items()
+    ]
+    off = [(way, error, _unless_rough(share)) for way, error, share in off]
+    return [*_each(off, in_a_plane), *_each(rough, (*in_a_plane, alike_in_planes(design)))]
 
 
 def exactly(hypothesis: Hypothesis) -> Share:
     """How likely it is that the laws of a hypothesis' effects are exact."""
-    return _unless_rough(EXACT) if _with_level(hypothesis) else EXACT
+    exact = CALIBRATION.exact
+    return _unless_rough(exact) if goes_with_level(hypothesis) else exact
 
 
 def _unless_rough(share: Share) -> Share:
-    return Share(*((1 - ROUGH) * each for each in share))
+    return Share(*((1 - CALIBRATION.rough) * each for each in share))
 
 
-def _each(
-    off: Sequence[tuple[FloatArray, Share]], orders: Sequence[FloatArray]
-) -> Iterator[Allowance]:
+def _each(off: Sequence[_Off], orders: Sequence[FloatArray]) -> Iterator[Allowance]:
     """By how much data may be off with every way to go together, all ways as likely."""
-    for error, share in off:
+    for way, error, share in off:
         for alike in orders:
-            yield Allowance(error, alike, Share(*(each / len(orders) for each in share)))
+            yield Allowance(error, alike, Share(*(each / len(orders) for each in share)), way)
 
 
-def _with_level(hypothesis: Hypothesis) -> bool:
-    return any(_goes_with_level(name) for name, _ in hypothesis.effects)
-
-
-def _goes_with_level(name: str) -> bool:
-    return "amplitude" in EFFECTS[name].follows
+def goes_with_level(hypothesis: Hypothesis) -> bool:
+    """Whether one of its effects follows the amplitude of the hits."""
+    return any("amplitude" in EFFECTS[name].follows for name, _ in hypothesis.effects)
 
 
 def _by_levels(problem: GapProblem, fit: Fit) -> FloatArray:
     """What a fit's effects that go with the level do to its prediction (data,)."""
-    names = [name for name, _ in fit.hypothesis.effects]
-    others = [index for index, name in enumerate(names) if not _goes_with_level(name)]
+    effects = fit.hypothesis.effects
+    others = [i for i, each in enumerate(effects) if not goes_with_level(Hypothesis((each,)))]
     return np.asarray(fit.predicted - problem.predicted_with(fit, others))
 
 

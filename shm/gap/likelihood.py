@@ -18,8 +18,6 @@ from scipy.special import logsumexp
 from shm.gap.contract import Covariance, NoiseNode
 from shm.values import FloatArray, IntArray
 
-_LOG_2_PI = float(np.log(2 * np.pi))
-
 
 class _Blocks:
     """All blocks of one length: `rows` (blocks, length) of covariances (nodes, F, F)."""
@@ -112,7 +110,7 @@ class Likelihood:
         volume = np.sum([each.log_volume for each in self._blocks], axis=0)[self._frequency_of]
         volume = volume + self._shape.log_volume[self._shape_of]
         data = self.frequencies + self._shape.precision.shape[1]
-        self.log_height: FloatArray = self.log_weight - volume - data * _LOG_2_PI / 2
+        self.log_height: FloatArray = self.log_weight - volume - data * np.log(2 * np.pi) / 2
 
     def by_node(self, residual: FloatArray) -> FloatArray:
         """Log likelihood and log weight of each node, (n, nodes); -inf where it is not finite."""

@@ -14,11 +14,14 @@ from shm.gap.problem import GapProblem
 from shm.values import FloatArray
 
 LARGEST_SCALE = 1.8
-"""Up to this factor, up or down, a shift counts as one in proportion to the effect's size."""
+"""Up to this factor, up or down, a shift counts as one in proportion to the effect's size.
 
-_CELL = 2 * float(np.log(LARGEST_SCALE))
-_NEAR = 1e-9
-_NOTHING = 1e-30
+Judgement: eight decades in 32 points, as scans have, are so far apart; over more a shift bends.
+"""
+
+_CELL = 2 * float(np.log(LARGEST_SCALE))  # from the smallest to the largest, of the logarithm
+# Technical: rounding of logarithms, and a square that is divided by.
+_NEAR, _NOTHING = 1e-9, 1e-30
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,8 @@ from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, IntArray
 
+# Judgement: where no standard deviation is stated, the one that is estimated may be four times too
+# large (1 / 4.5^2 = 0.05), and data may rightly fit so well.
 _LEAST_SCALE = 0.05
 
 

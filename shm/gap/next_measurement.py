@@ -18,14 +18,15 @@ from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, NextMeasurement
 
 NO_GAP = "no gap"
-_CONTENDERS = 4
-_OUT_OF_THE_RACE = 10.0
-_WORTH_IT = 0.5
-_LISTED = 8
-_AS_GOOD_AS_CERTAIN = 100.0
-_CANDIDATE_PLACES = 11
-_NEW_SENSORS = 2
-_APART = 1 / 6
+# Judgement: the leader against three rivals, as far behind as 20,000 to one, and a list that a
+# person reads.
+_CONTENDERS, _OUT_OF_THE_RACE, _LISTED = 4, 10.0, 8
+# Judgement: half a unit of log evidence turns even odds into 0.62 and is not worth a day's work;
+# 100 are more than any model's errors leave true.
+_WORTH_IT, _AS_GOOD_AS_CERTAIN = 0.5, 100.0
+# Judgement: every twelfth of the length, which one finds with a tape; two sensors that a person can
+# carry, no nearer than a sixth, half a wave of the sixth mode, lest they see the same.
+_CANDIDATE_PLACES, _NEW_SENSORS, _APART = 11, 2, 1 / 6
 
 _Promise = tuple[Proposal, float]
 
@@ -53,7 +54,8 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
     found = []
     for fit, seen in zip(contenders[1:], foresights[1:], strict=True):
         pair = (contenders[0], fit)
-        promises = _promises(general, foresights[0], seen)
+        pairs = zip(general, foresights[0], seen, strict=True)
+        promises = [(each, _expected(*both)) for each, *both in pairs]
         promises += [_promise(problem, pair, each, errors) for each in _sensors(problem, pair)]
         found += [_named(pair, promise) for promise in _worth_it(promises)]
     found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
@@ -72,12 +74,6 @@ def _contenders(fits: Sequence[Fit]) -> list[Fit]:
     best = max((fit.log_evidence for fit in distinct.values()), default=0.0)
     racing = [f for f in distinct.values() if f.log_evidence > best - _OUT_OF_THE_RACE]
     return racing[:_CONTENDERS]
-
-
-def _promises(
-    general: Sequence[Proposal], one: Sequence[Foresight], other: Sequence[Foresight]
-) -> list[_Promise]:
-    return [(each, _expected(*pair)) for each, *pair in zip(general, one, other, strict=True)]
 
 
 def _promise(
@@ -141,8 +137,8 @@ def _differences(problem: GapProblem, pair: tuple[Fit, Fit], design: Design) -> 
     )
 
 
-_USUAL_SHAPE_SD = 0.01
-_STEP_IN_SDS = 0.1
+_USUAL_SHAPE_SD = 0.01  # judgement: of a unit shape, twice that of our simulated campaigns
+_STEP_IN_SDS = 0.1  # technical: far from rounding, near enough for slopes to hold
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,11 @@ from shm.gap.contract import Covariance, Design, NoiseNode, Observations
 from shm.gap.repeated import Repeated, turned_modes
 from shm.values import FloatArray, IntArray
 
+# As the general model and other finite elements differ at most (docs/gap.md, what is compared).
 MODEL_ERROR_SCALE = 2e-5
-MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))
+MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))  # of a half-normal
+# Judgement: from the best identification (1e-4 in docs/trials/gap_trial.md) to peaks that are read
+# off a plot by eye.
 SD_LOWER, SD_UPPER = 1e-4, 3e-2
 FACTOR_SPREAD = 0.2
 """Of the logarithm of true over stated standard deviations, common to all frequencies."""
@@ -37,14 +40,19 @@ CORRELATIONS = (0.0, 0.4)
 """Of the errors of such peaks, one as likely as the other: our identification of both planes
 together leaves none, that of each by itself shares what both sensors heard."""
 
+# Judgement: below 3e-6 nothing shows; 3e-3 is six times the most that sound hangers of others had,
+# and more would take gaps for noise. Technical: ten steps of a factor of 2.
 _SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 3e-3, 10
+# Judgement: whether a bar is as clean as in our simulator or as in the field: even odds.
 _FIELD_SHARE = 0.5
-_SHAPES_SPREAD = 0.2
+_SHAPES_SPREAD = FACTOR_SPREAD  # as little is known of shapes' standard deviations
 _CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
-_SDS, _SDS_OF_SOME = 32, 12
+_SDS, _SDS_OF_SOME = 32, 12  # technical: steps of a fifth and a half in the logarithm
+# Judgement: three standard deviations are wild; data that scatter by less than half of what they
+# state are a chance, or were smoothed.
 _WILD, _LEAST_SCATTER = 3.0, 0.5
-_SETTLED = 0.06
-_FEWEST = 3
+_SETTLED = 0.06  # technical: a factor so well known (126 degrees of freedom) is one number
+_FEWEST = 3  # of two no scatter of a scatter is known
 _HERMITE = ((-1.732, 1 / 6), (0.0, 2 / 3), (1.732, 1 / 6))
 
 

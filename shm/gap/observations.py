@@ -26,9 +26,8 @@ from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
-_SAME_PLACE_M = 1e-3
-_FEWEST_FREQUENCIES = 2
-_FEWEST_READINGS = 2
+_SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
+_FEWEST_FREQUENCIES = _FEWEST_READINGS = 2  # of one there is no difference
 
 
 @dataclass(frozen=True)
@@ -232,7 +231,7 @@ def _integers(values: Sequence[int]) -> IntArray:
     return np.array(values, dtype=np.int64)
 
 
-_FEWEST = 3
+_FEWEST = 3  # places: one more than the two unknowns, own standard deviation and turn
 
 
 def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArray, float]:

@@ -27,17 +27,24 @@ from shm.gap.fit import fitted
 from shm.gap.landscape import Landscape
 from shm.gap.laws import by_its_laws
 from shm.gap.problem import GapProblem
+from shm.gap.search import LEADERS
+from shm.gap.sensitivity import HOPELESS_SHARE
 from shm.values import BoolArray, FloatArray, IntArray
 
 SURE = 0.9
-"""A frequency is set aside where it is a gross error with at least this probability."""
+"""A frequency is set aside where it is a gross error with at least this probability.
+
+Judgement: of ten that go, one may be sound, which costs little data and a remark says so.
+"""
 
 LARGEST_SHARE = 0.1
-"""Never more of the frequencies than this are set aside (one at least may be)."""
+"""Never more of the frequencies than this are set aside (one at least may be): the upper end of
+what is usual (`GROSS_ERROR`)."""
 
-_FEWEST_LEFT = 4
-_LEADERS = 3
-_REACH, _REACH_SHARE = 2.5, 0.3
+_FEWEST_LEFT = 4  # judgement: tension, stiffness, and two that can disagree with them
+# Judgement: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
+_REACH = 2.5
+# Judgement: a datum ten standard deviations out has pulled the fit out of where it is linear.
 _DRAGGED = 10.0
 GROSS_ERROR = 0.01
 """The prior probability of a frequency to be a gross error.
@@ -136,7 +143,7 @@ def _suspect(
     best = int(odds.argmax())
     leader = int(gross[:, best].argmax())
     gain = max(0.0, float(gross[leader, best] - plain[leader].log_weight))
-    return int(rows[best]) if odds[best] > -_REACH - _REACH_SHARE * gain else None
+    return int(rows[best]) if odds[best] > -_REACH - HOPELESS_SHARE * gain else None
 
 
 def _seen(problem: GapProblem, fit: Fit, rows: IntArray) -> LeftOut:
@@ -199,8 +206,8 @@ def _contenders(problem: GapProblem, candidates: Sequence[Believed], row: int) -
     flexible = [each for each in candidates if each.fit.hypothesis.flexible]
     plain = [each for each in candidates if not each.fit.hypothesis.flexible]
     gross = [c.log_weight + float(_seen(problem, c.fit, np.array([row])).gross[0]) for c in plain]
-    with_it = np.argsort([-each.log_weight for each in plain], kind="stable")[:_LEADERS]
-    without = np.argsort(-np.array(gross), kind="stable")[:_LEADERS]
+    with_it = np.argsort([-each.log_weight for each in plain], kind="stable")[:LEADERS]
+    without = np.argsort(-np.array(gross), kind="stable")[:LEADERS]
     none = [k for k, each in enumerate(plain) if not each.fit.hypothesis.effects]
     chosen = dict.fromkeys([*none, *map(int, with_it), *map(int, without)])
     return [*(plain[k] for k in chosen), *flexible]

@@ -33,6 +33,7 @@ from shm.values import BoolArray, FloatArray, Hanger, IntArray
 
 Effects = tuple[tuple[str, Variant], ...]
 
+# Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
 _TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
 
 
@@ -249,7 +250,7 @@ def _part(observations: Observations, rows: BoolArray | IntArray) -> Observation
     return observations.part(part, data)
 
 
-_STEP_SD = 0.01
+_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
 
 Predict = Callable[[Design], FloatArray]
 """The logarithms of the frequencies (F,) that the baseline predicts of a design."""

@@ -10,9 +10,8 @@ from scipy.special import logsumexp
 
 from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
-from shm.gap.fit import baseline_fit, fitted, with_remainder
+from shm.gap.fit import STARTS, baseline_fit, fitted, with_remainder
 from shm.gap.hypotheses import (
-    STARTS,
     hopeful,
     hypotheses,
     invisible,
@@ -29,9 +28,10 @@ from shm.gap.sensitivity import Scan
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
-SAMPLED_WITHIN = 4.0
+# Judgement, time against the chance to miss a cause. Sampled is what Laplace's method puts within
+# 55 to one of the likeliest, five at most.
 MOST_FITS = 30
-MOST_SAMPLED = 5
+SAMPLED_WITHIN, MOST_SAMPLED = 4.0, 5
 BENT_WITHIN, MOST_BENT = 8.0, 6
 """The same of a baseline with end springs, whose posterior no normal distribution follows: all
 that Laplace's method puts within so much, and the baseline itself, are sampled."""
@@ -40,12 +40,15 @@ THOROUGH_WITHIN = 3.0
 """Of the likeliest, by Laplace's method: the samplers of others stop after their first attempt. An
 evidence that is off by 0.6 changes a probability of 0.05 by 0.03."""
 
-LEADERS = 3
-LEADING_PAIRS = 2
-MOST_PAIRS = 8
-MOST_ROUNDS = 3
+# Judgement, too: each leader costs a scan of all its pairs, each pair a fit.
+LEADERS, LEADING_PAIRS, MOST_PAIRS, MOST_ROUNDS = 3, 2, 8, 3
 MANY_LEADERS, MANY_PAIRS, ALIKE = 6, 30, 2
+
+# Judgement: seven to one, where evidence is positive (Kass and Raftery 1995 say from 1.1 on): below
+# it a second effect has nothing to stand on.
 SUPPORTED = 2.0
+# Judgement: of a large effect the error of its law may cost a fifth of what it explains, hundreds
+# in a gap of many standard deviations; less reach would judge a cause by the letter of its law.
 LAWS_WITHIN, LAWS_WITHIN_SHARE = 500.0, 0.2
 DROWNED = "Even at its largest it would drown in the errors of these data."
 

@@ -21,14 +21,21 @@ from shm.values import BoolArray, FloatArray, IntArray
 VISIBLE = 1.5
 """Standard deviations, of all data together, from which on an effect counts as one."""
 
+# Judgement, points (powers of 2, as Sobol's are even only there) against time: eight along each of
+# two parameters, then 32 in a quarter and a twelfth of the range about the best. In eight bins of a
+# size four points and more make a median.
 _POINTS = {1: 32, 2: 64}
 _MOST_POINTS = 128
 _HALVES, _CLOSER_POINTS = (0.12, 0.04), 32
-_ORDINARY = 6.0
 _BINS = 8
-_LONGEST_STEP, _FARTHEST = 2.5, 4.0
-_APART = 0.12
-_HOPELESS, _HOPELESS_SHARE = 8.0, 0.3
+# Judgement: log evidence by which a scan may be wrong in any case, so that it needs no closer look.
+_ORDINARY = 6.0
+# Judgement: starts within 99 % of a prior, no nearer to each other than closer points reach, none
+# 3000 times worse than the best, nor by a third of the gap: a scan is linear, gaps are not.
+LONGEST_STEP, _FARTHEST, _APART = 2.5, 4.0, _HALVES[0]
+_HOPELESS, HOPELESS_SHARE = 8.0, 0.3
+# Judgement: curvature is worth two more solutions where the bar's deviations go along for more than
+# one standard deviation, not for eight, which the prior forbids, and leave a seventh visible.
 _BENT_STEPS, _STRAIGHT, _HOPELESSLY_FAR, _MOSTLY_FOLLOWED = 2, 1.0, 8.0, 0.15
 
 
@@ -96,7 +103,7 @@ class Scan:
         z = coordinates.z(self.theta)
         chosen: list[int] = []
         peak = np.where(self._counted, self.marginal.log_peak, -np.inf)
-        good = peak > peak.max() - max(_HOPELESS, _HOPELESS_SHARE * np.ptp(peak[self._counted]))
+        good = peak > peak.max() - max(_HOPELESS, HOPELESS_SHARE * np.ptp(peak[self._counted]))
         for branch in coordinates.branches:
             rows = np.flatnonzero(branch.holds(z) & good)
             chosen += _different(rows, self.share, self.marginal.log_peak, most)
@@ -211,7 +218,7 @@ def _scan(
     effect = _effect(problem, before, hypothesis, share)
     solved = np.asarray(np.isfinite(shift).all(axis=1))
     seen = marginal(problem, hypothesis, before, np.where(solved[:, None], shift, 0.0))
-    moved = before.z + seen.step.clip(-_LONGEST_STEP, _LONGEST_STEP)
+    moved = before.z + seen.step.clip(-LONGEST_STEP, LONGEST_STEP)
     linear = problem.theta(before.hypothesis, moved.clip(-_FARTHEST, _FARTHEST))
     theta = np.column_stack([linear, effect])
     return Scan(

@@ -27,8 +27,8 @@ from shm.gap.outliers import (
 from shm.gap.problem import GapProblem
 from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 
-_ROUNDS = 2
-_LIKELIER_THAN_NOT = 0.5
+_ROUNDS = 2  # judgement: one error may hide another
+_LIKELIER_THAN_NOT = 0.5  # even odds
 
 
 @dataclass(frozen=True, eq=False)

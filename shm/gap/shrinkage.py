@@ -17,9 +17,9 @@ from shm.gap.problem import GapProblem
 from shm.models.effects import Conditions
 from shm.values import NAN, BoolArray, FloatArray, IntArray, Shrinkage
 
-_FEWEST = 4
-_ORDER_FOLDS = 3
-_TEST_FOLDS = 6
+_FEWEST = 4  # frequencies: three to fit (tension, stiffness and a size), one to predict
+# Judgement: each fold is refitted; inner orders in thirds leave neighbours of each.
+_ORDER_FOLDS, _TEST_FOLDS = 3, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,9 +173,8 @@ def _rms_percent(residual: FloatArray) -> float:
     return float(100 * np.sqrt(np.mean(np.expm1(known) ** 2))) if known.size else NAN
 
 
-_STEPS = 6
-_STEP_IN_SDS = 0.05
-_SHORTER = 0.3
+# Technical, as Gauss-Newton steps converge: 0.05 of a standard deviation is no error to speak of.
+_STEPS, _STEP_IN_SDS, _SHORTER = 6, 0.05, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +238,8 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
     misfit = _misfits(parts, z, predicted)
     length = np.ones(len(parts))
     for _ in range(_STEPS):
-        steps = length[:, None] * _steps(parts, z, predicted)
+        whole = [part.step(*each) for part, *each in zip(parts, z, predicted, strict=True)]
+        steps = length[:, None] * np.array(whole)
         large = [part.sds(step) > _STEP_IN_SDS for part, step in zip(parts, steps, strict=True)]
         if not any(large):
             break
@@ -251,10 +251,6 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
         misfit = np.where(better, tried, misfit)
         length = np.where(better, 1.0, _SHORTER * length)
     return predicted
-
-
-def _steps(parts: list[_Part], z: FloatArray, predicted: FloatArray) -> FloatArray:
-    return np.array([part.step(*each) for part, *each in zip(parts, z, predicted, strict=True)])
 
 
 def _misfits(parts: list[_Part], z: FloatArray, predicted: FloatArray) -> FloatArray:

@@ -88,6 +88,7 @@ from shm.values.recording import (
     ResponsePoint,
 )
 from shm.values.trial import (
+    MIX,
     Answer,
     Bin,
     CaseScore,
@@ -106,6 +107,7 @@ from shm.values.trial import (
 __all__ = [
     "ENOUGH_EFFECTIVE",
     "LONGEST_TEST_ID",
+    "MIX",
     "MOST_MISFIT_PERCENT",
     "NAN",
     "PLANES",

@@ -12,8 +12,8 @@ from shm.values.kinds import FloatArray
 
 Force = TypeVar("Force", float, FloatArray)
 
-_DIGITS = 4
-_MOST_DECIMALS = 6
+_DIGITS = 4  # an interval's half width is some percent: two digits of it are four of the force
+MOST_DECIMALS = 6  # technical: what is smaller is written as 0
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ForceUnit:
         size = abs(self.of(force_n))
         if not (math.isfinite(size) and size > 0):
             return 1
-        return min(_MOST_DECIMALS, max(1, _DIGITS - 1 - math.floor(math.log10(size))))
+        return min(MOST_DECIMALS, max(1, _DIGITS - 1 - math.floor(math.log10(size))))
 
     def told(self, force_n: float) -> str:
         """`654.1 kN` of a force in N: four significant digits, never as a power of ten."""
@@ -44,7 +44,7 @@ class ForceUnit:
 
 
 _NEWTON = ForceUnit("N", 1.0)
-_KILONEWTON = ForceUnit("kN", 1e3)
+_KILONEWTON = ForceUnit("kN", 1e3)  # SI prefixes
 _MEGANEWTON = ForceUnit("MN", 1e6)
 # Engineers write 1200 kN, not 1.2 MN: only main cables and the like are told in MN.
 _KILONEWTON_FROM_N, _MEGANEWTON_FROM_N = 1e3, 1e7

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.force_units import MOST_DECIMALS, ForceUnit, force_unit
 from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
 
-_LEAST_SAID, _MOST_DECIMALS = 0.01, 6
+_LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 
 
 def averaged_now(
@@ -98,7 +98,7 @@ def _decimals(size: float) -> int:
     """Decimals that show two significant digits."""
     if not (math.isfinite(size) and size > 0):
         return 1
-    return min(_MOST_DECIMALS, max(0, 1 - math.floor(math.log10(size))))
+    return min(MOST_DECIMALS, max(0, 1 - math.floor(math.log10(size))))
 
 
 def _probability(value: float) -> str:

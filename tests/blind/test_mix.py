@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shm.blind.making.mix import KINDS, RICHNESSES, WAYS, Draft, balanced, drafts
+from shm.blind.making.mix import RICHNESSES, WAYS, Draft, balanced, drafts
+from shm.values import MIX
 
 EFFECTS = tuple(f"effect{number}" for number in range(19))
 UNLISTED = ("crack", "guide", "damper")
@@ -21,7 +22,7 @@ def drawn(cases: int, seed: int = 1) -> tuple[Draft, ...]:
 @pytest.mark.parametrize("cases", [24, 300, 426])
 def test_kinds_richnesses_and_ways_have_their_shares_to_within_one_case(cases: int) -> None:
     found = drawn(cases)
-    for name, shares in (("kind", KINDS), ("richness", RICHNESSES)):
+    for name, shares in (("kind", MIX), ("richness", RICHNESSES)):
         counts = Counter(getattr(draft, name) for draft in found)
         assert all(abs(counts[each] - cases * share) <= 1 for each, share in shares.items())
     ways = Counter(draft.way for draft in found)
@@ -30,7 +31,7 @@ def test_kinds_richnesses_and_ways_have_their_shares_to_within_one_case(cases: i
 
 def test_each_combination_has_its_share_to_within_two_cases_of_three_hundred() -> None:
     counts = Counter((draft.kind, draft.richness, draft.way) for draft in drawn(300))
-    for kind, of_kind in KINDS.items():
+    for kind, of_kind in MIX.items():
         for richness, of_richness in RICHNESSES.items():
             for way in WAYS:
                 wanted = 300 * of_kind * of_richness / 2
@@ -68,6 +69,6 @@ def test_the_order_of_cases_tells_nothing_of_their_kind() -> None:
     """Runs of equal kinds are about as many as chance makes, within four standard deviations."""
     kinds = [draft.kind for draft in drawn(300)]
     changes = sum(a != b for a, b in pairwise(kinds))
-    chance = 1 - sum(share**2 for share in KINDS.values())
+    chance = 1 - sum(share**2 for share in MIX.values())
     assert abs(changes - 299 * chance) < 4 * np.sqrt(299 * chance * (1 - chance))
     assert drawn(300, seed=2) != drawn(300, seed=1)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind, more_thorough
-from shm.gap.chances import MISSED, Tried
+from shm.gap.calibration import CALIBRATION
+from shm.gap.chances import Tried
 from shm.gap.contract import GapOptions, Hypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
@@ -72,7 +73,9 @@ def test_two_planted_effects_are_named_as_a_pair() -> None:
 def test_an_effect_that_is_not_in_the_catalogue_is_unexplained() -> None:
     known = tuple(name for name in KNOWN if name != "point_mass")
     found, _ = _found("point_mass", known=known)
-    assert found.unexplained_probability == pytest.approx(1 - MISSED, abs=0.05)
+    assert found.unexplained_probability == pytest.approx(
+        1 - CALIBRATION.undetected_share, abs=0.05
+    )
     assert found.unexplained.hypothesis.flexible
 
 

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.gap.calibration import CALIBRATION
 from shm.gap.chances import (
-    MISSED,
     NO_GAP,
-    PASSES_FOR_ONE,
     SINGLE,
     UNKNOWN,
     Tried,
-    doubted,
     families,
     log_prior,
     misfit_odds,
@@ -68,7 +66,9 @@ def test_what_is_unknown_may_pass_for_an_effect() -> None:
     tried = [_tried(0.0), _tried(30.0, "a"), _tried(0.0, "b"), _tried(0.0, flexible=True)]
     chances, passing = probabilities(families(tried, {"a": 1, "b": 1}))
     assert chances.sum() + passing == pytest.approx(1.0)
-    assert passing / chances[0] == pytest.approx(PASSES_FOR_ONE * UNKNOWN / SINGLE, rel=1e-6)
+    assert passing / chances[0] == pytest.approx(
+        CALIBRATION.mimics_one * UNKNOWN / SINGLE, rel=1e-6
+    )
 
 
 def test_a_pair_that_imitates_freely_is_claimed_less_surely() -> None:
@@ -127,9 +127,9 @@ def test_of_a_bad_fit_something_unknown_gains_and_of_a_good_one_nothing_changes(
     tried = [_tried(0.0), _tried(9.0, "a"), _tried(8.0, "b"), _tried(7.0, flexible=True)]
     kinds = families(tried, {"a": 1, "b": 1})
     before, passing = probabilities(kinds)
-    same, passes = doubted(kinds, before, passing, 0.6)
+    same, passes = probabilities(kinds, 0.6)
     assert (*same, passes) == pytest.approx((*before, passing))
-    after, passes = doubted(kinds, before, passing, 0.001)
+    after, passes = probabilities(kinds, 0.001)
     assert after.sum() + passes == pytest.approx(1.0)
     a, unknown = (next(i for i, k in enumerate(kinds) if k.name == n and k.flexible == f)
                   for n, f in (("a", False), ("", True)))  # fmt: skip
@@ -145,7 +145,7 @@ def test_of_what_is_unexplained_a_part_is_a_cause_that_was_missed() -> None:
     told = missed(kinds, chances)
     assert told.sum() + passing == pytest.approx(1.0)
     by_name = {(k.name, k.flexible): c for k, c in zip(kinds, told, strict=True)}
-    assert by_name["", True] == pytest.approx(1 - MISSED)
+    assert by_name["", True] == pytest.approx(1 - CALIBRATION.undetected_share)
     assert by_name["a", False] / by_name["b", False] == pytest.approx(np.exp(3.0))
     assert by_name["", False] == 0
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import LAW_TO_CAUSE, without_faint
+from shm.gap.attribution import without_faint
+from shm.gap.calibration import CALIBRATION
 from shm.gap.chances import Tried, families
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted
@@ -48,9 +49,9 @@ def chances_of(second: PlantedEffect, variant: Variant, fit_first: bool = True) 
 
 
 def test_a_faint_second_cause_is_for_the_most_part_the_law_of_the_first() -> None:
-    found = chances_of(SMALL, SMALL_VARIANT)
-    assert found["point_mass + sag"] == pytest.approx(0.9 / (1 + LAW_TO_CAUSE))
-    assert found["point_mass"] == pytest.approx(0.05 + 0.9 * LAW_TO_CAUSE / (1 + LAW_TO_CAUSE))
+    found, odds = chances_of(SMALL, SMALL_VARIANT), CALIBRATION.minor_law_odds
+    assert found["point_mass + sag"] == pytest.approx(0.9 / (1 + odds))
+    assert found["point_mass"] == pytest.approx(0.05 + 0.9 * odds / (1 + odds))
 
 
 def test_an_effect_that_was_not_worth_a_fit_gets_nothing() -> None:

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import EXACT, ByLaws, by_its_laws
+from shm.gap.laws import ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictive_p_value
@@ -62,7 +63,7 @@ def test_the_fit_by_a_law_that_is_off_has_draws_of_its_own() -> None:
 
 def test_an_exact_law_pays_little_for_the_allowance() -> None:
     found, before, _ = _by_laws("section_loss", False)
-    assert np.log(EXACT.own) <= found.gain < 1.0
+    assert np.log(CALIBRATION.exact.own) <= found.gain < 1.0
     assert found.fit is before
 
 

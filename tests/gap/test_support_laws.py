@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.laws import EXACT, ByLaws, by_its_laws
+from shm.gap.laws import ByLaws, by_its_laws
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
@@ -44,5 +45,5 @@ def test_a_deck_with_a_second_mode_is_forgiven_and_fitted() -> None:
 
 def test_a_deck_with_one_mode_pays_little_for_the_allowance() -> None:
     found, before = _by_laws(own_laws=False)
-    assert np.log(EXACT.own) <= found.gain < 1.0
+    assert np.log(CALIBRATION.exact.own) <= found.gain < 1.0
     assert found.fit is before

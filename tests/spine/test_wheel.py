@@ -57,5 +57,6 @@ def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     )
     run(unpacked, code)
     names = {path.name for path in unpacked.rglob("*") if path.is_file()}
-    assert {"hanger.html.j2", "report.css", "py.typed", "default.toml", "env.py"} <= names
+    assert {"hanger.html.j2", "report.css", "calibration.toml", "default.toml", "env.py"} <= names
+    assert "py.typed" in names
     assert not any(name.endswith((".pyc", ".db")) for name in names)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import shutil
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,6 @@ import numpy as np
 from shm.blind.layout import TRIAL_SCHEMA, Told, nobody
 from shm.blind.making.case import make_case
 from shm.blind.making.mix import WAYS, Draft, drafts
-from shm.blind.making.traces import of_one_instant, padded
 from shm.blind.sealing import write_key
 from shm.blind.workers import workers
 from shm.documents import dump
@@ -25,7 +26,9 @@ from shm.values import TrueCase, Way
 
 __all__ = ["WAYS", "MadeTrial", "make_trial"]
 
-_SEED_BITS = 62
+_SEED_BITS = 62  # nobody guesses it, and a JSON reader of 64 bits holds it
+# Any instant does, if it is one for all.
+_INSTANT = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
 
 
 @dataclass(frozen=True)
@@ -111,3 +114,26 @@ def _refuse_unless_free(directory: Path, key: Path) -> None:
         )
     if directory.resolve() in key.resolve().parents:
         raise UsageError(f"the key {key} would lie in the trial's folder.", remedy="Keep it apart.")
+
+
+def padded(directories: Iterable[Path]) -> None:
+    """Brings the text files of the same name in these folders to one size.
+
+    Spaces stand before the last end of line, where neither JSON nor TOML minds them.
+    """
+    by_name = defaultdict(list)
+    for directory in directories:
+        for path in directory.iterdir():
+            if path.suffix in (".json", ".toml"):
+                by_name[path.name].append(path)
+    for paths in by_name.values():
+        largest = max(path.stat().st_size for path in paths)
+        for path in paths:
+            content = path.read_bytes().removesuffix(b"\n")
+            path.write_bytes(content.ljust(largest - 1) + b"\n")
+
+
+def of_one_instant(directory: Path) -> None:
+    """Gives a folder and all in it the same time."""
+    for path in [*directory.rglob("*"), directory]:
+        os.utime(path, (_INSTANT, _INSTANT))

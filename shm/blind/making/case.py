@@ -40,7 +40,7 @@ from shm.simulate.recorded import Recorder, recorded
 from shm.values import Hanger, Richness, TrueCase, TrueEffect
 
 BASELINE = "beam1"
-_DRAWS = 5
+_DRAWS = 5  # judgement: of an effect or its place, until one can have the size; then another's turn
 
 
 def make_case(directory: Path, draft: Draft, seed: np.random.SeedSequence) -> TrueCase:
@@ -128,6 +128,7 @@ def _left_out(
 
 
 _ALL = CampaignPlan(tension_spread=0.0, reality=Reality())
+# At 10 degrees, the mean of the other plans' temperatures, and the reference level.
 _ONE_TEST = replace(_ALL, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 PLANS: dict[Richness, CampaignPlan] = {
     "one plane": replace(_ONE_TEST, planes=("transverse",)),
@@ -141,9 +142,11 @@ PLANS: dict[Richness, CampaignPlan] = {
 
 _SIZES, _SIZES_OF_A_PAIR = (1.0, 1000.0), (8.0, 100.0)
 """Up to what real hangers show: a few percent of frequencies that are known to 1e-4."""
-_DRAWS_OF_EFFECTS = 5
-_ABOUT = 1.1
-_WEAK = 0.02, 0.2
+_ABOUT = 1.1  # judgement: a size is drawn log-uniform over decades, so a tenth more is that size
+_WEAK = (
+    0.02,
+    0.2,
+)  # judgement: the weak end of a range without its edge, which no interval holds
 _OF_SENSORS = ("sensor_mass", "sensor_misalignment", "skewed_principal_axes")
 """Not planted without shapes: then nobody knows where the sensors sit or what they see across."""
 _OF_LEVELS = ("geometric_hardening", "joint_softening")
@@ -224,7 +227,7 @@ def _of_size(name: str, size: float, site: Site, rng: np.random.Generator) -> Pl
     hanger, plan = site.hanger, site.plan
     places = choices(name, plan.places_m(hanger), [test.id for test in plan.tests(hanger)])
     weak: PlantedEffect | None = None
-    for _ in range(_DRAWS_OF_EFFECTS):
+    for _ in range(_DRAWS):
         effect = drawn(name, str(rng.choice(places)), hanger, rng)
         scaled = scaled_to(size, hanger, site.state, effect, plan)
         if scaled is not None and site.size((scaled,)) < _ABOUT * size:

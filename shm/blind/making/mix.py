@@ -10,9 +10,10 @@ from typing import get_args
 
 import numpy as np
 
-from shm.values import FloatArray, IntArray, PlantedKind, Richness, Way
+from shm.values import MIX, FloatArray, IntArray, PlantedKind, Richness, Way
 
-KINDS: dict[PlantedKind, float] = {"none": 1 / 4, "one": 1 / 2, "two": 1 / 8, "unknown": 1 / 8}
+# Judgement: most of what campaigns measure as a rule (frequencies, shapes, everything), some of
+# what lies between; a twelfth of 480 cases is 40, whose shares are known to 0.13.
 RICHNESSES: dict[Richness, float] = {
     "one plane": 1 / 12,
     "two planes": 1 / 4,
@@ -52,9 +53,9 @@ def drafts(
     Within each kind and richness sizes are spread evenly over their range, and every effect takes
     its turn at being tried first.
     """
-    kinds, richnesses = tuple(KINDS), tuple(RICHNESSES)
+    kinds, richnesses = tuple(MIX), tuple(RICHNESSES)
     wanted = np.multiply.outer(
-        np.outer(list(KINDS.values()), list(RICHNESSES.values())), np.full(len(ways), 1 / len(ways))
+        np.outer(list(MIX.values()), list(RICHNESSES.values())), np.full(len(ways), 1 / len(ways))
     )
     groups = defaultdict(list)
     for kind, richness, way in balanced(wanted, cases):

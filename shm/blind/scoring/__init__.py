@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from shm.blind.scoring.cases import case_scores, left_out_scores
-from shm.blind.scoring.opened import opened
-from shm.blind.scoring.trial import trial_score
+from shm.blind.scoring.trial import opened, trial_score
 
 __all__ = ["case_scores", "left_out_scores", "opened", "trial_score"]

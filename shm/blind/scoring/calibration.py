@@ -9,10 +9,10 @@ import numpy as np
 from shm.blind.scoring.estimates import ENDS, Estimate, Estimator, Samples, resampled, share
 from shm.values import NAN, Bin, FloatArray, Score
 
-_IN_A_BIN = 15
-_MOST_BINS = 10
-_TRIALS = 1000
-_PERFECT_TRIALS, _RESAMPLES = 200, 200
+# Judgement: a share of 15 errs by up to 0.13 (1 sd); ten bins are what a reliability curve shows.
+_IN_A_BIN, _MOST_BINS = 15, 10
+# Technical: 5 % quantiles of 1000 draws err by 0.7 %, a share of 200 by 3.5 %.
+_TRIALS, _PERFECT_TRIALS, _RESAMPLES = 1000, 200, 200
 
 
 def bins_of(cases: int) -> int:

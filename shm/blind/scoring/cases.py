@@ -29,8 +29,8 @@ from shm.values.diagnosis import joined
 
 SURE = 0.9
 """An effect named with more than this is a statement that somebody may act on."""
-_WORST_BRIER = 2.0
-_AMONG = 3
+_WORST_BRIER = 2.0  # all given to what is wrong: 1 for that and 1 for what is right
+_AMONG = 3  # judgement: who reads on reads the first three
 
 
 def case_scores(truths: Sequence[TrueCase], answers: Sequence[Answer]) -> tuple[CaseScore, ...]:

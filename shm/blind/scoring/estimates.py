@@ -13,9 +13,9 @@ from shm.values import NAN, FloatArray, Score
 Samples = tuple[FloatArray, ...]
 """Figures of the same cases, each (cases,)."""
 
-CONFIDENCE = 0.9
-ENDS = (0.05, 0.95)
-_RESAMPLES = 1000
+CONFIDENCE = 0.9  # as all intervals of ours
+ENDS = (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2
+_RESAMPLES = 1000  # technical: 5 % quantiles of 1000 draws err by 0.7 %
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ FEWEST = 10
 """A mark from fewer cases is neither met nor missed."""
 MOST_LOST = 0.05
 """What time histories and identification may cost."""
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # technical: a bound that is met exactly is met
 
 
 def marks(
@@ -125,8 +125,9 @@ def _by_effect(
 
 
 LARGE = 4.0
-"""Sizes above this are what a diagnosis is held to."""
-VERY_LARGE = 8.0
+"""Sizes above this are what a diagnosis is held to: log evidence of 8 is to be expected, and chance
+moves it by 4 either way (docs/trials/gap_trial.md). Held-out data are fewer: twice that."""
+VERY_LARGE = 2 * LARGE  # of held-out data, which are fewer
 
 _ONE, _TWO, _UNKNOWN = of_kind("one"), of_kind("two"), of_kind("unknown")
 _RIGHT = figures(lambda case: case.right)
@@ -178,6 +179,7 @@ _UNKNOWN_CAUSE = (
     ),
 )  # fmt: skip
 
+# Promised as found by the prototype that set the marks; how often chance alone misses it is told.
 _MISCALIBRATED = 0.06
 
 _CALIBRATED = (

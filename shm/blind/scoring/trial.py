@@ -1,21 +1,48 @@
-"""All scores of a trial from its key and its answers."""
+"""All scores of a trial from its key and its answers, whose seals are verified."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 
+from shm.blind.answers import read_answers, verified_sha256
+from shm.blind.layout import read_trial
 from shm.blind.scoring.calibration import reliability
 from shm.blind.scoring.cases import case_scores, left_out_scores
 from shm.blind.scoring.estimates import share
 from shm.blind.scoring.marks import marks
 from shm.blind.scoring.questions import figures, leading
+from shm.blind.sealing import key_of
 from shm.values import Answer, Bin, CaseScore, Richness, TrialScore, TrueCase
 
+# Factors of 2 where detection rises, of 4 where it is sure: technical, bins of a figure.
 _SIZES = (0.0, 2.0, 4.0, 8.0, 32.0, 128.0, np.inf)
+
+
+def opened(directory: Path, key: Path) -> TrialScore:
+    """The score of the trial in `directory`, the same each time; with the second round if there is.
+
+    Raises BadInput where the key is another's, where key or answers were changed since they were
+    sealed, and NothingThere where the trial is not solved.
+    """
+    trial = read_trial(directory)
+    truths, seed = key_of(trial, key)
+    sealed = verified_sha256(trial, "answers")
+    second = trial.seal("left_out").exists()
+    if second:
+        verified_sha256(trial, "left_out")
+    return trial_score(
+        truths,
+        read_answers(trial.answers("answers")),
+        read_answers(trial.answers("left_out")) if second else (),
+        (trial.key_sha256, sealed),
+        seed,
+        np.random.default_rng(0),
+    )
 
 
 def trial_score(
