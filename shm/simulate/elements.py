@@ -1,8 +1,7 @@
-"""Hermite beam elements: consistent mass, bending, tension, rotational end springs.
+"""Modes of a hanger as its state alone has it: the bar and its turnbuckles on rotational springs.
 
-Each node carries a deflection and a slope; the deflections of both ends are held. Element
-matrices: J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6, 11.3 and 15.2.
-The hanger is pieces of uniform section: the bar and its turnbuckles.
+The finite elements are those of `bar`, on a finer mesh that depends on nothing but the hanger, its
+tension left aside: there are no places at which effects act.
 """
 
 from __future__ import annotations
@@ -10,13 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import eigsh
 
-from shm.errors import UsageError
+from shm.simulate.bar.description import Piece, bar_of, pieces_of
+from shm.simulate.bar.mesh import interpolation, mesh_on
+from shm.simulate.bar.problem import solved
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -27,11 +25,7 @@ _ELEMENTS_PER_MODE = 8
 _ELEMENTS_PER_EXACT_MODE = 32
 _LEAST_ELEMENTS_A_PIECE = 16
 
-# Element matrices over deflection, slope, deflection, slope, for an element of size 1.
-_BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float)
-_TENSION = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / 30
-_MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420
-_CLOSED = 1e-9
+_HINGE = 1e-15  # of EI/L: changes a pinned hanger's frequencies by less than rounding does
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +46,7 @@ class PlaneModes:
 
     def at(self, x_m: FloatArray) -> FloatArray:
         """Mode shapes at `x_m` (points,): shape (points, modes)."""
-        element = np.clip(np.searchsorted(self.nodes_m, x_m) - 1, 0, len(self.nodes_m) - 2)
-        size = np.diff(self.nodes_m)[element]
-        s = (x_m - self.nodes_m[element]) / size
-        weights = np.array(
-            [1 - 3 * s**2 + 2 * s**3, size * (s - 2 * s**2 + s**3),
-             3 * s**2 - 2 * s**3, size * (s**3 - s**2)]
-        )[..., None]  # fmt: skip
+        element, weights = interpolation(self.nodes_m, x_m)
         left, right = element, element + 1
         values = (
             self.deflection[left],
@@ -66,7 +54,7 @@ class PlaneModes:
             self.deflection[right],
             self.slope[right],
         )
-        return np.asarray(np.sum(weights * np.array(values), axis=0))
+        return np.asarray(np.sum(weights[..., None] * np.array(values), axis=0))
 
 
 def natural_frequencies(hanger: Hanger, state: HangerState, modes: int) -> FloatArray:
@@ -87,16 +75,12 @@ def plane_modes(
 ) -> PlaneModes:
     """The lowest `modes` modes of one plane."""
     elements = max(_LEAST_ELEMENTS, elements_per_mode * modes)
-    pieces = pieces_of(hanger, state.effective_length_m(hanger))
-    nodes, owner = _nodes([piece.length_m for piece in pieces], elements)
-    stiffness, mass = _matrices(nodes, [pieces[index] for index in owner], state.tension_n)
-    springs = state.springs_n_m_rad(plane)
-    free = np.delete(np.arange(2 * len(nodes)), _held(2 * len(nodes), springs))
-    stiffness = _with_springs(stiffness, springs)
-    squares, vectors = _lowest(stiffness[free][:, free], mass[free][:, free], modes)
-    full = np.zeros((2 * len(nodes), modes))
-    full[free] = vectors
-    return PlaneModes(np.sqrt(squares), nodes, full[0::2], full[1::2], np.zeros(modes))
+    bar = bar_of(hanger, state, hinge=_HINGE)
+    mesh = mesh_on(bar, _nodes(pieces_of(hanger, bar.length_m), elements))
+    found = solved(bar, mesh, (PLANES.index(plane),), modes)
+    upward = np.sign(found.deflection[0, 1])
+    deflection, slope = found.deflection[0] * upward, found.rotation[0] * upward
+    return PlaneModes(np.sqrt(found.squares), mesh.nodes_m, deflection, slope, np.zeros(modes))
 
 
 def modes_below(hanger: Hanger, state: HangerState, frequency_hz: float) -> int:
@@ -119,16 +103,16 @@ def _pinned_below(piece: Piece, tension_n: float, frequency_hz: float) -> int:
     return math.ceil(wave_number * piece.length_m / math.pi)
 
 
-def _nodes(lengths_m: Sequence[float], elements: int) -> tuple[FloatArray, list[int]]:
-    """Nodes of pieces end to end, and the piece of each element."""
-    total, start = sum(lengths_m), 0.0
-    nodes, owner = [np.zeros(1)], []
-    for index, length_m in enumerate(lengths_m):
-        share = max(_LEAST_ELEMENTS_A_PIECE, math.ceil(elements * length_m / total))
-        nodes.append(start + length_m * _spread(share, index == 0, index == len(lengths_m) - 1))
-        owner += [index] * share
-        start += length_m
-    return np.concatenate(nodes), owner
+def _nodes(pieces: Sequence[Piece], elements: int) -> FloatArray:
+    """Nodes of pieces end to end."""
+    total, start = sum(piece.length_m for piece in pieces), 0.0
+    nodes = [np.zeros(1)]
+    for index, piece in enumerate(pieces):
+        share = max(_LEAST_ELEMENTS_A_PIECE, math.ceil(elements * piece.length_m / total))
+        ends = _spread(share, index == 0, index == len(pieces) - 1)
+        nodes.append(start + piece.length_m * ends)
+        start += piece.length_m
+    return np.concatenate(nodes)
 
 
 def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
@@ -143,93 +127,3 @@ def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
     if from_deck:
         return np.asarray(1 - np.cos(angle))
     return np.asarray(np.sin(angle) if to_arch else angle / angle[-1])
-
-
-def _matrices(nodes_m: FloatArray, owners: Sequence[Piece], tension_n: float) -> tuple[Any, Any]:
-    """Stiffness and mass of the free-free beam, sparse (2 nodes, 2 nodes)."""
-    size = np.diff(nodes_m)
-    bending = np.array([piece.bending_stiffness_n_m2 for piece in owners]) / size**3
-    stiffness = _element(bending, _BENDING, size) + _element(tension_n / size, _TENSION, size)
-    mass_per_length = np.array([piece.mass_per_length_kg_m for piece in owners])
-    return _assemble(stiffness), _assemble(_element(mass_per_length * size, _MASS, size))
-
-
-def _element(scale: FloatArray, pattern: FloatArray, size: FloatArray) -> FloatArray:
-    """Element matrices (elements, 4, 4) of a pattern for unit size; slopes scale with the size."""
-    one = np.ones_like(size)
-    lengths = np.stack([one, size, one, size], axis=1)
-    return scale[:, None, None] * pattern * lengths[:, :, None] * lengths[:, None, :]
-
-
-def _assemble(elements: FloatArray) -> Any:
-    count = len(elements)
-    unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
-    rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
-    columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
-    shape = (2 * count + 2, 2 * count + 2)
-    return csc_array((elements.ravel(), (rows, columns)), shape=shape)
-
-
-def _held(unknowns: int, springs: tuple[float, float]) -> list[int]:
-    """Unknowns that are zero: both end deflections, and the slopes of clamped ends."""
-    deck, arch = (math.isinf(spring) for spring in springs)
-    return [0, unknowns - 2, *([1] if deck else []), *([unknowns - 1] if arch else [])]
-
-
-def _with_springs(stiffness: Any, springs: tuple[float, float]) -> Any:
-    diagonal = np.zeros(stiffness.shape[0])
-    diagonal[[1, -1]] = [0.0 if math.isinf(spring) else spring for spring in springs]
-    return stiffness + diags_array(diagonal)
-
-
-def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArray]:
-    """The lowest squares of angular frequency (modes,) and mass-normalised vectors."""
-    start = np.ones(stiffness.shape[0])  # a fixed start, so that the same input gives the same bits
-    squares, vectors = eigsh(stiffness, k=modes, M=mass, sigma=0.0, v0=start)
-    order = np.argsort(squares)
-    squares, vectors = squares[order], vectors[:, order]
-    if squares[0] <= 0:
-        raise UsageError(
-            "the compression buckles the hanger: it has no lowest frequency.",
-            remedy="Give a larger tension.",
-        )
-    return squares, vectors * np.sign(vectors[0])
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A part of a hanger of one section."""
-
-    length_m: float
-    bending_stiffness_n_m2: float
-    mass_per_length_kg_m: float
-
-
-def pieces_of(hanger: Hanger, effective_length_m: float) -> Sequence[Piece]:
-    """The pieces from the deck end up at an effective length.
-
-    Turnbuckles keep their length; the bar between them takes up what the effective length differs
-    from the hanger's own, in proportion.
-    """
-    clear = _gaps(hanger)
-    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
-    stretch = 1 + (effective_length_m - hanger.length_m) / sum(clear)
-    found = []
-    for gap, turnbuckle in zip(clear, [*turnbuckles, None], strict=True):
-        if gap > _CLOSED * hanger.length_m:
-            found.append(
-                Piece(gap * stretch, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
-            )
-        if turnbuckle is not None:
-            mass = turnbuckle.mass_kg / turnbuckle.length_m
-            found.append(Piece(turnbuckle.length_m, turnbuckle.bending_stiffness_n_m2, mass))
-    return found
-
-
-def _gaps(hanger: Hanger) -> list[float]:
-    """Lengths of bar below, between and above the turnbuckles."""
-    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
-    starts = [each.x_m - each.length_m / 2 for each in turnbuckles]
-    ends = [each.x_m + each.length_m / 2 for each in turnbuckles]
-    pairs = zip([0.0, *ends], [*starts, hanger.length_m], strict=True)
-    return [start - end for end, start in pairs]

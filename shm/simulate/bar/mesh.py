@@ -48,7 +48,11 @@ def mesh_of(bar: Bar, places_m: Sequence[float], elements: int) -> Mesh:
 
     More of them where a string-like bar bends in thin layers.
     """
-    nodes = _filled(_special(bar, places_m, elements), bar, elements)
+    return mesh_on(bar, _filled(_special(bar, places_m, elements), bar, elements))
+
+
+def mesh_on(bar: Bar, nodes: FloatArray) -> Mesh:
+    """The elements between given nodes, which should be at all edges of the bar's sections."""
     middle = (nodes[1:] + nodes[:-1]) / 2
     stiffness, mass = np.ones((2, len(middle))), np.ones_like(middle)
     for each in bar.stretches:
