@@ -39,7 +39,7 @@ from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_cam
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)
 _SPRING = "End spring in N m/rad; clamped if left out."
-_SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS)
+_SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
 _WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 _HAMMER_SECONDS, _HAMMER_NOISE = 20.0, 0.02
 _SENSORS = 2

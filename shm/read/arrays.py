@@ -1,5 +1,5 @@
 """Named arrays, as HDF5, MATLAB, TDMS and NumPy files hold them, before they are loaded, and the
-one layout in which we write them, whatever the format.
+one layout in which they are looked for and NumPy's are written.
 
     force, acc_1, ...                     time records, N and m/s^2, float64 (samples,)
     frequency_hz                          of frequency responses, float64 (lines,)

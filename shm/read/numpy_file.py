@@ -1,4 +1,4 @@
-"""NumPy files: .npz with named arrays, in the layout of `array_layout`; .npy with one table.
+"""NumPy files: .npz with named arrays, in the layout of `arrays`; .npy with one table.
 
 Nothing is ever unpickled: arrays of Python objects are refused by their header. The rows of a .npy
 are row_1, row_2, ...; its sidecar says what each is.
@@ -115,7 +115,4 @@ FORMAT = Format(
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
     write=_write,
-    holds_gaps=True,
-    holds_frequency_responses=True,
-    needs_sidecar=False,
 )

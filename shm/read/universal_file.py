@@ -75,9 +75,6 @@ FORMAT = Format(
     peek=_peek,
     read=_read,
     write=_write,
-    holds_gaps=False,
-    holds_frequency_responses=True,
-    needs_sidecar=True,
     may_be_gzipped=True,
 )
 

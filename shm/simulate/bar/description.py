@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from shm.simulate.state import HangerState
 from shm.values import Hanger
 
-# Of EI/L: a spring that stands for a hinge changes a pinned bar's frequencies by 2e-10, and beside a
-# nearly clamped other plane its compliance leaves that one's above the rounding of an eigenvector.
+# Of EI/L: a spring that stands for a hinge changes a pinned bar's frequencies by 2e-10; its
+# compliance must not exceed 1e12 times the other plane's, or that one counts as rigid (`_joints`).
 _SOFT = 1e-9
 _CLOSED = 1e-9  # of the length: rounding between turnbuckles that touch
 
