@@ -38,6 +38,7 @@ from shm.values import (
     ResponsePoint,
 )
 
+# judgement: twice the 16 accelerations of setting max_channels; a wider table is no recording
 _MOST_COLUMNS = 32
 _MOST_TEXT = 1000  # characters; longer texts say nothing about a channel
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")

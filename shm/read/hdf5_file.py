@@ -33,8 +33,9 @@ from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _NAME = "HDF5"
+# judgement: a recording has some tens of objects, two or three groups deep
 _DEEPEST, _MOST_OBJECTS = 8, 2000
-_LARGEST_ATTRIBUTE = 1 << 16
+_LARGEST_ATTRIBUTE = 1 << 16  # 64 KB, HDF5's own limit of one in an object's header
 _FILTERS = {
     h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32,
     h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_NBIT, h5py.h5z.FILTER_SCALEOFFSET,

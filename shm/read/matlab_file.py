@@ -148,13 +148,14 @@ def _refuse_doubles(names: Sequence[str], path: Path) -> None:
         )
 
 
+# MAT-File Format, MathWorks, chapter 1
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
 _INT8, _INT32, _UINT32 = 1, 5, 6
 _NUMBER_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
 _TEXTS = (1, 2, 4, 16, 17, 18)
 _COMPLEX_FLAG = 0x800
-_CHUNK = 1 << 20
+_CHUNK = 1 << 20  # technical: unpacked at once
 
 
 @dataclass(frozen=True)
