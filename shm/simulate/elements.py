@@ -1,7 +1,7 @@
 """Modes of a hanger as its state alone has it: the bar and its turnbuckles on rotational springs.
 
-The finite elements are those of `bar`, on a finer mesh that depends on nothing but the hanger, its
-tension left aside: there are no places at which effects act.
+The finite elements are those of `bar`, on a mesh that does not depend on the tension: finer, as
+there are no places at which effects act.
 """
 
 from __future__ import annotations
