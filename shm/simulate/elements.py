@@ -1,7 +1,7 @@
 """Modes of a hanger as its state alone has it: the bar and its turnbuckles on rotational springs.
 
-The finite elements are those of `bar`, on a mesh that does not depend on the tension: finer, as
-there are no places at which effects act.
+The elements are those of `bar`, on a mesh that does not depend on the tension: finer, as there are
+no places at which effects act.
 """
 
 from __future__ import annotations
@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import eigsh
 
-from shm.simulate.bar.description import Piece, bar_of, pieces_of
-from shm.simulate.bar.mesh import interpolation, mesh_on
-from shm.simulate.bar.problem import solved
+from shm.errors import UsageError
+from shm.simulate.bar.description import Piece, pieces_of
+from shm.simulate.bar.mesh import assembled, interpolation, mass_of, stiffness_of
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -24,8 +27,6 @@ _LEAST_ELEMENTS = 320
 _ELEMENTS_PER_MODE = 8
 _ELEMENTS_PER_EXACT_MODE = 32
 _LEAST_ELEMENTS_A_PIECE = 16
-
-_HINGE = 1e-15  # of EI/L: changes a pinned hanger's frequencies by less than rounding does
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +76,16 @@ def plane_modes(
 ) -> PlaneModes:
     """The lowest `modes` modes of one plane."""
     elements = max(_LEAST_ELEMENTS, elements_per_mode * modes)
-    bar = bar_of(hanger, state, hinge=_HINGE)
-    mesh = mesh_on(bar, _nodes(pieces_of(hanger, bar.length_m), elements))
-    found = solved(bar, mesh, (PLANES.index(plane),), modes)
-    upward = np.sign(found.deflection[0, 1])
-    deflection, slope = found.deflection[0] * upward, found.rotation[0] * upward
-    return PlaneModes(np.sqrt(found.squares), mesh.nodes_m, deflection, slope, np.zeros(modes))
+    pieces = pieces_of(hanger, state.effective_length_m(hanger))
+    nodes, owner = _nodes([piece.length_m for piece in pieces], elements)
+    stiffness, mass = _matrices(nodes, [pieces[index] for index in owner], state.tension_n)
+    springs = state.springs_n_m_rad(plane)
+    free = np.delete(np.arange(2 * len(nodes)), _held(2 * len(nodes), springs))
+    stiffness = _with_springs(stiffness, springs)
+    squares, vectors = _lowest(stiffness[free][:, free], mass[free][:, free], modes)
+    full = np.zeros((2 * len(nodes), modes))
+    full[free] = vectors
+    return PlaneModes(np.sqrt(squares), nodes, full[0::2], full[1::2], np.zeros(modes))
 
 
 def modes_below(hanger: Hanger, state: HangerState, frequency_hz: float) -> int:
@@ -103,16 +108,16 @@ def _pinned_below(piece: Piece, tension_n: float, frequency_hz: float) -> int:
     return math.ceil(wave_number * piece.length_m / math.pi)
 
 
-def _nodes(pieces: Sequence[Piece], elements: int) -> FloatArray:
-    """Nodes of pieces end to end."""
-    total, start = sum(piece.length_m for piece in pieces), 0.0
-    nodes = [np.zeros(1)]
-    for index, piece in enumerate(pieces):
-        share = max(_LEAST_ELEMENTS_A_PIECE, math.ceil(elements * piece.length_m / total))
-        ends = _spread(share, index == 0, index == len(pieces) - 1)
-        nodes.append(start + piece.length_m * ends)
-        start += piece.length_m
-    return np.concatenate(nodes)
+def _nodes(lengths_m: Sequence[float], elements: int) -> tuple[FloatArray, list[int]]:
+    """Nodes of pieces end to end, and the piece of each element."""
+    total, start = sum(lengths_m), 0.0
+    nodes, owner = [np.zeros(1)], []
+    for index, length_m in enumerate(lengths_m):
+        share = max(_LEAST_ELEMENTS_A_PIECE, math.ceil(elements * length_m / total))
+        nodes.append(start + length_m * _spread(share, index == 0, index == len(lengths_m) - 1))
+        owner += [index] * share
+        start += length_m
+    return np.concatenate(nodes), owner
 
 
 def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
@@ -127,3 +132,38 @@ def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
     if from_deck:
         return np.asarray(1 - np.cos(angle))
     return np.asarray(np.sin(angle) if to_arch else angle / angle[-1])
+
+
+def _matrices(nodes_m: FloatArray, owners: Sequence[Piece], tension_n: float) -> tuple[Any, Any]:
+    """Stiffness and mass of the free-free beam, sparse (2 nodes, 2 nodes)."""
+    size = np.diff(nodes_m)
+    bending = np.array([piece.bending_stiffness_n_m2 for piece in owners])
+    mass_per_length = np.array([piece.mass_per_length_kg_m for piece in owners])
+    stiffness = stiffness_of(size, bending, 0.0, tension_n)
+    return assembled(stiffness), assembled(mass_of(size, bending, 0.0, mass_per_length, 0.0))
+
+
+def _held(unknowns: int, springs: tuple[float, float]) -> list[int]:
+    """Unknowns that are zero: both end deflections, and the slopes of clamped ends."""
+    deck, arch = (math.isinf(spring) for spring in springs)
+    return [0, unknowns - 2, *([1] if deck else []), *([unknowns - 1] if arch else [])]
+
+
+def _with_springs(stiffness: Any, springs: tuple[float, float]) -> Any:
+    diagonal = np.zeros(stiffness.shape[0])
+    diagonal[[1, -1]] = [0.0 if math.isinf(spring) else spring for spring in springs]
+    return stiffness + diags_array(diagonal)
+
+
+def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArray]:
+    """The lowest squares of angular frequency (modes,) and mass-normalised vectors."""
+    start = np.ones(stiffness.shape[0])  # a fixed start, so that the same input gives the same bits
+    squares, vectors = eigsh(stiffness, k=modes, M=mass, sigma=0.0, v0=start)
+    order = np.argsort(squares)
+    squares, vectors = squares[order], vectors[:, order]
+    if squares[0] <= 0:
+        raise UsageError(
+            "the compression buckles the hanger: it has no lowest frequency.",
+            remedy="Give a larger tension.",
+        )
+    return squares, vectors * np.sign(vectors[0])

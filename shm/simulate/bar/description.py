@@ -89,15 +89,12 @@ class Bar:
         return replace(self, ends=ends)
 
 
-def bar_of(hanger: Hanger, state: HangerState, hinge: float = _SOFT) -> Bar:
-    """The bar of a hanger in a state, with its turnbuckles and no effect.
-
-    No end spring is softer than `hinge` times EI/L.
-    """
+def bar_of(hanger: Hanger, state: HangerState) -> Bar:
+    """The bar of a hanger in a state, with its turnbuckles and no effect."""
     length_m = state.effective_length_m(hanger)
-    least = hinge * hanger.bending_stiffness_n_m2 / length_m
+    hinge = _SOFT * hanger.bending_stiffness_n_m2 / length_m
     deck, arch = (
-        BarEnd(turning_rad_n_m=(1 / max(springs[0], least), 1 / max(springs[1], least)))
+        BarEnd(turning_rad_n_m=(1 / max(springs[0], hinge), 1 / max(springs[1], hinge)))
         for springs in (
             (state.k1_n_m_rad, state.k2_n_m_rad),
             (state.k3_n_m_rad, state.k4_n_m_rad),
