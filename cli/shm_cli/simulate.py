@@ -39,7 +39,7 @@ from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_cam
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
 _SPRING = "End spring in N m/rad; clamped if left out."
-_SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS)
+_SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
 _WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 # Judgement: a hanger rings for some 20 s; 0.02 m/s^2 is a good accelerometer in calm air; two
 # places tell the orders of modes apart.

@@ -199,7 +199,7 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 
-_LINES_AROUND = 4
+_LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does not move
 
 
 def without_window(found: Finding, measurement: Measurement) -> Finding:

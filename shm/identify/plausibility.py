@@ -18,6 +18,7 @@ import numpy as np
 from shm.identify.measuring.hits import Pulse, find_pulses
 from shm.values import NAN, Channel, FloatArray, Hanger, Recording
 
+# judgement, a factor of ten beyond what is usual:
 PEAK_FORCE_N = 10.0, 50e3
 PEAK_ACCELERATION_M_S2 = 1e-3, 1e4
 """From a tap with a pencil to a sledge; from the noise of a seismic sensor to a shock sensor."""
@@ -33,6 +34,8 @@ RINGS_MORE = 2.0
 """Factor of the ringing after the largest excursion: of accelerometers 4.9 times and more that
 of a hammer, double hits included (40 tests of tests/benchmarks/right_signals.py)."""
 
+# judgement: from where the softest pulse is over, for some periods of the first mode; the band of
+# hangers' modes that carry velocity. tests/benchmarks/right_signals.py counts what comes of them
 _AFTER_S, _RING_S = 0.02, 0.5
 _LOWEST_HZ, _HIGHEST_HZ = 2.0, 200.0
 

@@ -1,5 +1,5 @@
 """Named arrays, as HDF5, MATLAB, TDMS and NumPy files hold them, before they are loaded, and the
-one layout in which we write them, whatever the format.
+one layout in which they are looked for and NumPy's are written.
 
     force, acc_1, ...                     time records, N and m/s^2, float64 (samples,)
     frequency_hz                          of frequency responses, float64 (lines,)
@@ -38,6 +38,7 @@ from shm.values import (
     ResponsePoint,
 )
 
+# judgement: twice the 16 accelerations of setting max_channels; a wider table is no recording
 _MOST_COLUMNS = 32
 _MOST_TEXT = 1000  # characters; longer texts say nothing about a channel
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")

@@ -15,8 +15,9 @@ from shm.read.header import Header
 from shm.read.limits import limits, refuse_many_samples
 from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
 
+# judgement: no ring-down can be seen in fewer; identification asks for far more
 LEAST_SAMPLES = 16
-_LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
+LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
 _SAME_RATE = 1e-4
 _NAME_THEM = (
     "Name accelerometers acc_1, acc_2, ..., or give in NAME.toml a table [channel.NAME] with"
@@ -133,7 +134,7 @@ def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
             channel=channel,
             remedy="Check sensor and cable, or leave the channel out.",
         )
-    wild = np.flatnonzero(np.abs(values) > _LARGEST)
+    wild = np.flatnonzero(np.abs(values) > LARGEST)
     if len(wild):
         raise BadInput(
             f"sample {wild[0] + 1} is {values[wild[0]]:g}, which no sensor gives.",

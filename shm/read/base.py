@@ -53,9 +53,8 @@ class Peek:
 class Format:
     """One file format: the suffixes it goes by and its verbs.
 
-    `recognises` judges the first bytes of a file. `holds_gaps` says whether NaN survives,
-    `holds_frequency_responses` whether a FrequencyResponse can be written, `needs_sidecar`
-    whether `write` adds NAME.toml, `may_be_gzipped` whether NAME.csv.gz is read too.
+    `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
+    `may_be_gzipped` says whether NAME.csv.gz is read too.
     """
 
     name: str
@@ -63,10 +62,7 @@ class Format:
     recognises: Callable[[bytes], bool]
     peek: Callable[[Path], Peek]
     read: Callable[[Path], Recording | FrequencyResponse]
-    write: Callable[[Recording | FrequencyResponse, Path], None]
-    holds_gaps: bool
-    holds_frequency_responses: bool
-    needs_sidecar: bool
+    write: Callable[[Recording | FrequencyResponse, Path], None] | None = None
     may_be_gzipped: bool = False
 
 

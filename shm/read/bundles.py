@@ -20,8 +20,8 @@ from shm.read.limits import guarded, limits
 from shm.read.sidecar import document_beside, sidecar_path, with_sidecar
 
 SUFFIX = ".zip"
-_FIRST_DAY = (1980, 1, 1, 0, 0, 0)
-_UNIX, _PLAIN_FILE = 3, 0o100644 << 16
+FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
+_UNIX, _PLAIN_FILE = 3, 0o100644 << 16  # PKWARE APPNOTE 4.4.2 and 4.4.15: rw-r--r--
 
 T = TypeVar("T")
 
@@ -98,7 +98,7 @@ def bundle(paths: Sequence[Path], archive: Path) -> Path:
 def _pack(files: Sequence[Path], target: Path) -> None:
     with zipfile.ZipFile(target, "w") as archive:
         for file in files:
-            member = zipfile.ZipInfo(file.name, _FIRST_DAY)
+            member = zipfile.ZipInfo(file.name, FIRST_DAY)
             member.create_system, member.external_attr = _UNIX, _PLAIN_FILE
             archive.writestr(member, file.read_bytes())
 

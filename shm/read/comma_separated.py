@@ -101,9 +101,6 @@ FORMAT = Format(
     peek=_peek,
     read=_read,
     write=_write,
-    holds_gaps=True,
-    holds_frequency_responses=True,
-    needs_sidecar=False,
     may_be_gzipped=True,
 )
 

@@ -19,6 +19,7 @@ from shm.errors import BadInput
 from shm.read.base import Format
 from shm.read.limits import guarded, limits, too_large
 
+# judgement: marks of formats stand at the beginning, and a page tells text from other bytes
 _HEAD_BYTES = 4096
 _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"\x89PNG", "a PNG picture"),

@@ -27,16 +27,15 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import peeker, reader
-from shm.read.arrays import Arrays, Layout, Variable, attributes_of, layout_of, named_apart, natural
-from shm.read.atomic import replace_file
+from shm.read.arrays import Arrays, Variable, attributes_of, named_apart, natural
 from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
-from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _NAME = "HDF5"
+# judgement: a recording has some tens of objects, two or three groups deep
 _DEEPEST, _MOST_OBJECTS = 8, 2000
-_LARGEST_ATTRIBUTE = 1 << 16
+_LARGEST_ATTRIBUTE = 1 << 16  # 64 KB, HDF5's own limit of one in an object's header
 _FILTERS = {
     h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32,
     h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_NBIT, h5py.h5z.FILTER_SCALEOFFSET,
@@ -61,28 +60,12 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     return {key: value for group in groups for key, value in group.attributes.items()}
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
-    layout = layout_of(described)
-    replace_file(path, lambda temporary: _save(temporary, layout))
-
-
-def _save(path: Path, layout: Layout) -> None:
-    with h5py.File(path, "w", track_order=True) as file:
-        file.attrs.update(layout.attributes)
-        for array in layout.arrays:
-            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
-
-
 FORMAT = Format(
     name=_NAME,
     suffixes=(".h5", ".hdf5"),
     recognises=lambda head: head.startswith(_MAGIC),
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
-    write=_write,
-    holds_gaps=True,
-    holds_frequency_responses=True,
-    needs_sidecar=False,
 )
 
 

@@ -1,4 +1,4 @@
-"""NumPy files: .npz with named arrays, in the layout of `array_layout`; .npy with one table.
+"""NumPy files: .npz with named arrays, in the layout of `arrays`; .npy with one table.
 
 Nothing is ever unpickled: arrays of Python objects are refused by their header. The rows of a .npy
 are row_1, row_2, ...; its sidecar says what each is.
@@ -22,13 +22,14 @@ from shm.read.array_reading import peeker, reader
 from shm.read.arrays import Arrays, Variable, layout_of
 from shm.read.atomic import replace_file
 from shm.read.base import Format
+from shm.read.bundles import FIRST_DAY
 from shm.read.content import checked_members
 from shm.read.limits import guarded, refuse_large
 from shm.values import FrequencyResponse, Recording
 
 _MAGIC = b"\x93NUMPY"
 _TABLE = "row"
-_FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+# numpy.lib.format: 3.0 only adds names of fields in UTF-8, and tables with fields are not read
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
@@ -102,7 +103,7 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
 def _save(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         for name, values in arrays.items():
-            member = zipfile.ZipInfo(f"{name}.npy", _FIRST_DAY)
+            member = zipfile.ZipInfo(f"{name}.npy", FIRST_DAY)
             with archive.open(member, "w") as stream:
                 npy.write_array(stream, values, allow_pickle=False)
 
@@ -115,7 +116,4 @@ FORMAT = Format(
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
     write=_write,
-    holds_gaps=True,
-    holds_frequency_responses=True,
-    needs_sidecar=False,
 )

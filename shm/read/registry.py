@@ -50,13 +50,14 @@ def write(recording: Recording | FrequencyResponse, path: Path) -> None:
     """Writes a file in the format of its suffix, whole or not at all.
 
     A format that cannot hold everything gets a sidecar, written first. Raises UsageError for a
-    suffix of no format and for what the format cannot hold.
+    suffix of no format that is written, and for what the format cannot hold.
     """
     found = _format_of_suffix(path)
-    if found is None:
+    if found is None or found.write is None:
+        written = ", ".join(known.suffixes[0] for known in FORMATS if known.write)
         raise UsageError(
             f"no format is written as {path.suffix or 'a file without suffix'}.",
-            remedy=f"Use one of {', '.join(_suffixes())}.",
+            remedy=f"Use one of {written}.",
         )
     found.write(recording, path)
 

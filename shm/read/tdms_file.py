@@ -1,7 +1,7 @@
 """TDMS of National Instruments: channels in groups, what is said about them as properties.
 
-Loggers write wf_increment (s), wf_start_time and unit_string; we write these and hanger,
-temperature_c, plane, x_m, full_scale. A group is only a name: "test" in ours.
+Loggers write wf_increment (s), wf_start_time and unit_string; hanger, temperature_c, plane, x_m and
+full_scale are read as well. A group is only a name.
 """
 
 from __future__ import annotations
@@ -13,28 +13,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
+from nptdms import TdmsFile
 from nptdms.log import log_manager
 
 from shm.errors import BadInput
 from shm.read.array_reading import peeker, reader
-from shm.read.arrays import (
-    Arrays,
-    Layout,
-    NamedArray,
-    Variable,
-    attributes_of,
-    layout_of,
-    named_apart,
-)
-from shm.read.atomic import replace_file
+from shm.read.arrays import Arrays, Variable, attributes_of, named_apart
 from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
-from shm.values import FrequencyResponse, Recording
 
 log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words
 _MAGIC = b"TDSm"
-_GROUP = "test"
 _MOST_CHANNELS = 2000
 
 
@@ -89,31 +78,6 @@ def _variable(name: str, channel: Any, path: Path) -> Variable:
     )
 
 
-def _write(described: Recording | FrequencyResponse, path: Path) -> None:
-    layout = layout_of(described)
-    replace_file(path, lambda temporary: _save(temporary, layout))
-
-
-def _save(path: Path, layout: Layout) -> None:
-    channels = [
-        ChannelObject(_GROUP, array.name, array.values, _properties(array, layout))
-        for array in layout.arrays
-    ]
-    with path.open("wb") as stream, TdmsWriter(stream) as writer:
-        writer.write_segment([RootObject(layout.attributes), GroupObject(_GROUP), *channels])
-
-
-def _properties(array: NamedArray, layout: Layout) -> dict[str, object]:
-    """What belongs to a channel, in the words of National Instruments where they have some."""
-    said: dict[str, object] = {k: v for k, v in array.attributes.items() if k != "unit"}
-    if "unit" in array.attributes:
-        said["unit_string"] = array.attributes["unit"]
-    rate = layout.attributes.get("sampling_rate_hz")
-    if isinstance(rate, float):
-        said |= {"sampling_rate_hz": rate, "wf_increment": 1 / rate, "wf_start_offset": 0.0}
-    return said
-
-
 _NAME = "TDMS"
 FORMAT = Format(
     name=_NAME,
@@ -121,8 +85,4 @@ FORMAT = Format(
     recognises=lambda head: head.startswith(_MAGIC),
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
-    write=_write,
-    holds_gaps=True,
-    holds_frequency_responses=True,
-    needs_sidecar=False,
 )

@@ -16,16 +16,17 @@ class Unit:
     si: float
 
 
-_STANDARD_GRAVITY = 9.80665
+_STANDARD_GRAVITY = 9.80665  # 3rd CGPM (1901)
 _METRE_PER_S2 = Unit("acceleration", 1.0)
+# NIST Special Publication 811, B.8; a pound is 0.45359237 kg
 _UNITS: dict[str, Unit] = {
     "n": Unit("force", 1.0),
     "newton": Unit("force", 1.0),
     "newtons": Unit("force", 1.0),
     "dan": Unit("force", 10.0),
     "kn": Unit("force", 1e3),
-    "kgf": Unit("force", 9.80665),
-    "lbf": Unit("force", 4.4482216152605),
+    "kgf": Unit("force", _STANDARD_GRAVITY),
+    "lbf": Unit("force", 0.45359237 * _STANDARD_GRAVITY),
     "m/s2": _METRE_PER_S2,
     "m/s/s": _METRE_PER_S2,
     "m/sec2": _METRE_PER_S2,

@@ -75,13 +75,11 @@ FORMAT = Format(
     peek=_peek,
     read=_read,
     write=_write,
-    holds_gaps=False,
-    holds_frequency_responses=True,
-    needs_sidecar=True,
     may_be_gzipped=True,
 )
 
 
+# UC-SDRL, Universal File Formats, data set 58, records 7 to 10
 _QUANTITIES: dict[int, Quantity] = {9: "force", 12: "acceleration", 13: "force"}
 _CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
 _TIME, _EVEN, _DOUBLE = 17, 1, 4

@@ -21,17 +21,18 @@ from shm.errors import BadInput
 from shm.read.content import bytes_of, plain_file
 from shm.values import ComplexArray, FloatArray
 
+# UC-SDRL, Universal File Formats: data sets 15, 58, 58b and 2411
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
 _FUNCTION = 58
 _NODES = (15, 2411)
 _START = re.compile(rb"\A\s*-1[ \t]*\r?\n\s*\d+")
 _MARK = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
 _EXPORT_AGAIN = "Export or send it again."
-_IEEE_754 = 2
-_INCREMENT_DIGITS = 6
-_MOST_UNEVEN = 0.01
-_LARGEST_NODE = 1e10
-_LEAST_STEP, _LARGEST_STEP = 1e-9, 1e6
+_IEEE_754 = 2  # data set 58b, record 1
+_INCREMENT_DIGITS = 6  # of E13.5, data set 58, record 7
+_MOST_UNEVEN = 0.01  # judgement: of a step; a clock is far better, a lost sample far worse
+_LARGEST_NODE = 1e10  # ten digits, I10
+_LEAST_STEP, _LARGEST_STEP = 1e-9, 1e6  # judgement: s or Hz, beyond which no step is one
 
 
 @dataclass(frozen=True, eq=False)

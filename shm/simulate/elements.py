@@ -1,8 +1,7 @@
-"""Hermite beam elements: consistent mass, bending, tension, rotational end springs.
+"""Modes of a hanger as its state alone has it: the bar and its turnbuckles on rotational springs.
 
-Each node carries a deflection and a slope; the deflections of both ends are held. Element
-matrices: J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6, 11.3 and 15.2.
-The hanger is pieces of uniform section: the bar and its turnbuckles.
+The elements are those of `bar`, on a mesh that does not depend on the tension: finer, as there are
+no places at which effects act.
 """
 
 from __future__ import annotations
@@ -13,10 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import diags_array
 from scipy.sparse.linalg import eigsh
 
 from shm.errors import UsageError
+from shm.simulate.bar.description import Piece, pieces_of
+from shm.simulate.bar.mesh import assembled, interpolation, mass_of, stiffness_of
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
@@ -26,12 +27,6 @@ _LEAST_ELEMENTS = 320
 _ELEMENTS_PER_MODE = 8
 _ELEMENTS_PER_EXACT_MODE = 32
 _LEAST_ELEMENTS_A_PIECE = 16
-
-# Element matrices over deflection, slope, deflection, slope, for an element of size 1.
-_BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float)
-_TENSION = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / 30
-_MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) / 420
-_CLOSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +47,7 @@ class PlaneModes:
 
     def at(self, x_m: FloatArray) -> FloatArray:
         """Mode shapes at `x_m` (points,): shape (points, modes)."""
-        element = np.clip(np.searchsorted(self.nodes_m, x_m) - 1, 0, len(self.nodes_m) - 2)
-        size = np.diff(self.nodes_m)[element]
-        s = (x_m - self.nodes_m[element]) / size
-        weights = np.array(
-            [1 - 3 * s**2 + 2 * s**3, size * (s - 2 * s**2 + s**3),
-             3 * s**2 - 2 * s**3, size * (s**3 - s**2)]
-        )[..., None]  # fmt: skip
+        element, weights = interpolation(self.nodes_m, x_m)
         left, right = element, element + 1
         values = (
             self.deflection[left],
@@ -66,7 +55,7 @@ class PlaneModes:
             self.deflection[right],
             self.slope[right],
         )
-        return np.asarray(np.sum(weights * np.array(values), axis=0))
+        return np.asarray(np.sum(weights[..., None] * np.array(values), axis=0))
 
 
 def natural_frequencies(hanger: Hanger, state: HangerState, modes: int) -> FloatArray:
@@ -148,26 +137,10 @@ def _spread(elements: int, from_deck: bool, to_arch: bool) -> FloatArray:
 def _matrices(nodes_m: FloatArray, owners: Sequence[Piece], tension_n: float) -> tuple[Any, Any]:
     """Stiffness and mass of the free-free beam, sparse (2 nodes, 2 nodes)."""
     size = np.diff(nodes_m)
-    bending = np.array([piece.bending_stiffness_n_m2 for piece in owners]) / size**3
-    stiffness = _element(bending, _BENDING, size) + _element(tension_n / size, _TENSION, size)
+    bending = np.array([piece.bending_stiffness_n_m2 for piece in owners])
     mass_per_length = np.array([piece.mass_per_length_kg_m for piece in owners])
-    return _assemble(stiffness), _assemble(_element(mass_per_length * size, _MASS, size))
-
-
-def _element(scale: FloatArray, pattern: FloatArray, size: FloatArray) -> FloatArray:
-    """Element matrices (elements, 4, 4) of a pattern for unit size; slopes scale with the size."""
-    one = np.ones_like(size)
-    lengths = np.stack([one, size, one, size], axis=1)
-    return scale[:, None, None] * pattern * lengths[:, :, None] * lengths[:, None, :]
-
-
-def _assemble(elements: FloatArray) -> Any:
-    count = len(elements)
-    unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
-    rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
-    columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
-    shape = (2 * count + 2, 2 * count + 2)
-    return csc_array((elements.ravel(), (rows, columns)), shape=shape)
+    stiffness = stiffness_of(size, bending, 0.0, tension_n)
+    return assembled(stiffness), assembled(mass_of(size, bending, 0.0, mass_per_length, 0.0))
 
 
 def _held(unknowns: int, springs: tuple[float, float]) -> list[int]:
@@ -194,42 +167,3 @@ def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArr
             remedy="Give a larger tension.",
         )
     return squares, vectors * np.sign(vectors[0])
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A part of a hanger of one section."""
-
-    length_m: float
-    bending_stiffness_n_m2: float
-    mass_per_length_kg_m: float
-
-
-def pieces_of(hanger: Hanger, effective_length_m: float) -> Sequence[Piece]:
-    """The pieces from the deck end up at an effective length.
-
-    Turnbuckles keep their length; the bar between them takes up what the effective length differs
-    from the hanger's own, in proportion.
-    """
-    clear = _gaps(hanger)
-    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
-    stretch = 1 + (effective_length_m - hanger.length_m) / sum(clear)
-    found = []
-    for gap, turnbuckle in zip(clear, [*turnbuckles, None], strict=True):
-        if gap > _CLOSED * hanger.length_m:
-            found.append(
-                Piece(gap * stretch, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
-            )
-        if turnbuckle is not None:
-            mass = turnbuckle.mass_kg / turnbuckle.length_m
-            found.append(Piece(turnbuckle.length_m, turnbuckle.bending_stiffness_n_m2, mass))
-    return found
-
-
-def _gaps(hanger: Hanger) -> list[float]:
-    """Lengths of bar below, between and above the turnbuckles."""
-    turnbuckles = sorted(hanger.turnbuckles, key=lambda each: each.x_m)
-    starts = [each.x_m - each.length_m / 2 for each in turnbuckles]
-    ends = [each.x_m + each.length_m / 2 for each in turnbuckles]
-    pairs = zip([0.0, *ends], [*starts, hanger.length_m], strict=True)
-    return [start - end for end, start in pairs]

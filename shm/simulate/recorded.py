@@ -29,7 +29,7 @@ _PULSE_SAMPLES = 2.5
 """Of a half sine whose spectrum is still a third at the highest frequency passed."""
 _PEAK_PASSED = 0.9914
 """Of such a pulse's peak."""
-_SAME_PLACE_M = 1e-6
+_SAME_PLACE_M = 1e-6  # rounding of one number that went two ways
 _ALONE = 2
 """Of the usual places, the one that moves well in the first mode, too."""
 _BEFORE, _SCATTER = 0.04, 0.01

@@ -20,7 +20,7 @@ from shm.simulate.elements import PlaneModes
 from shm.simulate.strikes import Pulse, samples_of
 from shm.values import PLANES, ComplexArray, FloatArray, Plane
 
-_MODES_AT_ONCE = 16
+_MODES_AT_ONCE = 16  # technical: memory of a block against calls
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,9 @@ import scipy.io
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.read import bundle, sidecar_path, write
+from shm.read import bundle, sidecar_path
 from shm.values import Channel, FrequencyResponse, ModalTest, Mode, Recording, ResponsePoint
+from tests.helpers.written import write
 
 SAMPLES = 200
 _SIDECAR = b'hanger = 3\ntemperature_c = 12.0\n[channel.acc_1]\nplane = "transverse"\nx_m = 2.52\n'

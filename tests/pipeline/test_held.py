@@ -11,7 +11,6 @@ import pytest
 from shm.documents import dump
 from shm.errors import NothingThere, UsageError
 from shm.modes_document import modes_document
-from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, Workspace
 from shm.store.checking import check_store
@@ -21,6 +20,7 @@ from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test, put, write_test
+from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
 

@@ -21,10 +21,11 @@ from shm.documents import dump
 from shm.errors import BadInput, WorkerDied
 from shm.modes_document import load_modes as load_modes_here
 from shm.modes_document import modes_document
-from shm.read import FORMATS, Format, apart, bundle, peek_test, read_test, write
+from shm.read import FORMATS, Format, apart, bundle, peek_test, read_test
 from shm.read.apart import asking
 from shm.values import FrequencyResponse, ModalTest, Mode, Recording
 from tests.helpers.taken_over import obey, obeying_readers
+from tests.helpers.written import write
 
 formats = pytest.mark.parametrize("file_format", FORMATS, ids=lambda f: f.name)
 Child = Callable[..., object]

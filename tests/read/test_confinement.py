@@ -17,10 +17,11 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm.read import FORMATS, apart, write
+from shm.read import FORMATS, apart
 from shm.read.apart import confinement
 from shm.values import Recording
 from tests.helpers.taken_over import obey, obeying_readers
+from tests.helpers.written import write
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or platform.machine() not in confinement.CALLS,

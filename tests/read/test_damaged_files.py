@@ -11,8 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shm.errors import BadInput
-from shm.read import FORMATS, Format, peek, read, write
+from shm.read import FORMATS, Format, peek, read
 from shm.values import FrequencyResponse, Recording
+from tests.helpers.written import write
 
 formats = pytest.mark.parametrize("file_format", FORMATS, ids=lambda f: f.name)
 examples = settings(
@@ -51,7 +52,7 @@ def test_damaged_files_raise_nothing_but_bad_input(
 ) -> None:
     """Cut off, overwritten, inserted, repeated: read well or refused, never a crash."""
     path = path_for(file_format, tmp_path)
-    both = file_format.holds_frequency_responses and data.draw(st.booleans(), label="response")
+    both = data.draw(st.booleans(), label="response")
     write(response if both else recording, path)
     path.write_bytes(damaged(path.read_bytes(), data))
     assert is_read_well_or_refused(path)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from shm.read import bundle, sidecar_path, write
+from shm.read import bundle, sidecar_path
 from shm.values import FrequencyResponse, Recording
 from shm_cli.main import run
+from tests.helpers.written import write
 
 
 def shown(capsys: pytest.CaptureFixture[str], *files: Path, code: int = 0) -> str:

@@ -10,8 +10,9 @@ import pytest
 import pyuff
 
 from shm.errors import BadInput
-from shm.read import bundle, peek, peek_test, read, read_test, sidecar_path, write
+from shm.read import bundle, peek, peek_test, read, read_test, sidecar_path
 from shm.values import Channel, FrequencyResponse, Recording
+from tests.helpers.written import write
 
 LOGGED = "MPSTD_Set001_2024_10_08_10_27_07.uff"
 MICROPHONES = ("Sample_UFF58_ascii.uff", "Sample_UFF58b_bin.uff")

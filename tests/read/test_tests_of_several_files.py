@@ -15,9 +15,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shm.errors import BadInput, UsageError
-from shm.read import bundle, holds_test, peek, peek_test, read, read_test, sidecar_path, write
+from shm.read import bundle, holds_test, peek, peek_test, read, read_test, sidecar_path
 from shm.read.limits import Limits, limited
 from shm.values import FrequencyResponse, Recording
+from tests.helpers.written import write
 
 SUFFIXES = (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz")
 

@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from shm.errors import UsageError
 from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
-from shm.simulate.elements import modes_below, pieces_of
+from shm.simulate.bar.description import pieces_of
+from shm.simulate.elements import modes_below
 from shm.values import Hanger, Turnbuckle
 
 MIDDLE = Turnbuckle(x_m=6.0, length_m=0.5, mass_kg=400.0, bending_stiffness_n_m2=5e7)

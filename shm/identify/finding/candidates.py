@@ -22,11 +22,12 @@ from shm.identify.finding.poles import (
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
 
-_LIKE = 0.9
+# judgement: noise moves a mode by less than max_frequency_sd, 0.1 %, from order to order, and poles
+# of noise by percents; 1 - MAC of a mode 20 dB above the noise is 0.01
 FREQUENCY_TOLERANCE = 0.005
 SHAPE_TOLERANCE = 0.1
-_ORDERS_MISSED_AT_MOST = 8
-_FAR = 1e6
+_ORDERS_MISSED_AT_MOST = 8  # judgement: one step of 4 or three of 2 missed
+FAR = 1e6  # of a pair that must not be: far above the cost of any allowed one, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +143,7 @@ def resolved(
 def _double(one: Candidate, other: Candidate, seconds: float) -> bool:
     near = abs(one.frequency_hz - other.frequency_hz) < 1 / seconds
     likeness = abs(np.vdot(one.poles[-1].shape, other.poles[-1].shape)) ** 2
-    return bool(near and likeness > _LIKE)
+    return bool(near and likeness > 1 - SHAPE_TOLERANCE)
 
 
 def _count(sets: Sequence[PoleSet]) -> int:
@@ -204,7 +205,7 @@ def _extended(tracks: list[list[Pole]], poles: list[Pole]) -> list[list[Pole]]:
     cost = mismatch([track[-1] for track in tracks], poles)
     taken = set()
     for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
-        if cost[row, column] < _FAR:
+        if cost[row, column] < FAR:
             tracks[row].append(poles[column])
             taken.add(column)
     return tracks + [[pole] for index, pole in enumerate(poles) if index not in taken]
@@ -224,7 +225,7 @@ def mismatch(
     frequency_cost = np.abs(ratio - 1) / frequency_tolerance
     shape_cost = (1 - likeness) / shape_tolerance
     near = (frequency_cost < 1) & (shape_cost < 1)
-    return np.where(near, frequency_cost + shape_cost, _FAR)
+    return np.where(near, frequency_cost + shape_cost, FAR)
 
 
 def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
@@ -235,6 +236,6 @@ def continued(known: Sequence[Pole], poles: PoleSet) -> list[Pole | None]:
     cost = mismatch(known, candidates, 2 * FREQUENCY_TOLERANCE, 2 * SHAPE_TOLERANCE)
     best: list[Pole | None] = [None] * len(known)
     for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
-        if cost[row, column] < _FAR:
+        if cost[row, column] < FAR:
             best[row] = candidates[column]
     return best

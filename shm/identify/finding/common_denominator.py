@@ -22,7 +22,7 @@ from shm.values import ComplexArray, FloatArray, IntArray
 
 _GUARD = 1.15
 """The circle of z is this much longer than a part of the band: its ends do not meet."""
-_MIXES = 6
+_MIXES = 6  # judgement: as many sums as a part sees modes; further ones are noise
 _LONGEST_STEP = 0.5
 """Of ln z in Newton's method, where the whole circle is 2 pi long."""
 _RIDGE = 1e-14

@@ -30,15 +30,17 @@ from shm.identify.finding.stabilise import final_orders, nothing_moves, stabilis
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray, IntArray
 
+# judgement: a share of 8 Hz holds a mode or two a plane. With _OVERLAP on both
+# sides 40 lines are 100, enough for an order of 40 by _LINES_AN_ORDER
 _MOST_PARTS = 13
 _LINES_A_SHARE = 40
 _OVERLAP = 0.75
 """A part reaches so far into its neighbours, in shares."""
-_MAX_ORDER = 36
-_ORDER_STEP = 3
-_LEAST_ORDER = 6
+# judgement: a part sees six modes with its neighbours' ends, and six times as many poles leave room
+# for noise; eleven orders tell what stays; from two lines an order on noise is averaged
+_MAX_ORDER, _ORDER_STEP, _LEAST_ORDER = 36, 3, 6
 _LINES_AN_ORDER = 2.5
-_LEAST_FORCE = 1e-6
+_LEAST_FORCE = 1e-6  # judgement: 120 dB below the largest is rounding
 _CONFIRMED = 0.5
 """The two constraints put a true pole this near, as a share of its distance from the axis."""
 

@@ -43,15 +43,17 @@ from shm.values import FloatArray
 _NOBODY_HIT = 2.0
 """The chance in ambient motion moves a frequency more than noise does a ring-down's: so many times
 the largest standard deviation of a hammer test are taken."""
+# judgement: rows are channels times lags and cost their cube; twice _MAX_ORDER of them fix a model,
+# and 60 lags are a quarter second, half a period of the lowest mode
 _ROWS = 240
 _BLOCK_ROWS = (60, 120)
+_MOST_ROWS = 640
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
-_MOST_ROWS = 640
-_REFERENCES = 4
-_MAX_ORDER = 120
-_COARSE_FROM = 60
-_LEAST_ORDER = 2
+_REFERENCES = 4  # judgement: two planes, and two modes that are close in each
+_MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hanger has below 100 Hz
+_COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
+_LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
 """Singular values below this share of the first are zero but for rounding."""
 _MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level

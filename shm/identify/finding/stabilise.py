@@ -13,7 +13,7 @@ from shm.identify.finding.poles import PoleSet
 from shm.identify.finding.repeats import LEAST_HITS, find_again, proven
 from shm.identify.options import IdentifyOptions
 
-_FINAL_ORDERS = 5
+_FINAL_ORDERS = 5  # judgement: the median of five bears two strays; each costs a fit a hit
 
 
 def final_orders(orders: Sequence[int]) -> list[int]:

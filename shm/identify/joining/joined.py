@@ -16,8 +16,9 @@ import scipy
 from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
+from shm.identify.finding.candidates import FAR
 from shm.identify.finding.poles import modal_assurance
-from shm.identify.finding.repeats import FREQUENCY_FLOOR
+from shm.identify.finding.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.joining.products import (
     Shapes,
     hammer_roves,
@@ -32,13 +33,11 @@ from shm.identify.options import IdentifyOptions
 from shm.identify.placing.planes import transverse_share
 from shm.values import NAN, PLANES, FloatArray, ResponsePoint
 
-_LEAST_SET_UPS = 3
 LARGEST_SHIFT = 0.002
 """A mode's frequency differs by less than this fraction from set-up to set-up."""
-LEAST_LIKENESS = 0.25
+LEAST_LIKENESS = 0.25  # judgement: MAC of 60 degrees; the other plane's mode is at 90
 _SEEN = 0.01
 """Share of a shape's energy that points must hold to say anything of it."""
-_NEVER = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +211,7 @@ def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
         return float(values[0]), float(sds[0])
     if np.all(np.isnan(sds)):
         scatter = float(np.std(values, ddof=1)) / np.sqrt(count) * _widening(count)
-        return float(np.mean(values)), scatter if count >= _LEAST_SET_UPS else NAN
+        return float(np.mean(values)), scatter if count >= LEAST_HITS else NAN
     own = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
     own = np.maximum(own, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
     between = _between(values, own)
@@ -276,7 +275,7 @@ def _take_in(groups: list[list[Seen]], modes: Sequence[Seen]) -> None:
     joined = {
         int(row): int(column)
         for row, column in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True)
-        if cost[row, column] < _NEVER
+        if cost[row, column] < FAR
     }
     for row, mode in enumerate(modes):
         if row in joined:
@@ -293,7 +292,7 @@ def _cost(group: Sequence[Seen], mode: Seen) -> float:
     shift = abs(mode.mode.frequency_hz / _frequency(group) - 1)
     likeness = float(np.mean([_likeness(member, mode) for member in group]))
     if shift > LARGEST_SHIFT or likeness < LEAST_LIKENESS:
-        return _NEVER
+        return FAR
     return shift / LARGEST_SHIFT + 1 - likeness
 
 

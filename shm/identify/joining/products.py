@@ -196,6 +196,7 @@ def _share(
     return np.asarray(np.sign(largest[:, 0]) * np.linalg.norm(part, axis=1))
 
 
+# technical: until the shapes stand still far below their standard deviations, 1e-4 at best
 _MOST_ROUNDS = 200
 _TOLERANCE = 1e-9
 

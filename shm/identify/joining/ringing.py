@@ -28,7 +28,6 @@ from shm.values import BoolArray, ComplexArray, FloatArray, FrequencyResponse
 
 _RIDGE = 1e-12
 """Keeps modes that the ring-down is too short to tell apart from growing against each other."""
-_ROUNDING_ONLY = 1e-12
 _AROUND_BAND = 0.02
 """Lines this fraction beyond the band are fitted too, for modes at its edges."""
 
@@ -196,7 +195,7 @@ def _fitted(
     wanted = np.hstack([response.accelerance[:, band].real, response.accelerance[:, band].imag])
     scale = np.maximum(np.linalg.norm(stacked, axis=1, keepdims=True), np.finfo(float).tiny)
     stacked /= scale
-    gram = stacked @ stacked.T + _ROUNDING_ONLY * np.eye(len(stacked))
+    gram = stacked @ stacked.T + _RIDGE * np.eye(len(stacked))
     factors = np.linalg.solve(gram, stacked @ wanted.T)
     return np.asarray(factors.T @ (basis / scale))
 

@@ -33,8 +33,8 @@ from shm.values import PLANES, FloatArray, ResponsePoint
 
 _MOST_TURN = 0.1
 """Radians: shapes that noise turns by more (as a standard deviation) have no direction."""
-_UNKNOWN_TURN = math.pi / 4
-_ALIKE = 0.5
+_UNKNOWN_TURN = math.pi / 4  # nothing is farther from the nearer of two axes
+_ALIKE = 0.5  # MAC: less than 45 degrees apart
 _OTHER = dict(zip(PLANES, reversed(PLANES), strict=True))
 
 

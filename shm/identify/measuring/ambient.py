@@ -18,6 +18,8 @@ from shm.identify.measuring.points import point_of
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, FloatArray, Recording
 
+# Student's 95 % quantile is 1.05 times the normal one with 20 parts, 1.15 with 8: more parts would
+# only be shorter, fewer leave the standard deviations vague
 MOST_PARTS = 20
 LEAST_PARTS = 8
 LEAST_PERIODS = 10

@@ -16,16 +16,16 @@ from scipy.fft import next_fast_len, rfft
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
 
-BAND_MARGIN = 1.25
-MOST_LINES = 8192
+BAND_MARGIN = 1.25  # both flanks of a mode at the edge, and within 2.56/2 of the thinned signals
+MOST_LINES = 8192  # judgement: 65 s of a band of 100 Hz, more than crews wait between hits
 END_LEVEL = 0.01
 """A ring-down that is above this share at the end of its window gets an exponential one."""
 _TINY = np.finfo(float).tiny
-RATE_OVER_BAND = 2.56
+RATE_OVER_BAND = 2.56  # of any analyser: 1/2.56 of the rate is flat behind its anti-alias filter
 _HALF_LENGTH = 16
 """Of the filter, in samples of its output: what folds into the band is 90 dB down."""
-_KAISER_BETA = 9.0
-_LEAST_SAMPLES = 64
+_KAISER_BETA = 9.0  # 0.1102 (90.4 dB - 8.7): J. F. Kaiser (1974)
+LEAST_SAMPLES = 64  # judgement: 25 periods of the highest mode; fewer have no order to stabilise
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ _ESTIMATORS: dict[str, Callable[[ComplexArray, FloatArray, FloatArray], ComplexA
 
 def least_seconds(band_high_hz: float) -> float:
     """The shortest signal that leaves enough samples for an identification."""
-    return (_LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
+    return (LEAST_SAMPLES + 4 * _HALF_LENGTH) / (RATE_OVER_BAND * band_high_hz)
 
 
 def filter_reach(sampling_rate_hz: float, band_high_hz: float) -> tuple[int, int]:

@@ -9,11 +9,14 @@ import scipy
 
 from shm.values import FloatArray
 
+# judgement: normal noise reaches 5 sigmas once in a million samples, mains and steps of a converter
+# somewhat more; a second blow is sought only where one has struck, so that less may count
 HIT_SIGMAS = 10.0
 DOUBLE_SIGMAS = 8.0
+# judgement: crews' hits differ by a factor of two or three; a tenth is the hammer put down
 LEAST_SHARE_OF_HARDEST = 0.1
-DOUBLE_SHARE = 0.02
-PULSE_SECONDS = 0.006
+DOUBLE_SHARE = 0.02  # judgement: drives the response by 2 %, what one hit's scatter hides
+PULSE_SECONDS = 0.006  # judgement: soft tips on steel push for 3 to 5 ms, hard ones for 1 to 2
 GROUP_SECONDS = 0.5
 """Peaks closer than this are one swing of the hammer, not two hits."""
 RINGING = 0.4
@@ -23,6 +26,7 @@ RINGING_SAMPLES = 16
 _REACH, _STEPS = 12, 33
 """Samples to either side from which a peak between samples is interpolated, and at how many places.
 """
+# judgement: forty pulses long, so that a hit does not move its median; drift is slower
 _BASELINE_SECONDS = 0.25
 _BASELINE_SAMPLES = 64
 

@@ -12,16 +12,15 @@ import numpy as np
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Measurement
-from shm.identify.measuring.frf import band_limited
+from shm.identify.measuring.frf import LEAST_SAMPLES, band_limited
+from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray, FrequencyResponse
 
-_LEAST_SAMPLES = 64
-_MOST_SAMPLES = 16_000
+_MOST_SAMPLES = 16_000  # judgement: a minute at 256 Hz, in which all modes have rung down
 _MOST_SAMPLES_ROVING = 1_000
 """Points measured one after the other differ by some 1e-4 in frequency. This many samples, some 500
 periods of the highest mode, are too few to tell that apart, and enough for damping."""
-_START_SAMPLES = 16
 _USED_SHARE = 0.8
 """The end of an inverse transform holds what leaked ahead of the hit."""
 
@@ -38,7 +37,7 @@ def measurement_of_responses(
     merged, dropped = _merged(responses, options)
     most_samples = _MOST_SAMPLES if len(responses) == 1 else _MOST_SAMPLES_ROVING
     decay, rate = _impulse_responses(merged, options, most_samples)
-    if not merged.points or decay.shape[1] < _LEAST_SAMPLES:
+    if not merged.points or decay.shape[1] < LEAST_SAMPLES:
         raise NotIdentifiable(
             "no frequency response with enough finite lines in the band.",
             file=responses[0].source,
@@ -104,8 +103,8 @@ def _impulse_responses(
     # Lines outside of the band, such as H1's 0/0 at zero frequency, may be unknown: they count 0.
     known = np.where(np.isfinite(response.accelerance), response.accelerance, 0)
     impulse = np.fft.irfft(known, n=2 * (known.shape[1] - 1), axis=1)
-    used = impulse[:, _START_SAMPLES : int(_USED_SHARE * impulse.shape[1])]
-    if used.shape[1] < _LEAST_SAMPLES:
+    used = impulse[:, RINGING_SAMPLES : int(_USED_SHARE * impulse.shape[1])]
+    if used.shape[1] < LEAST_SAMPLES:
         return used, rate
     decay, rate = band_limited(used, rate, options.band_high_hz)
     return decay[:, :most_samples], rate

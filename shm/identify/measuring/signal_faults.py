@@ -39,28 +39,33 @@ OUTLIER = "outlier: its response is unlike that of the other hits"
 _SURPRISE = 5.0
 """Of 7,114 ring-downs of 110 sound simulated tests, 20 to 60 dB above noise, none was above 3.1; of
 92 with a cable fault in 23 tests, none below 9."""
+# identify_limits.py (docs/trials/identification_benchmarks.md): in sound tests the offset moves by
+# 0.07 of the ringing at most, a channel by 0.59 of the median one at least; the rest is judgement
 _OFFSET_SECONDS = 0.5
 _OFFSET_MOVES = 2.0
 _SILENT_SHARE = 1e-3
-_COPY_SAMPLES = 256
-LEAST_REPEATS = 3
+_COPY_SAMPLES = 256  # noise in the last bit alone makes as many alike once in 2^256
+LEAST_REPEATS = 3  # judgement: a crest may hold two equal samples
 FULL_SCALE_SHARE = 0.999
 """A converter's largest code lies below its full scale: by 1/2048 of it for 12 bits."""
-FROZEN_SAMPLES = 16
+FROZEN_SAMPLES = 16  # judgement: 8 ms at 2 kHz; shorter gaps are `surprise`'s
+# Crests have 3 to 4 times as many at the top (`_is_crowded`), clipped tests 40 and more: as above
 _LEVELS_BELOW = 10
 _TOP = 200
 _CROWDED = 8.0
-_MOVES = 30.0
+_MOVES = 30.0  # judgement: three times the nine levels about a crest, see `_stands_still`
 _FINE = 4000.0
 """Levels up to the peak: forces of hits differ by tens of percent, a thousand levels, so that two
 are hardly the same by chance."""
 _ORDER = 128
 """Two for each mode that a channel sees, aliased ones too; 64 left sound tests of long hangers with
 errors 8 times those around them."""
+# judgement: four rows a coefficient from each hit; a fault shorter than a block is still seen, and
+# 25 blocks about it tell what is usual
 _FIT_SAMPLES = 600
 _BLOCK = 16
 _AROUND = 25
-_RIDGE = 1e-9
+_RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordings
 
 
 def faults_of_channels(

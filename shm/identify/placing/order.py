@@ -37,17 +37,18 @@ STRING_TOLERANCE = 0.3
 """How far sqrt(T/m)/(2 L) strays from the description (log): tension 0.55 to 1.8 of nominal."""
 UNIT_TOLERANCE = 0.15
 """How far sqrt(EI/m)/(2 pi L^2) strays from the description (log): length, strands' stiffness."""
+# judgement: two missing orders cost as much as a mode off by 2.6 (2) tolerances
 MISSING_COST = 3.5
 MISSING_COST_DESCRIBED = 2.0
 """Of an order without a mode; less where the description says which orders the modes have."""
-_LEVEL = 0.008
-_AROUND = 0.9
-_TENSIONS_AROUND = 1.2
-_BELOW, _ABOVE = 3.0, 0.5
-_TAIL = 5.0
+_LEVEL = 0.008  # the nearest level is off by a third of a tolerance at most, a cost of 0.1
+_AROUND = 0.9  # three times STRING_TOLERANCE
+_TENSIONS_AROUND = 1.2  # 3.6 times hypot(STRING_TOLERANCE, UNIT_TOLERANCE), the sd of log xi
+_BELOW, _ABOVE = 3.0, 0.5  # judgement: lowest mode of order 20 at most, or 1.6 times low
+_TAIL = 5.0  # judgement: degrees of freedom; at three deviations 5.1 instead of 9
 MOST_ASIDE = 0.4
 """Share of the modes that may be set aside before description and pattern are doubted."""
-_FREE = 2
+_FREE = 2  # level and xi: two frequencies fit some beam
 
 Orders: TypeAlias = tuple[tuple[int | None, ...], ...]
 Basis: TypeAlias = Literal["description", "pattern", "counting"]
@@ -181,8 +182,8 @@ def _heavy_tailed(deviation: FloatArray) -> FloatArray:
     return np.asarray(_TAIL * np.log1p(deviation**2 / _TAIL))
 
 
-_SECTIONS = 1201
-_SPRING = 2
+_SECTIONS = 1201  # technical: 20 a half wave of HIGHEST_ORDER
+_SPRING = 2  # of the fixities, 0.5
 
 
 def turnbuckle_shift(hanger: Hanger) -> tuple[float, ...]:

@@ -14,6 +14,8 @@ CLOSE = 0.02
 """Two modes nearer than this fraction cannot be neighbours in one plane of a hanger."""
 LEAST_SHARE = 0.2
 """Of the energy that a mode must have in a plane to be moved there."""
+# Directions of n modes by chance agree so far with probability exp(-0.49 n): 14 % of 4, 0.7 % of 10
+# (Rayleigh). judgement: a quarter in a plane is one mode of four
 _LEAST_MODES = 4
 _LEAST_AGREEMENT = 0.7
 _LEAST_IN_A_PLANE = 0.25

@@ -10,7 +10,7 @@ from shm.identify.contract import Finding, Hit, Measurement, Tone
 from shm.identify.options import IdentifyOptions
 from shm.values import QualityCheck, Recording
 
-_MOST_TOLD = 4
+_MOST_TOLD = 4  # technical: of a sentence that can be read
 
 
 @dataclass(frozen=True, eq=False)

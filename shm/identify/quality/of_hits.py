@@ -20,7 +20,7 @@ _RUNG_DOWN_DB = -3.0
 """Above it less than a third of a time constant is seen: damping rests on a small difference."""
 _LEAST_FORCE_DB = -20.0
 """Usual in impact testing (Ewins 2000, 3.4): a tenth of the force still excites."""
-_LONGEST_PULSE_S = 0.05
+_LONGEST_PULSE_S = 0.05  # judgement: ten soft pulses; what follows is noise in the spectrum
 _TRANSFORM_S = 1.0
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from shm.identify.contract import Hit, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
+from shm.identify.measuring.screening import LEAST_SAMPLES
 from shm.identify.measuring.signal_faults import (
     CABLE,
     CLIPPED,
@@ -36,13 +37,13 @@ _PULSES = 5.0
 _REFUSED_DB = 6.0
 """Two half-second stretches of one noise differ by 1.2 dB (a band of 100 Hz has 50 independent
 values in each); the best of 16 channels, over the quietest of several stretches, by up to 4."""
-_WARNING_DB = 20.0
+_WARNING_DB = 20.0  # from there the benchmark counts a mode as one to be found
 _STILL_DB = 1.0
 _MOST_DB = 200.0
 """More than any converter resolves: what stands higher is computed, not measured."""
+# judgement: lines of 2 Hz, so that the lowest mode is seen; a fifth still tells loud from quiet
 _STRETCH_S = 0.5
 _LEAST_STRETCH_S = 0.1
-_LEAST_SAMPLES = 32
 
 
 def clipping(inspection: Inspection) -> QualityCheck | None:
@@ -191,7 +192,7 @@ def _power(
     """Mean square in the band of half a second, the first or the last of a stretch, (channels,)."""
     rate, options = record.sampling_rate_hz, inspection.options
     length = min(stop - first, int(_STRETCH_S * rate))
-    if length < max(_LEAST_STRETCH_S * rate, _LEAST_SAMPLES):
+    if length < max(_LEAST_STRETCH_S * rate, LEAST_SAMPLES):
         return None
     begin = stop - length if last else first
     cut = np.array([c.values[begin : begin + length] for c in record.accelerations])

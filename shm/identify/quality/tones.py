@@ -17,7 +17,7 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from shm.identify.contract import Hit, Measurement, Tone
-from shm.identify.measuring.frf import RATE_OVER_BAND
+from shm.identify.measuring.frf import LEAST_SAMPLES, RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.measuring.signal_faults import thinned
 from shm.identify.options import IdentifyOptions
@@ -26,22 +26,25 @@ from shm.values import BoolArray, Channel, ComplexArray, FloatArray, QualityChec
 
 _PROMINENCE = 30.0
 """Noise averaged over one channel reaches 14 times its median once in 10,000 lines."""
-_FLOOR_LINES = 201
+_FLOOR_LINES = 201  # 12 widths, as below, of a tone over the whole record: 4/T, 4 lines each
 _FLOOR_WIDTHS = 12.0
 """A stretch of T seconds smears a tone over 4 / T Hz. Where ring-downs are short, 201 lines hold
 nothing but the tone: then its floor is the median of three times that."""
+# identify_limits.py: planted tones are steady by 0.91 and more and change by 0.38 and less, other
+# narrow lines by up to 0.83 and by 0.24 and more. Neither limit parts them, both do but for 3 of
+# 400 sound tests (docs/trials/identification_benchmarks.md); where within is judgement
 _STEADY = 0.6
 _SAME_BEFORE = 0.3
 _FAINTLY_STEADY = 0.3
 _SURELY_SAME_BEFORE = 0.15
 """A mode next to a tone unsteadies it in the ring-downs, not before the first hit."""
-_MAY_BE_SAME_BEFORE = 0.75
-_STEADY_UNSEEN_BEFORE = 0.9
+_MAY_BE_SAME_BEFORE = 0.75  # judgement: looser, as lines lie beside the tone
+_STEADY_UNSEEN_BEFORE = 0.9  # of a tone 10 dB above the noise: 1/(1 + 0.1)
 _LOCKED_TO_HITS = 0.6
 """Of three to five hits, the phases of a mode agree at one frequency near its own by chance."""
-_STEADY_IN_BAND = 0.3
-_MOST_CANDIDATES = 100
-_LEAST_TRANSFORM = 65536
+_STEADY_IN_BAND = _STEADY / 2  # judgement: a machine that is named needs less proof
+_MOST_CANDIDATES = 100  # technical: time; tones are among the strongest lines
+_LEAST_TRANSFORM = 65536  # technical: a fine grid of short records
 _MAINS_TOLERANCE = 0.004
 """A grid's frequency moves by 0.2 Hz in 50 in a bad hour."""
 
@@ -212,8 +215,8 @@ def _name(frequency_hz: float, options: IdentifyOptions) -> str:
     return "a machine"
 
 
-_LEAST_BEFORE_S = 0.25
-_LEAST_SAMPLES = 64
+_LEAST_BEFORE_S = 0.25  # judgement: lines of 4 Hz; of half a second that crews are told to record
+# judgement: n random phases are steady by 1/n; three leave a mode below _STEADY, 12 surely
 _FEW_SEGMENTS = 3
 _SEGMENTS_WITHOUT_HITS = 12
 
@@ -274,7 +277,7 @@ def stretches(
         if hit is None
         else replace(_stretch(signals, a, b), hit=hit.start / factor, force_n=abs(hit.peak_force_n))
         for (a, b), hit in zip(spans, struck, strict=True)
-        if b - a >= _LEAST_SAMPLES
+        if b - a >= LEAST_SAMPLES
     )
     quiet = starts[0] - margin if starts else 0
     known = quiet >= _LEAST_BEFORE_S * rate

@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from shm.errors import BadInput
 
 BEGUN = b"+"
-LENGTH_BYTES = 8
+LENGTH_BYTES = 8  # technical: of a whole number of 64 bits
+# judgement: 33 MB, more than any list of modal tests; arrays do not count
 LARGEST_HEADER = 1 << 25
 _DTYPES = ("<f8", "<c16")
+# judgement: far above a refusal (2,000 characters) or a path (4,096)
 _LONGEST_TEXT = 100_000
-_LARGEST_WHOLE = 2**53
+_LARGEST_WHOLE = 2**53  # beyond, numbers of double precision leave out whole ones
 
 T = TypeVar("T")
 

@@ -37,9 +37,9 @@ ARRAYS_AT_ONCE = 2
 """The arrays of an answer may be so many times what is read at once."""
 WALL_SECONDS = 3.0
 """A child may take so many times its processor time: beyond, it waits for something."""
-_GRACE_S = 5.0
-_START_S = 120.0
-_UNCONFINED_S = 60.0
+# judgement: ending a child takes milliseconds, starting the reader seconds, far longer on a full
+# machine; what a kernel refuses is not mended within the minute
+_GRACE_S, _START_S, _UNCONFINED_S = 5.0, 120.0, 60.0
 _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from shm.read.apart.serving import serve; serve()"

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+# judgement: a reader opens a file, its sidecar and modules, one after the other; far below 1024
 _OPEN_FILES = 64
 _LIBRARIES = ("/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/share/zoneinfo", "/etc/localtime")
 _DEVICES = ("/dev/null", "/dev/urandom")
@@ -41,6 +42,7 @@ _NO_LANDLOCK = {
     errno.EPERM: "a filter around this process, as of a container, forbids it",
 }
 
+# linux/prctl.h, linux/seccomp.h
 _NO_NEW_PRIVILEGES, _SET_SECCOMP, _FILTER = 38, 22, 2
 
 # What reading needs, by number on each machine (asm/unistd_64.h, asm-generic/unistd.h): looking

@@ -19,6 +19,7 @@ from shm.errors import BadInput
 from shm.modes_document import parse_modes
 from shm.read.apart.answers import Answer, Refused, refusal_of, value_of
 from shm.read.apart.asking import Request, ask
+from shm.read.assemble import LARGEST
 from shm.read.base import Peek
 from shm.read.bundles import holds_test
 from shm.read.content import is_gzipped
@@ -107,10 +108,9 @@ def _believed(path: Path) -> Iterator[None]:
         ) from error
 
 
-_LARGEST = 1e9
-_LARGEST_HANGER = 2**31
-_FASTEST_HZ = 1e9
-_EVEN = 1e-6
+_LARGEST_HANGER = 2**31  # a column of PostgreSQL's type integer
+_FASTEST_HZ = 1e9  # judgement: a thousand times the fastest converter for vibrations
+_EVEN = 1e-6  # judgement: readers make even grids, so that only rounding is allowed for
 
 
 def refuse_unsound(
@@ -162,7 +162,7 @@ def _refuse_channel(channel: Channel) -> None:
         raise ValueError("a channel has no name, no place or no scale")
     # Not the absolute values: those would be a copy of everything.
     least, most = np.fmin.reduce(channel.values), np.fmax.reduce(channel.values)
-    if not (least >= -_LARGEST and most <= _LARGEST):
+    if not (least >= -LARGEST and most <= LARGEST):
         raise ValueError(f"channel {channel.name} holds no number, or impossible ones")
 
 

@@ -28,7 +28,7 @@ from shm.read.limits import Limits, limited, limits, too_large
 from shm.read.sidecar import sidecar_path
 from shm.read.whole_test import load_modes, peek_test, read_test
 
-_LARGEST_REQUEST = 1 << 16
+_LARGEST_REQUEST = 1 << 16  # three paths of PATH_MAX, 4096 bytes, thrice as long in JSON
 
 
 def serve() -> None:

@@ -1,9 +1,9 @@
 """Nodes of a bar (where its section changes, at special places, crowded towards thin layers), and
 its element: two-node Timoshenko with exact static shape functions, in tension.
 
-J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6; A. W. Friedman and J. B.
-Kosmatka, An improved two-node Timoshenko beam finite element, Computers & Structures 47 (1993).
-Without shear it is the Hermite element. The integrals of products of polynomials are Gauss sums.
+J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 5.6, 11.3 and 15.2; A. W. Friedman
+and J. B. Kosmatka, An improved two-node Timoshenko beam finite element, Computers & Structures 47
+(1993). Without shear it is the Hermite element.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from shm.simulate.bar.description import Bar
 from shm.values import FloatArray, IntArray
@@ -24,8 +26,6 @@ _APART = 1 / 4000  # of the length: a place closer to a node has none of its own
 _ELEMENTS_A_LAYER = 8
 _GROWTH = 1.7
 _TABLE = 2001
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-_S, _W = (_POINTS + 1) / 2, _WEIGHTS / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,21 +155,44 @@ def _layer_m(bar: Bar) -> float:
     return math.sqrt(min(bar.bending_stiffness_n_m2) / bar.tension_n)
 
 
+# The matrices of both books over deflection, rotation, deflection, rotation, for an element of size
+# 1: without shear, then what phi = 12 EI/(kappa G A h^2) and its square add.
+_DIFFERENCE = np.array([[1, 0, -1, 0], [0, 0, 0, 0], [-1, 0, 1, 0], [0, 0, 0, 0]], float)
+_TWIST = np.array([[0, 0, 0, 0], [0, 1, 0, -1], [0, 0, 0, 0], [0, -1, 0, 1]], float)
+_BENDING = (
+    np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], float),
+    _TWIST,
+)
+_SLOPES = (
+    np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / 30,
+    2 * _DIFFERENCE + _TWIST / 6,
+    _DIFFERENCE + _TWIST / 12,
+)
+_DEFLECTIONS = tuple(
+    np.array(rows) / 420
+    for rows in (
+        [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]],
+        [[294, 38.5, 126, -31.5], [38.5, 7, 31.5, -7],
+         [126, 31.5, 294, -38.5], [-31.5, -7, -38.5, 7]],
+        [[140, 17.5, 70, -17.5], [17.5, 3.5, 17.5, -3.5],
+         [70, 17.5, 140, -17.5], [-17.5, -3.5, -17.5, 3.5]],
+    )
+)  # fmt: skip
+_ROTATIONS = (
+    _SLOPES[0],
+    np.array([[0, -15, 0, -15], [-15, 5, 15, -5], [0, 15, 0, 15], [-15, -5, 15, 5]]) / 30,
+    np.array([[0, 0, 0, 0], [0, 10, 0, 5], [0, 0, 0, 0], [0, 5, 0, 10]]) / 30,
+)
+_AREA = np.array([1 / 2, 1 / 12, 1 / 2, -1 / 12])
+
+
 def stiffness_of(
     size_m: FloatArray, bending_n_m2: FloatArray, shear_compliance_1_n: float, tension_n: float
 ) -> FloatArray:
     """Stiffness (elements, 4, 4) over deflection, rotation, deflection, rotation."""
     phi = 12 * bending_n_m2 * shear_compliance_1_n / size_m**2
-    h, one = size_m, np.ones_like(size_m)
-    rows = [
-        [12 * one, 6 * h, -12 * one, 6 * h],
-        [6 * h, (4 + phi) * h**2, -6 * h, (2 - phi) * h**2],
-        [-12 * one, -6 * h, 12 * one, -6 * h],
-        [6 * h, (2 - phi) * h**2, -6 * h, (4 + phi) * h**2],
-    ]
-    bent = np.moveaxis(np.array(rows), -1, 0) * (bending_n_m2 / h**3 / (1 + phi))[:, None, None]
-    slopes = _slopes(h, phi)
-    return np.asarray(bent + tension_n * _gram(slopes, h))
+    bent = _elements(bending_n_m2 / size_m**3 / (1 + phi), _BENDING, phi, size_m)
+    return bent + _elements(tension_n / size_m / (1 + phi) ** 2, _SLOPES, phi, size_m)
 
 
 def mass_of(
@@ -181,72 +204,33 @@ def mass_of(
 ) -> FloatArray:
     """Consistent mass with rotary inertia, (elements, 4, 4)."""
     phi = 12 * bending_n_m2 * shear_compliance_1_n / size_m**2
-    moved = _gram(_deflections(size_m, phi), size_m) * mass_per_length_kg_m[:, None, None]
+    scale = 1 / (1 + phi) ** 2
+    moved = _elements(mass_per_length_kg_m * size_m * scale, _DEFLECTIONS, phi, size_m)
     if rotary_inertia_kg_m == 0:
-        return np.asarray(moved)
-    return np.asarray(moved + rotary_inertia_kg_m * _gram(_rotations(size_m, phi), size_m))
+        return moved
+    return moved + _elements(rotary_inertia_kg_m / size_m * scale, _ROTATIONS, phi, size_m)
 
 
-def load_of(
-    size_m: FloatArray, bending_n_m2: FloatArray, shear_compliance_1_n: float
+def load_of(size_m: FloatArray) -> FloatArray:
+    """The integral of the deflection, (elements, 4); shear does not change it."""
+    one = np.ones_like(size_m)
+    return np.asarray(_AREA * size_m[:, None] * np.stack([one, size_m, one, size_m], axis=1))
+
+
+def _elements(
+    scale: FloatArray, patterns: Sequence[FloatArray], phi: FloatArray, size_m: FloatArray
 ) -> FloatArray:
-    """The integral of the deflection, (elements, 4)."""
-    phi = 12 * bending_n_m2 * shear_compliance_1_n / size_m**2
-    return np.asarray(np.einsum("p,epi,e->ei", _W, _deflections(size_m, phi), size_m))
+    """Element matrices (elements, 4, 4) of patterns by powers of phi, rotations times the size."""
+    one = np.ones_like(size_m)
+    lengths = np.stack([one, size_m, one, size_m], axis=1)
+    pattern = sum(phi[:, None, None] ** power * each for power, each in enumerate(patterns))
+    return np.asarray(scale[:, None, None] * pattern * lengths[:, :, None] * lengths[:, None, :])
 
 
-def _gram(functions: FloatArray, size_m: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("p,epi,epj,e->eij", _W, functions, functions, size_m))
-
-
-def _deflections(h: FloatArray, phi: FloatArray) -> FloatArray:
-    """Shape functions of the deflection at the Gauss points, (elements, points, 4)."""
-    s, p, h = _S, phi[:, None], h[:, None]
-    return np.asarray(
-        np.stack(
-            [
-                1 - 3 * s**2 + 2 * s**3 + p * (1 - s),
-                h * (s - 2 * s**2 + s**3 + p / 2 * (s - s**2)),
-                3 * s**2 - 2 * s**3 + p * s,
-                h * (s**3 - s**2 - p / 2 * (s - s**2)),
-            ],
-            axis=-1,
-        )
-        / (1 + p)[..., None]
-    )
-
-
-def _slopes(h: FloatArray, phi: FloatArray) -> FloatArray:
-    """Derivatives of the deflections by the place."""
-    s, p, h = _S, phi[:, None], h[:, None]
-    one = np.ones_like(h)
-    return np.asarray(
-        np.stack(
-            [
-                (6 * s**2 - 6 * s - p) / h,
-                one * (1 - 4 * s + 3 * s**2 + p / 2 * (1 - 2 * s)),
-                (6 * s - 6 * s**2 + p) / h,
-                one * (3 * s**2 - 2 * s - p / 2 * (1 - 2 * s)),
-            ],
-            axis=-1,
-        )
-        / (1 + p)[..., None]
-    )
-
-
-def _rotations(h: FloatArray, phi: FloatArray) -> FloatArray:
-    """Shape functions of the cross-section's rotation."""
-    s, p, h = _S, phi[:, None], h[:, None]
-    one = np.ones_like(h)
-    return np.asarray(
-        np.stack(
-            [
-                (6 * s**2 - 6 * s) / h,
-                one * (1 - 4 * s + 3 * s**2 + p * (1 - s)),
-                (6 * s - 6 * s**2) / h,
-                one * (3 * s**2 - 2 * s + p * s),
-            ],
-            axis=-1,
-        )
-        / (1 + p)[..., None]
-    )
+def assembled(elements: FloatArray) -> Any:
+    """The sparse matrix (2 nodes, 2 nodes) of element matrices (elements, 4, 4) along a bar."""
+    count = len(elements)
+    unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
+    rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
+    columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
+    return csc_array((elements.ravel(), (rows, columns)), shape=(2 * count + 2, 2 * count + 2))

@@ -16,7 +16,15 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from shm.errors import UsageError
 from shm.simulate.bar.description import Attached, Bar, BarEnd
-from shm.simulate.bar.mesh import Mesh, interpolation, load_of, mass_of, slopes, stiffness_of
+from shm.simulate.bar.mesh import (
+    Mesh,
+    assembled,
+    interpolation,
+    load_of,
+    mass_of,
+    slopes,
+    stiffness_of,
+)
 from shm.values import FloatArray
 
 
@@ -90,7 +98,7 @@ def _matrices(bar: Bar, mesh: Mesh, plane: int) -> tuple[Any, Any]:
         if each.rotary_inertia_kg_m2 and mesh.nodes_m[0] <= each.x_m <= mesh.nodes_m[-1]:
             element, slope = slopes(mesh.nodes_m, each.x_m)
             mass[element] += each.rotary_inertia_kg_m2 * np.outer(slope, slope)
-    return _assembled(stiffness), _assembled(mass)
+    return assembled(stiffness), assembled(mass)
 
 
 def _add_at_points(elements: FloatArray, mesh: Mesh, points: Sequence[tuple[float, float]]) -> None:
@@ -99,14 +107,6 @@ def _add_at_points(elements: FloatArray, mesh: Mesh, points: Sequence[tuple[floa
         if mesh.nodes_m[0] <= x_m <= mesh.nodes_m[-1]:
             element, weights = interpolation(mesh.nodes_m, np.array([x_m]))
             elements[element[0]] += amount * weights @ weights.T
-
-
-def _assembled(elements: FloatArray) -> Any:
-    count = len(elements)
-    unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
-    rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
-    columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
-    return csc_array((elements.ravel(), (rows, columns)), shape=(2 * count + 2, 2 * count + 2))
 
 
 def _diagonal_blocks(blocks: Sequence[Any]) -> Any:
@@ -183,8 +183,7 @@ def _sags(bar: Bar, mesh: Mesh, planes: Sequence[int]) -> FloatArray:
     a_plane = 2 * len(mesh.nodes_m)
     vectors = np.zeros((a_plane * len(planes), len(planes)))
     for number, plane in enumerate(planes):
-        bending = bar.bending_stiffness_n_m2[plane] * mesh.stiffness_factor[plane]
-        loads = load_of(mesh.size_m, bending, bar.shear_compliance_1_n)
+        loads = load_of(mesh.size_m)
         area = np.zeros(a_plane)
         np.add.at(area, 2 * np.arange(len(loads))[:, None] + np.arange(4), loads)
         strength = bar.sag_parameter[plane] * bar.tension_n / bar.length_m**3
@@ -214,7 +213,7 @@ def _tightened(bar: Bar, mesh: Mesh, bent: FloatArray) -> FloatArray:
     for own in range(bent.shape[1]):
         stiff = bending[own] * mesh.stiffness_factor[own]
         tight = stiffness_of(size, stiff, shear, bar.tension_n)
-        blocks.append(_assembled(tight - stiffness_of(size, stiff, shear, 0.0)))
+        blocks.append(assembled(tight - stiffness_of(size, stiff, shear, 0.0)))
     return np.asarray(_diagonal_blocks(blocks) @ bent)
 
 

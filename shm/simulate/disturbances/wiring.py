@@ -11,7 +11,7 @@ from shm.simulate.disturbances.base import Channels, Lines, Planted, Scene
 from shm.values import NAN, FloatArray
 
 T = TypeVar("T")
-_OPEN_CONTACTS = 4
+_OPEN_CONTACTS = 4  # judgement: a loose plug opens more than once while the hanger swings
 
 
 def clipping(made: Lines, scene: Scene, rng: np.random.Generator) -> tuple[Lines, Planted]:

@@ -42,7 +42,9 @@ __all__ = [
 _AT_ENDS = ("deck end", "arch end", "both ends")
 _BY_PLANE = tuple(f", {plane}" for plane in PLANES)
 _AT_ENDS_BY_PLANE = tuple(end + plane for end in _AT_ENDS for plane in ("", *_BY_PLANE))
-_ONE_END_AND_PLANE = tuple(end + plane for end in _AT_ENDS[:2] for plane in _BY_PLANE)
+_ONE_END_AND_PLANE = tuple(
+    end + plane for end in _AT_ENDS if end != "both ends" for plane in _BY_PLANE
+)
 _EVERYWHERE = ("everywhere",)
 _ONE_PLANE = tuple(f"everywhere{plane}" for plane in _BY_PLANE)
 _ALL = (

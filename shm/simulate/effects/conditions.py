@@ -11,7 +11,7 @@ from shm.simulate.effects.base import Range, Scene, Where
 from shm.values import Hanger
 
 Values = Mapping[str, float]
-_STEEL_1_K = 1.2e-5
+_STEEL_1_K = 1.2e-5  # EN 1993-1-1, 3.2.6
 
 
 def warmth_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:

@@ -19,11 +19,13 @@ from shm.simulate.effects.base import Scene
 
 Values = Mapping[str, float]
 
-_LOSS_POINTS = 25
-_PITS = 1.9
-_FULL, _TAPER, _TAPER_POINTS = 0.6, 0.8, 9
-_CLAMP_WIDTH, _CLAMP_RADIUS = 0.15, 0.10
-_SLIP = 0.8
+# Each only has to differ from the catalogue's law and to be possible: the functions say how.
+_LOSS_POINTS, _TAPER_POINTS = 25, 9  # technical: of piecewise linear profiles
+_PITS = 1.9  # judgement: between 1, a loss at the skin of a tube, and 2, a thinner bar
+_FULL, _TAPER = 0.6, 0.8  # 0.6 + 0.8/2 = 1: the compliance of a zone with an edge; judgement else
+_CLAMP_WIDTH, _CLAMP_RADIUS = 0.15, 0.10  # judgement: m, of a clamp about a bar of 0.13 m
+_SLIP = 0.8  # judgement: within 0 to 1, Segalman (2005)
+# Judgement for the mass; 2.76 = (7.853/4.730)^2, the first two modes of a clamped beam
 _SECOND_MODE = (6.0, 2.76)
 
 

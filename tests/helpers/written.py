@@ -1,0 +1,47 @@
+"""Files of every format that is read, also of those that `shm` does not write itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import scipy.io
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+
+from shm.read import write as write_ours
+from shm.read.arrays import Layout, layout_of
+from shm.values import FrequencyResponse, Recording
+
+
+def write(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Writes as `shm.read.write` does, and HDF5, MATLAB and TDMS in the same layout."""
+    known = {".h5": _hdf5, ".hdf5": _hdf5, ".mat": _matlab, ".tdms": _tdms}
+    if path.suffix in known:
+        known[path.suffix](layout_of(described), path)
+    else:
+        write_ours(described, path)
+
+
+def _hdf5(layout: Layout, path: Path) -> None:
+    with h5py.File(path, "w", track_order=True) as file:
+        file.attrs.update(layout.attributes)
+        for array in layout.arrays:
+            file.create_dataset(array.name, data=array.values).attrs.update(array.attributes)
+
+
+def _matlab(layout: Layout, path: Path) -> None:
+    scipy.io.savemat(str(path), layout.flat, long_field_names=True, oned_as="column")
+
+
+def _tdms(layout: Layout, path: Path) -> None:
+    """With what National Instruments' own programs say of a channel: increment and unit."""
+    rate = layout.attributes.get("sampling_rate_hz")
+    timed = {"wf_increment": 1 / rate, "sampling_rate_hz": rate} if isinstance(rate, float) else {}
+    channels = [
+        ChannelObject("test", array.name, array.values, {
+            **{"unit_string" if k == "unit" else k: v for k, v in array.attributes.items()}, **timed
+        })
+        for array in layout.arrays
+    ]  # fmt: skip
+    with path.open("wb") as stream, TdmsWriter(stream) as writer:
+        writer.write_segment([RootObject(layout.attributes), GroupObject("test"), *channels])
