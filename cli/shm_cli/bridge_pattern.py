@@ -42,7 +42,7 @@ def command(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     if as_json:
         show(pattern_json(pattern))
         return
-    for each in pattern_tables(pattern, bars=True):
+    for each in pattern_tables(pattern):
         show_texts(each)
     for sentence in (pattern.sentence, *pattern.remarks):
         click.echo(paragraph(sentence))

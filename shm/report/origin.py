@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from shm.report import words
 from shm.report.content import HangerReport
-from shm.report.table import Table
+from shm.report.paper import Table
 from shm.settings import TABLE
 from shm.values import ModalTest
 

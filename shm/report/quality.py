@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.report import verdicts
-from shm.report.table import Table
+from shm.report.paper import Table
 from shm.values import QualityCheck
 
 

@@ -10,28 +10,23 @@ from shm.report import words
 from shm.report.bridge.tables import shift_table
 from shm.report.content import HangerReport, Interval, TrendRow
 from shm.report.origin import origin, settings
+from shm.report.paper import Table, filled
 from shm.report.quality import quality_table
 from shm.report.shifts import factor, shift_cells
 from shm.report.summary import misfits_percent, of_nominal, tension_change, told_tests
-from shm.report.table import Table
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
 
 
-def tables(data: HangerReport) -> tuple[Table, ...]:
-    """All tables that this report can fill, in reading order."""
-    return (*numbers(data), *origins(data))
-
-
 def numbers(data: HangerReport) -> tuple[Table, ...]:
     """What was found, as far as there is any of it."""
-    return tuple(table for table in (make(data) for make in _NUMBERS) if table.rows)
+    return filled(*(make(data) for make in _NUMBERS))
 
 
 def origins(data: HangerReport) -> tuple[Table, ...]:
     """What it was found from."""
-    return tuple(table for table in (origin(data), settings(data.settings)) if table.rows)
+    return filled(origin(data), settings(data.settings))
 
 
 def tension(data: HangerReport) -> Table:
@@ -83,6 +78,8 @@ def temperatures(data: HangerReport) -> Table:
 
 
 _BESIDE = 2
+_ROWS_SHOWN = 12
+_EARLIER = "... and {} earlier ones (in HTML and JSON)"
 _IRREGULAR = (
     " Not followed: the mode is well off the bar that the others follow, as if the hanger sagged "
     "or had lost section; no tension is inferred from it. For the cause: shm gap diagnose."
@@ -99,7 +96,8 @@ def neighbours(data: HangerReport) -> Table:
     near = tuple(row for row in rows if abs(row.place - place) <= _BESIDE)
     made = shift_table(replace(pattern, rows=near, not_compared=()))
     told = " ".join((pattern.sentence, *pattern.remarks))
-    return replace(made, title=title, note=f"{told} The whole bridge: shm report --bridge.")
+    note = f"{told} The whole bridge: shm report --bridge."
+    return replace(made, title=title, note=note, sketch=())
 
 
 def frequencies(data: HangerReport) -> Table:
@@ -273,7 +271,8 @@ def history(data: HangerReport) -> Table:
         f"Tests{within}, latest first",
         ("time", "test", "temperature", "model", *words.tension_headings(unit)),
         tuple(_history_row(row, unit) for row in reversed(data.trend)),
-    )
+        rest=_EARLIER,
+    ).shortened(_ROWS_SHOWN)
 
 
 def _history_row(row: TrendRow, unit: ForceUnit) -> tuple[str, ...]:
@@ -295,7 +294,8 @@ def alerts(data: HangerReport) -> Table:
         f"Alerts{within}, latest first",
         ("time", "test", "message", "acknowledged"),
         tuple(_alert_row(row, data.acknowledged) for row in reversed(data.alerts)),
-    )
+        rest=_EARLIER,
+    ).shortened(_ROWS_SHOWN)
 
 
 def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:

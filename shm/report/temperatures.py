@@ -9,8 +9,8 @@ import numpy as np
 
 from shm.report import words
 from shm.report.content import Interval
+from shm.report.paper import Table
 from shm.report.states import StatesOverTime
-from shm.report.table import Table
 from shm.values import TENSION, FloatArray, TemperatureCoefficient
 
 TITLE = "Change with the temperature"

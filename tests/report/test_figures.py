@@ -203,7 +203,7 @@ def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -
 
 def test_reports_do_without_pyplot_and_its_global_figures() -> None:
     asked = (
-        "import sys, shm.report.figures, shm.report.paper.pdf; "
+        "import sys, shm.report.figures, shm.report.as_pdf; "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.template import with_code
+from shm.report.as_html import with_code
 
 
 def test_commands_are_set_as_code_and_nothing_else_is_let_through() -> None:

@@ -16,9 +16,9 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader
 import shm
 from shm.errors import ShmError
 from shm.report import words
+from shm.report.as_html import ENVIRONMENT as OF_REPORTS
+from shm.report.as_html import environment
 from shm.report.colours import PALETTE
-from shm.report.template import ENVIRONMENT as OF_REPORTS
-from shm.report.template import environment
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 
 from shm.report import words
-from shm.report.table import Table
+from shm.report.paper import Table
 from shm.store import FormerTest, Lineage, Step
 from shm_daemon.web.view_of_test import TestView
 

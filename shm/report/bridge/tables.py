@@ -6,8 +6,8 @@ from shm.report import words
 from shm.report.bridge.content import BridgeReport, Course, HangerLine, hangers_unit
 from shm.report.content import Interval
 from shm.report.origin import lineage, settings
+from shm.report.paper import Table, filled
 from shm.report.shifts import shift_cells, shift_unit
-from shm.report.table import Table
 from shm.values import Drift
 from shm.values.force_units import ForceUnit
 from shm.values.stated_tension import stated
@@ -21,50 +21,49 @@ _BESIDE = {"repeatability": "repeatability", "above": "above limit", "slack": "s
 """What stands beside a tension where it is known, with its heading."""
 
 
-def tables(data: BridgeReport, *, bars: bool = False) -> tuple[Table, ...]:
-    """All tables that this report can fill; `bars` where there is no figure beside them."""
-    made = (
+def tables(data: BridgeReport) -> tuple[Table, ...]:
+    """All tables that this report can fill."""
+    return filled(
         _hangers(data),
         _since_baseline(data),
         _courses(data),
-        *(pattern_tables(data.pattern, bars=bars) if data.pattern else ()),
+        *(pattern_tables(data.pattern) if data.pattern else ()),
         _tests(data),
         _origin(data),
         settings(data.settings),
     )
-    return tuple(table for table in made if table.rows)
 
 
-def pattern_tables(pattern: BridgePattern, *, bars: bool) -> tuple[Table, Table]:
+def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
     """Each hanger's shift, and the explanations of all shifts together."""
-    return shift_table(pattern, bars=bars), Table(
+    return shift_table(pattern), Table(
         "What explains them",
         ("explanation", "probability"),
         tuple((each.name, words.probability(each.probability)) for each in pattern.explanations),
     )
 
 
-def shift_table(pattern: BridgePattern, *, bars: bool = False) -> Table:
+def shift_table(pattern: BridgePattern) -> Table:
     """Shifts of the tension since each hanger's baseline; those not compared stand last."""
     unit, places = shift_unit(pattern)
-    headings: tuple[str, ...] = (
-        f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of",
-    )  # fmt: skip
     rows = [_shift(row, unit, places) for row in pattern.rows]
     rows += [
         (str(each.hanger), "not known", "not known", "not compared", _day(each.time))
         for each in pattern.not_compared
     ]
-    note = (
-        "Shift of the tension since the baseline at each hanger's latest test, if there is any, "
-        "the swing with the temperature taken out, with 90 % intervals; whether it has lost or "
-        "gained, with the probability of that."
+    return Table(
+        "Shifts along the bridge",
+        ("hanger", f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of"),
+        tuple(rows),
+        note="Shift of the tension since the baseline at each hanger's latest test, if there is "
+        "any, the swing with the temperature taken out, with 90 % intervals; whether it has lost "
+        "or gained, with the probability of that.",
+        sketch=(
+            "lost | gained",
+            *(bar(share) for share in _shares(pattern)),
+            *("" for _ in pattern.not_compared),
+        ),
     )
-    if bars:
-        drawn = [bar(share) for share in _shares(pattern)] + [""] * len(pattern.not_compared)
-        headings = ("lost | gained", *headings)
-        rows = [(first, stroke, *rest) for (first, *rest), stroke in zip(rows, drawn, strict=True)]
-    return Table("Shifts along the bridge", ("hanger", *headings), tuple(rows), note=note)
 
 
 def _shares(pattern: BridgePattern) -> list[float]:

@@ -38,11 +38,6 @@ _CONDITIONS = {
 }
 
 
-def headline(sheet: DiagnosisSheet) -> str:
-    """The hanger's name and the answer in a word or two."""
-    return f"{name(sheet)}: {answer(sheet.diagnosis).value}"
-
-
 def name(sheet: DiagnosisSheet) -> str:
     """`Gap diagnosis, Hanger 3`."""
     return f"Gap diagnosis, {words.hanger_name(sheet.hanger.id, sheet.hanger.name)}"

@@ -18,12 +18,14 @@ from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope
 from shm.report.diagnosis.tensions import AFTER, tension_of, tension_unit
-from shm.report.table import Table
+from shm.report.paper import Table, filled
 from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
 from shm.values.force_units import ForceUnit
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _WORST = 16
+_ROWS_SHOWN = 10
+"""Of a table in a terminal."""
 
 
 def answers(sheet: DiagnosisSheet) -> tuple[Table, ...]:
@@ -39,7 +41,9 @@ def evidence(sheet: DiagnosisSheet) -> tuple[Table, ...]:
 def _made(
     sheet: DiagnosisSheet, makers: tuple[Callable[[DiagnosisSheet], Table], ...]
 ) -> tuple[Table, ...]:
-    return tuple(table for table in (make(sheet) for make in makers) if table.rows)
+    made = filled(*(make(sheet) for make in makers))
+    # What is always said last, such as `no gap`, stays in a terminal.
+    return tuple(table.shortened(_ROWS_SHOWN, last=2 if table.marks else 0) for table in made)
 
 
 def causes(sheet: DiagnosisSheet) -> Table:

@@ -14,7 +14,7 @@ from shm.report.verdicts import overall
 SHEET_SCHEMA = "shm.test-sheet/1"
 
 
-def test_json(sheet: TestSheet) -> dict[str, Any]:
+def sheet_json(sheet: TestSheet) -> dict[str, Any]:
     """A document for `shm.documents.dump`; signals and curves stay in the records."""
     found = sheet.identification
     return {

@@ -20,11 +20,6 @@ HEADLINES: dict[Verdict, str] = {
 _MOST_REMEDIES = 3
 
 
-def headline(sheet: TestSheet) -> str:
-    """The test's name and whether to trust it."""
-    return f"{name(sheet)}: {HEADLINES[overall(sheet.identification.quality)]}"
-
-
 def name(sheet: TestSheet) -> str:
     """`Test t7, Hanger 3`, as far as it is known."""
     test = sheet.identification.test

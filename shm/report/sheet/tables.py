@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from shm.report import words
 from shm.report.origin import added_mass, lineage, settings
+from shm.report.paper import Table, filled
 from shm.report.quality import quality_table
 from shm.report.sheet.content import TestSheet
-from shm.report.table import Table
 from shm.values import FrequencyResponse, Mode, Recording
 from shm.values.force_units import force_unit
 
 
 def results(sheet: TestSheet) -> tuple[Table, ...]:
     """What came of the test, as far as there is any of it."""
-    return _filled((modes(sheet), quality(sheet), set_aside(sheet)))
+    return filled(modes(sheet), _doubts_first(quality(sheet)), set_aside(sheet))
+
+
+def _doubts_first(checks: Table) -> Table:
+    """In a terminal the checks that are not good, and how many are."""
+    doubts = tuple(row for row, verdict in enumerate(checks.marks) if verdict != "good")
+    good = len(checks.rows) - len(doubts)
+    what = f"{'further ' if doubts else ''}{'check' if good == 1 else 'checks'}"
+    return replace(checks, brief=doubts, rest=f"{{}} {what} good.") if good else checks
 
 
 def details(sheet: TestSheet) -> tuple[Table, ...]:
     """How it came about, as far as there is any of it."""
-    made = (notes(sheet), hits(sheet), dropped(sheet), conditions(sheet), settings(sheet.settings))
-    return _filled(made)
-
-
-def _filled(tables: tuple[Table, ...]) -> tuple[Table, ...]:
-    return tuple(table for table in tables if table.rows)
+    told = (hits(sheet), conditions(sheet), settings(sheet.settings))
+    hit, *others = (table.without_terminal() for table in told)
+    return filled(notes(sheet), hit, dropped(sheet), *others)
 
 
 def modes(sheet: TestSheet) -> Table:

@@ -20,8 +20,6 @@ from shm.report.trial.phrases import (
 )
 from shm.values import Mark, MarkName, TrialScore
 
-TITLE = "The gap diagnosis tried blind"
-
 
 def verdict(score: TrialScore) -> str:
     """`41 of 45 marks met`."""

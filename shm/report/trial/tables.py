@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.report import words
-from shm.report.table import Table
+from shm.report.paper import Table, filled
 from shm.report.trial.content import RICHNESS, asked, find, misled, missed
 from shm.report.trial.phrases import (
     PHRASES,
@@ -21,22 +21,23 @@ from shm.report.trial.phrases import (
 from shm.report.trial.summary import names_of
 from shm.values import CaseScore, Mark, TrialScore
 
+_ROWS_SHOWN = 20
+"""Of the wrong answers in a terminal."""
 _STYLES = {"met": "good", "missed": "refused", "too few": "unknown"}
 
 
 def answers(score: TrialScore) -> tuple[Table, ...]:
     """The marks, then all scores by richness, effect and way, then those of no bound."""
-    made = (marks(score), by_richness(score), by_effect(score), by_way(score), others(score))
-    return tuple(table for table in made if table.rows)
+    scores = (by_richness(score), by_effect(score), by_way(score), others(score))
+    return filled(marks(score), *(table.without_terminal() for table in scores))
 
 
 def evidence(score: TrialScore) -> tuple[Table, ...]:
     """Every case that went wrong."""
-    made = (
+    return filled(
         _cases("Wrong answers of the first round", missed(score), _FIRST_NOTE),
         _cases("Wrong effects blamed with the true one left out", misled(score), _LEFT_OUT_NOTE),
     )
-    return tuple(table for table in made if table.rows)
 
 
 def marks(score: TrialScore) -> Table:
@@ -154,7 +155,7 @@ def _cases(name: str, cases: Sequence[CaseScore], note: str) -> Table:
         ("case", "planted", "size", "data", "what was said", "probability", "of the truth"),
         tuple(_case_row(case) for case in cases),
         note=note,
-    )
+    ).shortened(_ROWS_SHOWN)
 
 
 def _case_row(case: CaseScore) -> tuple[str, ...]:

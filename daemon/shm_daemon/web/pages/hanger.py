@@ -12,12 +12,12 @@ from fastapi.responses import HTMLResponse
 from shm.report import tables as report_tables
 from shm.report import words
 from shm.report.content import HangerReport
-from shm.report.diagnosis.page import in_words
-from shm.report.diagnosis.part import how_to_diagnose
+from shm.report.diagnosis.tables import answers, evidence
 from shm.report.facts import facts
+from shm.report.hanger_report import gap_part
+from shm.report.paper import Table
 from shm.report.states import called_words
 from shm.report.summary import status, summary
-from shm.report.table import Table
 from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
@@ -108,7 +108,6 @@ def all_tests(
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     found = status(report)
-    *_, origin = report_tables.tables(report)
     return {
         "status_word": found.value,
         "style": found.name.lower(),
@@ -119,10 +118,10 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "tables": _tables(view, report),
         "alerts": report_tables.alerts(report),
         "events": _events(view),
-        "gap_watch": report.gap_watch,
-        "diagnosis": in_words(view.sheet) if view.sheet else None,
-        "how_to_diagnose": how_to_diagnose(report),
-        "origin": origin,
+        "gap": gap_part(report),
+        "answers": answers(view.sheet) if view.sheet else (),
+        "evidence": evidence(view.sheet) if view.sheet else (),
+        "origin": report_tables.origins(report)[-1],
     }
 
 

@@ -19,7 +19,7 @@ from shm.documents import parse_time
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.report import words
-from shm.report.table import Table
+from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told

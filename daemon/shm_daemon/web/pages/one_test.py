@@ -11,11 +11,11 @@ from fastapi.responses import HTMLResponse
 from shm.errors import NothingThere
 from shm.report import words
 from shm.report.content import Interval
+from shm.report.paper import Table
 from shm.report.sheet import tables
 from shm.report.sheet.figures.response import point_name
 from shm.report.sheet.spectra import shown_points
 from shm.report.sheet.summary import HEADLINES, name
-from shm.report.table import Table
 from shm.report.verdicts import overall
 from shm.values import ResponsePoint, Verdict
 from shm.values.force_units import force_unit

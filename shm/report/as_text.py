@@ -1,11 +1,17 @@
-"""A table of texts, and how it stands in a terminal; titles and paragraphs there."""
+"""A paper as plain text for a terminal.
+
+Figures are left out, and the figures on top, which the summary tells; tables as far as they say.
+"""
 
 from __future__ import annotations
 
 import textwrap
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import zip_longest
 from operator import gt
+
+from shm.report.paper import Paper, Part, Table
 
 WIDTH = 100
 """Columns of a terminal that a text may fill, where nobody says how wide it is."""
@@ -15,25 +21,54 @@ _LONGEST_NUMBER = 12
 _LEAST = 9
 
 
-@dataclass(frozen=True)
-class Table:
-    """One table; every cell is a text with its unit in the cell or in the heading.
-
-    `marks` names a style for each row on the page; empty: none has one.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
-    marks: tuple[str, ...] = ()
+def as_text(paper: Paper, width: int = WIDTH) -> str:
+    """The document in lines of at most `width` columns, unless a single word is longer."""
+    first, *others = paper.parts
+    blocks = [*_underlined(paper.headline, "=", width), *_part(first, width)]
+    for part in others:
+        if told := list(_part(part, width)):
+            blocks += [*_underlined(part.headline, "-", width), *told]
+    return "\n".join([*blocks, _folded(paper.foot, width), ""])
 
 
-def headed(title: str, paragraph: str, width: int = WIDTH) -> str:
-    """An underlined title and a paragraph."""
+def _part(part: Part, width: int) -> Iterator[str]:
+    for paragraph in (*part.paragraphs, part.told):
+        if paragraph:
+            yield f"{_folded(paragraph, width)}\n"
+    if part.remarks:
+        yield "\n".join(_folded(each, width, "! ") for each in part.remarks) + "\n"
+    for table in part.tables:
+        shown = in_terminal(table)
+        if shown.rows or shown.note:
+            yield laid_out(shown, width)
+
+
+def _underlined(title: str, line: str, width: int) -> list[str]:
     lines = textwrap.wrap(title, width)
-    told = "\n".join((*lines, "=" * max(map(len, lines)), textwrap.fill(paragraph, width)))
-    return f"{told}\n"
+    return [*lines, line * max(map(len, lines))]
+
+
+def _folded(text: str, width: int, start: str = "") -> str:
+    return textwrap.fill(
+        text, width, initial_indent=start, subsequent_indent=" " * len(start),
+        break_long_words=False,
+    )  # fmt: skip
+
+
+def in_terminal(table: Table) -> Table:
+    """The rows that a terminal shows, with the column that stands for a figure there."""
+    rows, headings, note = table.rows, table.headings, table.note
+    if table.sketch:
+        heading, *strokes = table.sketch
+        headings = (headings[0], heading, *headings[1:])
+        rows = tuple((row[0], s, *row[1:]) for row, s in zip(rows, strokes, strict=True))
+    if table.brief is not None:
+        more = table.rest.format(len(rows) - len(table.brief))
+        rows = tuple(rows[index] for index in table.brief)
+        note = f"{note} {more}".strip() if rows else more
+    return replace(
+        table, headings=headings, rows=rows, note=note, brief=None, sketch=(), marks=()
+    )  # fmt: skip
 
 
 def laid_out(table: Table, width: int = WIDTH) -> str:
@@ -43,10 +78,11 @@ def laid_out(table: Table, width: int = WIDTH) -> str:
     """
     title = textwrap.fill(table.title.upper(), width)
     note = [textwrap.fill(table.note, width)] if table.note else []
-    widths = _widths(table, width)
-    return "\n".join(
-        (title, *(_columns(table, widths) if widths else _lists(table, width)), *note, "")
-    )
+    lines: list[str] = []
+    if table.rows:
+        widths = _widths(table, width)
+        lines = _columns(table, widths) if widths else _lists(table, width)
+    return "\n".join((title, *lines, *note, ""))
 
 
 def _columns(table: Table, widths: list[int]) -> list[str]:

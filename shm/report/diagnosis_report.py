@@ -1,20 +1,22 @@
-"""A gap diagnosis as one HTML file, and as a part of a hanger's page."""
+"""The report of a gap diagnosis: a paper of its own, or a part of a hanger's."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
-
-from markupsafe import Markup
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from shm.report import words
 from shm.report.diagnosis.content import Answer, DiagnosisSheet, answer, claimed
-from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import consequences, name, verdict
 from shm.report.diagnosis.tables import answers, evidence
 from shm.report.diagnosis.tensions import tension_unit, tension_words
-from shm.report.template import ENVIRONMENT
+from shm.report.paper import CREDIBLE, Fact, Paper, Part
+
+if TYPE_CHECKING:
+    from shm.report.figures.member import Illustration
 
 _STYLES = {
     Answer.EXPLAINED: "first",
@@ -25,44 +27,54 @@ _STYLES = {
 }
 
 
-def diagnosis_page(sheet: DiagnosisSheet) -> str:
-    """The diagnosis of one hanger: readable on screen (light or dark), on paper, by ear."""
-    return ENVIRONMENT.get_template("diagnosis.html.j2").render(
-        title=name(sheet), bridge=sheet.bridge, made=_made(sheet), diagnosis=section(sheet)
+def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
+    """The answer, figures, the answer in numbers, what it rests on."""
+    part = diagnosis_part(sheet, "In short")
+    return Paper(
+        title=name(sheet),
+        bridge=sheet.bridge,
+        status=part.status,
+        style=part.style,
+        parts=(
+            replace(part, figures=tuple, tables=(), status=""),
+            Part("Figures", figures=part.figures),
+            Part("The answer in numbers", tables=answers(sheet)),
+            Part("What it rests on", tables=evidence(sheet)),
+        ),
+        closing=f"From {_origin(sheet)}. {CREDIBLE}; places count from the deck end.",
     )
 
 
-def section(sheet: DiagnosisSheet) -> dict[str, Any]:
-    """What the templates show of a diagnosis."""
-    drawings = [
-        (item, Markup(item.svg()))  # noqa: S704
-        for item in diagnosis_figures(sheet)
-    ]
-    return {**in_words(sheet), "illustrations": drawings}
-
-
-def in_words(sheet: DiagnosisSheet) -> dict[str, Any]:
-    """The same without its drawings."""
+def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
+    """The whole of it: the answer with what follows, remarks on the data, figures, tables."""
     found = answer(sheet.diagnosis)
-    return {
-        "answer": found.value,
-        "style": _STYLES[found],
-        "verdict": verdict(sheet.diagnosis),
-        "consequences": consequences(sheet.diagnosis),
-        "facts": _facts(sheet),
-        "remarks": sheet.diagnosis.remarks,
-        "answers": answers(sheet),
-        "evidence": evidence(sheet),
-    }
+    return Part(
+        title,
+        paragraphs,
+        lead=verdict(sheet.diagnosis),
+        summary=consequences(sheet.diagnosis),
+        facts=facts(sheet),
+        remarks=sheet.diagnosis.remarks,
+        figures=lambda: _figures(sheet),
+        tables=(*answers(sheet), *evidence(sheet)),
+        status=found.value,
+        style=_STYLES[found],
+    )
 
 
-def _facts(sheet: DiagnosisSheet) -> tuple[tuple[str, str, str], ...]:
+def _figures(sheet: DiagnosisSheet) -> Sequence[Illustration]:
+    from shm.report.diagnosis.figures import diagnosis_figures
+
+    return diagnosis_figures(sheet)
+
+
+def facts(sheet: DiagnosisSheet) -> tuple[Fact, ...]:
     """The figures on top: what, value, what stands beside it."""
     facts = (_claim(sheet), _misses(sheet), _tension(sheet), _fit(sheet))
     return tuple(fact for fact in facts if fact is not None)
 
 
-def _claim(sheet: DiagnosisSheet) -> tuple[str, str, str]:
+def _claim(sheet: DiagnosisSheet) -> Fact:
     diagnosis, claim = sheet.diagnosis, claimed(sheet.diagnosis)
     if claim is not None:
         more = len(claim.causes) - 1
@@ -75,7 +87,7 @@ def _claim(sheet: DiagnosisSheet) -> tuple[str, str, str]:
     return ("Something else", words.probability(unknown), "probability, not in the catalogue")
 
 
-def _misses(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+def _misses(sheet: DiagnosisSheet) -> Fact | None:
     found = sheet.diagnosis.shrinkage
     if math.isnan(found.rms_before_percent):
         return None
@@ -88,7 +100,7 @@ def _misses(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     return ("Error of the frequencies", f"{before} → {with_it} %", told)
 
 
-def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+def _tension(sheet: DiagnosisSheet) -> Fact | None:
     plain, better = sheet.diagnosis.tension_before_n, sheet.diagnosis.tension_after_n
     if math.isnan(plain.mean):
         return None
@@ -100,7 +112,7 @@ def _tension(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     return ("Tension", words.rounded_tension(better.mean, unit), told)
 
 
-def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
+def _fit(sheet: DiagnosisSheet) -> Fact | None:
     p_value = sheet.diagnosis.fit_p_value
     if math.isnan(p_value):
         return None
@@ -108,7 +120,7 @@ def _fit(sheet: DiagnosisSheet) -> tuple[str, str, str] | None:
     return ("Fit of the answer", told, f"posterior predictive p-value {words.probability(p_value)}")
 
 
-def _made(sheet: DiagnosisSheet) -> str:
+def _origin(sheet: DiagnosisSheet) -> str:
     diagnosis = sheet.diagnosis
     tests = words.counted(len(diagnosis.tests), "test")
     seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""

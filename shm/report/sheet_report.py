@@ -1,49 +1,49 @@
-"""A test's sheet as one HTML file: style, figures and words inside, nothing fetched."""
+"""The sheet of one hammer test, by which a person checks how it was identified."""
 
 from __future__ import annotations
 
-from markupsafe import Markup
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from shm.report import words
+from shm.report.colours import VERDICT_STYLES
+from shm.report.paper import Fact, Paper, Part
 from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import page_figures
 from shm.report.sheet.summary import HEADLINES, name, summary
 from shm.report.sheet.tables import details, results
-from shm.report.template import ENVIRONMENT
 from shm.report.verdicts import overall
-from shm.values import Verdict
 
-CLOSING = "Intervals are central 90 %; standard deviations are of one test; times are UTC."
-STYLES: dict[Verdict, str] = {
-    "good": "steady",
-    "warning": "watch",
-    "refused": "alert",
-    "unknown": "first",
-}
+if TYPE_CHECKING:
+    from shm.report.figures.member import Illustration
 
 
-def test_page(sheet: TestSheet) -> str:
-    """The sheet of one test: readable on screen (light or dark), on paper, by ear."""
+def sheet_paper(sheet: TestSheet) -> Paper:
+    """Summary, modes and quality, figures, how it came about."""
     verdict = overall(sheet.identification.quality)
-    figures = page_figures(sheet)
-    return ENVIRONMENT.get_template("sheet.html.j2").render(
+    return Paper(
         title=name(sheet),
-        verdict=HEADLINES[verdict],
-        style=STYLES[verdict],
-        summary=summary(sheet),
-        facts=facts(sheet),
-        illustrations=[(item, Markup(item.svg())) for item in figures],  # noqa: S704
-        results=results(sheet),
-        details=details(sheet),
         bridge=sheet.bridge,
-        made=f"Made {words.moment(sheet.generated_at)} by shm {sheet.version}. "
-        if sheet.generated_at
-        else "",
-        closing=CLOSING,
+        status=HEADLINES[verdict],
+        style=VERDICT_STYLES[verdict],
+        parts=(
+            Part("In short", summary=summary(sheet), facts=facts(sheet)),
+            Part("Modes and quality", tables=results(sheet)),
+            Part("Figures", figures=lambda: _figures(sheet)),
+            Part("How it came about", tables=details(sheet)),
+        ),
+        generated_at=sheet.generated_at,
+        version=sheet.version,
+        closing="Intervals are central 90 %; standard deviations are of one test; times are UTC.",
     )
 
 
-def facts(sheet: TestSheet) -> tuple[tuple[str, str, str], ...]:
+def _figures(sheet: TestSheet) -> Sequence[Illustration]:
+    from shm.report.sheet.figures import page_figures
+
+    return page_figures(sheet)
+
+
+def facts(sheet: TestSheet) -> tuple[Fact, ...]:
     """The figures on top: what, value, what stands beside it."""
     test, hits = sheet.identification.test, sheet.hits
     planes = {mode.plane for mode in sheet.modes}
