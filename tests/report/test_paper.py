@@ -1,0 +1,216 @@
+"""One paper, three renderers: all it says stands in text, page and PDF, in its order."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import shm.report
+from shm.report.as_html import as_html
+from shm.report.as_pdf import as_pdf
+from shm.report.as_text import as_text
+from shm.report.bridge.content import BridgeReport, HangerLine
+from shm.report.bridge_report import bridge_paper
+from shm.report.content import HangerReport
+from shm.report.diagnosis_report import diagnosis_paper
+from shm.report.hanger_report import hanger_paper
+from shm.report.paper import Paper, Part, Table
+from shm.report.sheet_report import sheet_paper
+from shm.report.summary import Status
+from shm.report.trial_report import trial_paper
+from shm.watch.neighbours import HangerShift, bridge_pattern
+from tests.helpers.pdf_words import Pdf
+from tests.report.conftest import START
+from tests.report.diagnoses import CASES, sheet
+from tests.report.outline import Outline
+from tests.report.sheets import make_sheet, warned
+from tests.report.test_trial_page import make_score
+
+pytestmark = pytest.mark.usefixtures("unpainted", "drawn_once")
+RENDERERS = ("as_text", "as_html", "as_pdf")
+WIDE = 100_000
+"""Columns with which no line of a text folds."""
+
+
+def of_hanger(season: HangerReport) -> Paper:
+    return hanger_paper(
+        replace(season, diagnosis=CASES["led"], gap_watch="The gap has stayed below 0.3 %.")
+    )
+
+
+def of_bridge(season: HangerReport) -> Paper:
+    shifts = [
+        HangerShift(number, number - 1, START, 700e3, -34e3 if number == 3 else 0.0, 1.5e3)
+        for number in range(1, 6)
+    ]
+    line = HangerLine(season.hanger, Status.ALERT, START, season.tension_n, "", 1, season.drifts[0])
+    report = BridgeReport("Arch", (line,), bridge_pattern(shifts, range(1, 7)), "", START, "0.1.0")
+    return bridge_paper(replace(report, settings={"seed": "1"}))
+
+
+KINDS: dict[str, Callable[[HangerReport], Paper]] = {
+    "hanger": of_hanger,
+    "bridge": of_bridge,
+    "diagnosis": lambda _: diagnosis_paper(sheet("led")),
+    "sheet": lambda _: sheet_paper(warned(make_sheet(hits=6, dropped={2: "double hit"}))),
+    "trial": lambda _: trial_paper(make_score("plausible")),
+}
+
+
+@pytest.fixture(scope="module")
+def papers(season: HangerReport) -> dict[str, Paper]:
+    return {kind: make(season) for kind, make in KINDS.items()}
+
+
+def unabridged(paper: Paper) -> Paper:
+    """With every row in a terminal, too."""
+    return replace(
+        paper,
+        parts=[
+            replace(part, tables=[replace(table, brief=None) for table in part.tables])
+            for part in paper.parts
+        ],
+    )
+
+
+def texts(paper: Paper, renderer: str) -> Iterator[str]:
+    """Everything that a paper says, in reading order, as far as the renderer promises it."""
+    if renderer != "as_pdf":
+        yield paper.title
+    for number, part in enumerate(paper.parts):
+        yield from _texts_of_part(part, renderer, is_first=number == 0)
+    yield paper.foot
+
+
+def _texts_of_part(part: Part, renderer: str, is_first: bool) -> Iterator[str]:
+    figures = () if renderer == "as_text" else part.figures()
+    told = (*part.paragraphs, part.told, *part.facts, *part.remarks, *figures, *part.tables)
+    if not any(told) or (renderer == "as_text" and not (is_first or part.tables or part.told)):
+        return
+    if not is_first or renderer != "as_text":
+        yield from (part.title, part.status)
+    yield from (*part.paragraphs, part.lead, part.summary)
+    if renderer != "as_text":  # whose summary tells them
+        yield from (text for fact in part.facts for text in fact)
+    yield from part.remarks
+    for figure in figures:
+        yield from (figure.title, figure.caption)
+    for table in part.tables:
+        yield from (table.title, *table.headings)
+        yield from (cell for row in table.rows for cell in row)
+        yield table.note
+
+
+def written(paper: Paper, renderer: str) -> str:
+    if renderer == "as_text":
+        return as_text(unabridged(paper), WIDE)
+    if renderer == "as_pdf":
+        return Pdf.parse(as_pdf(paper)).words
+    outline = Outline()
+    outline.feed(as_html(paper))
+    return " ".join(outline.words)
+
+
+def squeezed(text: str) -> str:
+    """Without blanks, case and the marks of commands: lines fold where a renderer likes."""
+    return "".join(text.split()).replace("`", "").lower()
+
+
+def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
+    """The first text of the paper that does not follow those before it.
+
+    A PDF repeats headings and lines over pages, even amid a paragraph: there each word counts.
+    """
+    place = 0
+    for text in texts(paper, renderer):
+        for piece in text.split() if renderer == "as_pdf" else [text]:
+            at = found.find(squeezed(piece), place)
+            if at < 0:
+                return text
+            place = at + len(squeezed(piece))
+    return None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_all_that_a_paper_says_is_rendered_in_its_order(
+    kind: str, renderer: str, papers: dict[str, Paper]
+) -> None:
+    paper = papers[kind]
+    assert first_missing(paper, renderer, squeezed(written(paper, renderer))) is None
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_a_cell_that_is_lost_or_out_of_order_is_found(
+    renderer: str, papers: dict[str, Paper]
+) -> None:
+    paper = papers["diagnosis"]
+    *parts, last = paper.parts
+    (first, *others) = last.tables
+    lost = replace(first, rows=first.rows[:-1])
+    turned = replace(first, rows=first.rows[::-1])
+    for table in (lost, turned):
+        found = written(
+            replace(paper, parts=[*parts, replace(last, tables=[table, *others])]), renderer
+        )
+        assert first_missing(paper, renderer, squeezed(found)) is not None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_leads_with_its_state_and_a_summary(kind: str, papers: dict[str, Paper]) -> None:
+    paper = papers[kind]
+    assert paper.parts[0].title == "In short"
+    assert paper.parts[0].told
+    assert paper.status
+    first_line = as_text(paper).splitlines()[0]
+    assert first_line == paper.headline
+    assert f"<title>{paper.headline}</title>" in as_html(paper)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("width", [100, 72])
+def test_a_text_fits_its_terminal(kind: str, width: int, papers: dict[str, Paper]) -> None:
+    lines = as_text(papers[kind], width).splitlines()
+    assert max(map(len, lines)) <= width
+
+
+def test_a_terminal_says_how_many_rows_it_leaves_out() -> None:
+    rows = tuple((str(number), "x") for number in range(30))
+    long = Table("Long", ("no.", "what"), rows, note="A note.")
+    told = as_text(_paper(long.shortened(5, last=2)))
+    assert "A note. ... and 25 more rows (in HTML and JSON)." in told
+    assert [line.split()[0] for line in told.splitlines() if line.endswith("  x")] == [
+        "0", "1", "2", "28", "29",
+    ]  # fmt: skip
+    assert replace(long, rows=rows[:6]).shortened(5).brief is None
+    assert "LONG" not in as_text(_paper(long.without_terminal()))
+    only = as_text(_paper(replace(long, brief=(), rest="{} checks good.")))
+    assert "LONG\n30 checks good.\n" in only
+
+
+def test_a_part_that_has_nothing_is_not_headed() -> None:
+    paper = replace(_paper(Table("t", ("a",), (("1",),))), parts=[
+        Part("In short", summary="All."), Part("Figures"), Part("Numbers", tables=()),
+    ])  # fmt: skip
+    assert "Figures" not in as_text(paper)
+    assert "Figures" not in as_html(paper)
+    assert "Figures" not in Pdf.parse(as_pdf(paper)).words
+
+
+def _paper(table: Table) -> Paper:
+    return Paper("Title", "", "first", [Part("In short", tables=[table])], "The end.")
+
+
+@pytest.mark.parametrize("module", ["paper", *RENDERERS])
+def test_the_model_and_its_renderers_know_no_kind_of_report(module: str) -> None:
+    source = Path(shm.report.__file__).with_name(f"{module}.py").read_text()
+    imported = {
+        node.module
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("shm.report.")
+    }
+    assert imported <= {"shm.report.paper", "shm.report.figures.member"}
