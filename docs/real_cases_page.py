@@ -27,7 +27,7 @@ from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
 from shm.report.as_text import as_text
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis_report import diagnosis_paper

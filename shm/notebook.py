@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shm.report.content import Interval
+    from shm.report.intervals import Interval
     from shm.values import Diagnosis, Hanger, Posterior, Selection
 
 _CAUSES_SHOWN = 5
@@ -62,7 +62,7 @@ def hanger_html(hanger: Hanger) -> str:
 def posterior_html(posterior: Posterior) -> str:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.report import words
-    from shm.report.content import Interval
+    from shm.report.intervals import Interval
     from shm.values.force_units import force_unit
 
     tension_n = Interval.of_samples(posterior.tension_n)
@@ -86,7 +86,7 @@ def posterior_html(posterior: Posterior) -> str:
 def selection_html(selection: Selection) -> str:
     """The model classes, most probable first, with the tension that each gives."""
     from shm.report import words
-    from shm.report.content import Interval
+    from shm.report.intervals import Interval
     from shm.values.force_units import force_unit
 
     tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]

@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.content import HangerReport, TrendRow, trend_row
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet, HangerReport, TrendRow, trend_row
 from shm.report.diagnosis.figures.causes import FIGURE as CAUSES
 from shm.report.diagnosis.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.frequencies import FIGURE as FREQUENCIES

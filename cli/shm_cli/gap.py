@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.terms import diagnosis_lineage
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet
 from shm.report.diagnosis.document import diagnosis_json
 from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis_report import diagnosis_paper

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
+from enum import Enum
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
-
+from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.values import (
@@ -19,7 +19,6 @@ from shm.values import (
     Averaged,
     Diagnosis,
     Drift,
-    FloatArray,
     FrequencyResponse,
     Hanger,
     ModalTest,
@@ -33,86 +32,6 @@ from shm.values.force_units import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now, selection_now
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
-
-NORMAL_90 = 1.6448536269514722
-"""Half width of the central 90 % of a normal distribution, in standard deviations."""
-_WIDE = 0.5
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A mean with its central 90 % interval.
-
-    `repeatability_sd` is the standard deviation with which the same test would give it again, less
-    than the interval says where part of that is the same in all tests; None: not known.
-    """
-
-    mean: float
-    low: float
-    high: float
-    repeatability_sd: float | None = None
-
-    @classmethod
-    def of_samples(cls, samples: FloatArray) -> Interval:
-        """From equally weighted draws, shape (samples,)."""
-        low, high = np.quantile(samples, [0.05, 0.95])
-        return cls(float(samples.mean()), float(low), float(high))
-
-    @classmethod
-    def normal(cls, mean: float, sd: float) -> Interval:
-        """From a mean and a standard deviation, taken as normal."""
-        return cls(mean, mean - NORMAL_90 * sd, mean + NORMAL_90 * sd)
-
-    @classmethod
-    def of_summary(cls, summary: Summary) -> Interval:
-        """From what was kept of samples."""
-        return cls(summary.mean, summary.q05, summary.q95)
-
-    @classmethod
-    def of_averaged(cls, averaged: Averaged) -> Interval:
-        """Of a tension over all model classes, in N."""
-        return cls.of_summary(averaged.tension_n).repeating(averaged.repeatability_sd_n)
-
-    def repeating(self, sd: float) -> Interval:
-        """The same with the standard deviation of a repetition; NaN is not known."""
-        return replace(self, repeatability_sd=sd if math.isfinite(sd) else None)
-
-    def scaled(self, factor: float) -> Interval:
-        """The same quantity in a unit 1/`factor` as large."""
-        own = self.repeatability_sd
-        repeats = None if own is None else own * factor
-        return Interval(self.mean * factor, self.low * factor, self.high * factor, repeats)
-
-    def in_unit(self, unit: ForceUnit) -> Interval:
-        """A force in N in another unit."""
-        return self.scaled(1 / unit.newtons)
-
-    @property
-    def width(self) -> float:
-        return self.high - self.low
-
-    @property
-    def is_wide(self) -> bool:
-        """Whether it is wider than half its mean, so that a shift could hardly be seen in it."""
-        return self.width > _WIDE * abs(self.mean)
-
-    def since(self, then: Interval) -> Interval:
-        """The relative change from `then`: repeatabilities in squares.
-
-        Where one is not known, of two independent estimates: widths in squares.
-        """
-        ratio = self.mean / then.mean
-        widths = [each.width / 2 for each in (self, then)]
-        if self.repeatability_sd is not None and then.repeatability_sd is not None:
-            widths = [NORMAL_90 * self.repeatability_sd, NORMAL_90 * then.repeatability_sd]
-        half = math.hypot(widths[0], ratio * widths[1]) / abs(then.mean)
-        return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
-
-    def less(self, then: Interval) -> Interval:
-        """The difference from `then`, of two independent estimates: widths in squares."""
-        half = math.hypot(self.width, then.width) / 2
-        shift = self.mean - then.mean
-        return Interval(shift, shift - half, shift + half)
 
 
 @dataclass(frozen=True)
@@ -261,3 +180,52 @@ class HangerReport:
         """The one unit of this tension and the baseline's, so that they compare at a glance."""
         both = (self.tension_n, self.baseline_tension_n)
         return force_unit(*(each.mean for each in both if each))
+
+
+_WATCH_PROBABILITY = 0.5
+
+
+class Status(Enum):
+    """The state of a hanger in a word."""
+
+    ALERT = "Alert"
+    WATCH = "Watch"
+    STEADY = "No change"
+    FIRST = "First test"
+
+
+def status(data: HangerReport) -> Status:
+    """The state that the watch gives."""
+    return status_of(
+        data.drifts,
+        data.hanger,
+        is_first=data.baseline_tension_n is None,
+        is_called=data.is_called,
+    )
+
+
+def status_of(
+    drifts: Sequence[Drift], hanger: Hanger, *, is_first: bool, is_called: bool
+) -> Status:
+    """The state that the drifts of the latest test give, and whether a change was called."""
+    highest = max((drift.probability for drift in drifts), default=math.nan)
+    if highest >= hanger.thresholds.alert_probability:
+        return Status.ALERT
+    if highest >= _WATCH_PROBABILITY or is_called:
+        return Status.WATCH
+    return Status.FIRST if is_first else Status.STEADY
+
+
+def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
+    """The tension in percent of the nominal one; None where the hanger has none."""
+    nominal_n = hanger.nominal_tension_n
+    return tension_n.scaled(100 / nominal_n) if nominal_n > 0 else None
+
+
+@dataclass(frozen=True)
+class DiagnosisSheet:
+    """A gap diagnosis with the hanger it is of, and the bridge's name where it is known."""
+
+    diagnosis: Diagnosis
+    hanger: Hanger
+    bridge: str = ""

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from shm.report import words
-from shm.report.diagnosis.content import Answer, DiagnosisSheet, answer, claimed
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import Answer, answer, claimed
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import consequences, name, verdict
 from shm.report.diagnosis.tables import answers, evidence

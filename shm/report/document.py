@@ -7,11 +7,11 @@ from typing import Any
 
 from shm import documents, modes_document
 from shm.report.bridge.document import pattern_json
-from shm.report.content import HangerReport
+from shm.report.content import HangerReport, status
 from shm.report.diagnosis.document import diagnosis_json
 from shm.report.diagnosis.part import diagnosed
 from shm.report.period import period_json
-from shm.report.summary import advice, status, summary
+from shm.report.summary import advice, summary
 from shm.report.temperatures import temperature_documents
 from shm.values import FrequencyResponse
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from shm.report import words
-from shm.report.content import HangerReport
-from shm.report.summary import is_found, of_nominal, tension_change
+from shm.report.content import HangerReport, of_nominal
+from shm.report.summary import is_found, tension_change
 from shm.values.stated_tension import StatedTension, stated
 
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from shm.report import words
-from shm.report.content import HangerReport
+from shm.report.content import HangerReport, status
 from shm.report.diagnosis.part import diagnosed, how_to_diagnose
 from shm.report.diagnosis_report import diagnosis_part
 from shm.report.facts import facts
 from shm.report.paper import CREDIBLE, Paper, Part
-from shm.report.summary import status, summary
+from shm.report.summary import summary
 from shm.report.tables import numbers, origins
 
 if TYPE_CHECKING:

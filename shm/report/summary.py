@@ -4,55 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from enum import Enum
 
 import numpy as np
 
 from shm.report import words
-from shm.report.content import HangerReport, Interval
+from shm.report.content import HangerReport, Status, status
 from shm.report.diagnosis.summary import next_step, verdict
 from shm.report.diagnosis.tensions import AFTER, tension_of
+from shm.report.intervals import Interval
 from shm.report.redescription import redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
-from shm.values import TENSION, Diagnosis, Drift, Hanger, PredictedFrequency
+from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
 
 _CONVERGED_R_HAT = 1.1
-_WATCH_PROBABILITY = 0.5
 _WORTH_DIAGNOSING_PERCENT = 0.5
 _MOST_NAMED = 3
-
-
-class Status(Enum):
-    """The state of a hanger in a word."""
-
-    ALERT = "Alert"
-    WATCH = "Watch"
-    STEADY = "No change"
-    FIRST = "First test"
-
-
-def status(data: HangerReport) -> Status:
-    """The state that the watch gives."""
-    return status_of(
-        data.drifts,
-        data.hanger,
-        is_first=data.baseline_tension_n is None,
-        is_called=data.is_called,
-    )
-
-
-def status_of(
-    drifts: Sequence[Drift], hanger: Hanger, *, is_first: bool, is_called: bool
-) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was called."""
-    highest = max((drift.probability for drift in drifts), default=math.nan)
-    if highest >= hanger.thresholds.alert_probability:
-        return Status.ALERT
-    if highest >= _WATCH_PROBABILITY or is_called:
-        return Status.WATCH
-    return Status.FIRST if is_first else Status.STEADY
 
 
 def summary(data: HangerReport) -> str:
@@ -93,12 +61,6 @@ def tension_change(data: HangerReport) -> Interval | None:
         if drift.quantity == TENSION and math.isfinite(drift.shift_mean + drift.shift_sd):
             return Interval.normal(drift.shift_mean, drift.shift_sd)
     return now.since(then)
-
-
-def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
-    """The tension in percent of the nominal one; None where the hanger has none."""
-    nominal_n = hanger.nominal_tension_n
-    return tension_n.scaled(100 / nominal_n) if nominal_n > 0 else None
 
 
 def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from shm.report import words
-from shm.report.bridge.tables import shift_table
-from shm.report.content import HangerReport, Interval, TrendRow
-from shm.report.origin import origin, settings
+from shm.report.content import HangerReport, TrendRow, of_nominal
+from shm.report.intervals import Interval
+from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
 from shm.report.quality import quality_table
-from shm.report.shifts import factor, shift_cells
-from shm.report.summary import misfits_percent, of_nominal, tension_change, told_tests
+from shm.report.shifts import factor, shift_cells, shift_table
+from shm.report.summary import misfits_percent, tension_change, told_tests
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
@@ -315,3 +315,29 @@ _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
     parameters,
     history,
 )
+
+
+def origin(data: HangerReport) -> Table:
+    posterior, test = data.posterior, data.latest
+    facts = {
+        "test": f"{test.id}, {words.moment(test.time)}",
+        "temperature": words.temperature(test.temperature_c),
+        "hit level over reference level": words.plain(test.amplitude, absent="not recorded"),
+        "added mass": added_mass(test),
+        "modes identified": f"{len(test.modes)}",
+        "model class": words.model_class(posterior.model),
+        "tests in this posterior": ", ".join(posterior.tests),
+        "posterior samples": f"{len(posterior.samples)} (effective "
+        f"{words.number(posterior.effective_sample_size, '.0f')})",
+        "R-hat (1 is settled)": words.number(posterior.r_hat, ".3f"),
+        "model evaluations": f"{posterior.evaluations}",
+        "random seed": f"{posterior.seed}",
+        "computing time": _seconds(posterior.seconds),
+        **lineage(data.lineage),
+        "report made": f"{words.moment(data.generated_at)} by shm version {data.version}",
+    }
+    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.1f} s" if math.isfinite(seconds) else "not known"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shm.report import words
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.report.states import StatesOverTime
 from shm.values import TENSION, FloatArray, TemperatureCoefficient

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
 

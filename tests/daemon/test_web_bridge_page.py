@@ -14,8 +14,8 @@ import httpx
 import pytest
 
 from shm.report.bridge.content import HangerLine
-from shm.report.content import Interval
-from shm.report.summary import Status
+from shm.report.content import Status
+from shm.report.intervals import Interval
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view

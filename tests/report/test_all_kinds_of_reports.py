@@ -18,15 +18,15 @@ from shm.report.as_text import as_text
 from shm.report.bridge.content import BridgeReport, Course, HangerLine
 from shm.report.bridge.document import bridge_json
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Interval, TrendRow
+from shm.report.content import HangerReport, Status, TrendRow
 from shm.report.document import json
 from shm.report.hanger_report import hanger_paper
+from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.document import sheet_json
 from shm.report.sheet_report import sheet_paper
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
-from shm.report.summary import Status
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
 from tests.helpers.pdf_words import Pdf

@@ -12,10 +12,11 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.bridge.document import bridge_json
-from shm.report.bridge.tables import bar
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Interval
-from shm.report.summary import Status, summary
+from shm.report.content import HangerReport, Status
+from shm.report.intervals import Interval
+from shm.report.shifts import bar
+from shm.report.summary import summary
 from shm.report.tables import neighbours
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern

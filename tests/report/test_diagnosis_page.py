@@ -12,8 +12,7 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.content import HangerReport
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet, HangerReport
 from shm.report.diagnosis.document import diagnosis_json
 from shm.report.diagnosis_report import diagnosis_paper, facts
 from shm.report.document import json as report_json

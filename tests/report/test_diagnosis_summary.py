@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from shm.models.effects import EFFECTS, Survey
-from shm.report.diagnosis.content import Answer, DiagnosisSheet, answer, claimed
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import Answer, answer, claimed
 from shm.report.diagnosis.phrases import PHRASES, label, phrase, title
 from shm.report.diagnosis.sizes import size
 from shm.report.diagnosis.summary import summary

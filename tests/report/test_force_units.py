@@ -15,8 +15,7 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Interval
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet, HangerReport, Status
 from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.document import json
@@ -24,9 +23,9 @@ from shm.report.figures import illustrations
 from shm.report.figures.bridge_shift import bridge_illustration
 from shm.report.figures.drift import STATES
 from shm.report.hanger_report import hanger_paper
+from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
-from shm.report.summary import Status
 from shm.report.tables import history, models, tension
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.force_units import force_unit

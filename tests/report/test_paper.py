@@ -15,12 +15,11 @@ from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
 from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport
+from shm.report.content import HangerReport, Status
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
 from shm.report.paper import Paper, Part, Table
 from shm.report.sheet_report import sheet_paper
-from shm.report.summary import Status
 from shm.report.trial_report import trial_paper
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.pdf_words import Pdf

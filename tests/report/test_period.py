@@ -10,9 +10,10 @@ import pytest
 from shm.errors import UsageError
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.content import HangerReport, Interval
+from shm.report.content import HangerReport
 from shm.report.document import json
 from shm.report.hanger_report import hanger_paper
+from shm.report.intervals import Interval
 from shm.report.period import Period, period_since
 from shm.report.summary import in_period, summary
 from shm.report.tables import numbers, origins

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from shm.report import words
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from shm.report import words
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.store import TestRow, TrendPoint
 from shm.values.force_units import ForceUnit
 from shm_daemon.web.address_of_test import test_page

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from shm.report.content import Interval
+from shm.report.content import Status, of_nominal
+from shm.report.intervals import Interval
 from shm.report.period import Period
-from shm.report.summary import Status, of_nominal
 from shm.values import Averaged, Drift, Hanger
 from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.neighbours import BridgePattern

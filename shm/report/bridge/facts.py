@@ -5,7 +5,7 @@ from __future__ import annotations
 from shm.report import words
 from shm.report.bridge.content import BridgeReport
 from shm.report.bridge.summary import named, of_status
-from shm.report.summary import Status
+from shm.report.content import Status
 
 
 def facts(data: BridgeReport) -> tuple[tuple[str, str, str], ...]:

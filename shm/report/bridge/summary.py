@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from shm.report import words
 from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.content import Interval
-from shm.report.summary import Status
+from shm.report.content import Status
+from shm.report.intervals import Interval
 
 
 def summary(data: BridgeReport) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from shm.values import Cause, Diagnosis, Hanger, Residual
+from shm.values import Cause, Diagnosis, Residual
 
 _LIKELIER_THAN_NOT = 0.5
 
@@ -18,15 +18,6 @@ class Answer(Enum):
     NO_GAP = "No gap"
     UNEXPLAINED = "Not explained"
     UNDECIDED = "Undecided"
-
-
-@dataclass(frozen=True)
-class DiagnosisSheet:
-    """A gap diagnosis with the hanger it is of, and the bridge's name where it is known."""
-
-    diagnosis: Diagnosis
-    hanger: Hanger
-    bridge: str = ""
 
 
 @dataclass(frozen=True)

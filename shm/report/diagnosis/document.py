@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from shm.diagnosis_document import diagnosis_document
-from shm.report.diagnosis.content import DiagnosisSheet, answer
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import answer
 from shm.report.diagnosis.summary import summary
 
 

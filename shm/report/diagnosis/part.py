@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.content import HangerReport
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet, HangerReport
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:

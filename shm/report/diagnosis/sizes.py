@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.values import EffectEstimate
 
 _LOGARITHM = "log10_"

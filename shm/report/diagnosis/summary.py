@@ -5,17 +5,11 @@ from __future__ import annotations
 import math
 
 from shm.report import words
-from shm.report.content import Interval
-from shm.report.diagnosis.content import (
-    Answer,
-    Claim,
-    DiagnosisSheet,
-    answer,
-    claimed,
-    claims,
-)
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import Answer, Claim, answer, claimed, claims
 from shm.report.diagnosis.phrases import label, phrase
 from shm.report.diagnosis.tensions import AFTER, tension_unit, tension_words
+from shm.report.intervals import Interval
 from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9

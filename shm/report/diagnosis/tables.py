@@ -6,14 +6,8 @@ import math
 from collections.abc import Callable
 
 from shm.report import words
-from shm.report.diagnosis.content import (
-    Answer,
-    DiagnosisSheet,
-    answer,
-    claimed,
-    claims,
-    is_set_aside,
-)
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import Answer, answer, claimed, claims, is_set_aside
 from shm.report.diagnosis.phrases import label, title
 from shm.report.diagnosis.sizes import quantity, size
 from shm.report.diagnosis.summary import contender, promise, ranked_measurements, slope

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from shm.report import words
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.values import Diagnosis, TensionEstimate
 from shm.values.force_units import ForceUnit, force_unit
 

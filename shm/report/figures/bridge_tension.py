@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from shm.report import colours, words
 from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.content import Interval
+from shm.report.content import Status
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.summary import Status
+from shm.report.intervals import Interval
 
 _MARKS = {
     Status.ALERT: (colours.RED, "v"),

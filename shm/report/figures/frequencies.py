@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.report import words
-from shm.report.content import NORMAL_90, HangerReport, Interval
+from shm.report.content import HangerReport
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -24,6 +24,7 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
+from shm.report.intervals import NORMAL_90, Interval
 from shm.report.summary import residuals_percent
 from shm.values import PLANES, Mode, Plane, PredictedFrequency
 

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.report.content import HangerReport, Interval, TrendRow
+from shm.report.content import HangerReport, TrendRow
 from shm.report.figures.specification import (
     Axis,
     Band,
@@ -20,6 +20,7 @@ from shm.report.figures.specification import (
     Span,
     Values,
 )
+from shm.report.intervals import Interval
 from shm.report.sheet.thinning import envelope_places
 from shm.report.states import CalledChange
 from shm.values import FloatArray, IntArray

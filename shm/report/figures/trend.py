@@ -10,7 +10,7 @@ from datetime import datetime
 import numpy as np
 
 from shm.report import words
-from shm.report.content import HangerReport, Interval
+from shm.report.content import HangerReport
 from shm.report.figures import over_time
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
@@ -23,6 +23,7 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
+from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit

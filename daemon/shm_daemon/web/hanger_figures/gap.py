@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from shm.report import words
-from shm.report.diagnosis.content import DiagnosisSheet, claimed
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import claimed
 from shm.report.diagnosis.figures import before_and_after, causes, gap_map
 from shm.report.diagnosis.figures.modes import kept, measured
 from shm.report.diagnosis.phrases import title

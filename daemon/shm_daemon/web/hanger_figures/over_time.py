@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from shm.report import words
-from shm.report.content import Interval
 from shm.report.figures import stiffness, trend
 from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
+from shm.report.intervals import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values import TENSION

@@ -20,7 +20,7 @@ from fastapi.responses import JSONResponse
 from shm.pipeline import utc_now
 from shm.report import words
 from shm.report.bridge.content import hangers_unit
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.values.force_units import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader

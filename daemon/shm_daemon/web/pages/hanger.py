@@ -11,13 +11,13 @@ from fastapi.responses import HTMLResponse
 
 from shm.report import tables as report_tables
 from shm.report import words
-from shm.report.content import HangerReport
+from shm.report.content import HangerReport, status
 from shm.report.diagnosis.tables import answers, evidence
 from shm.report.facts import facts
 from shm.report.hanger_report import gap_part
 from shm.report.paper import Table
 from shm.report.states import called_words
-from shm.report.summary import status, summary
+from shm.report.summary import summary
 from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.report import words
-from shm.report.content import Interval
+from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.report.sheet import tables
 from shm.report.sheet.figures.response import point_name

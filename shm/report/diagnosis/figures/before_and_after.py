@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.report import words
-from shm.report.diagnosis.content import DiagnosisSheet, claimed
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import claimed
 from shm.report.diagnosis.figures.modes import by_plane, kept, orders, planes
 from shm.report.diagnosis.phrases import label
 from shm.report.figures.member import Member

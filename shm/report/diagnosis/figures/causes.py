@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shm.report import words
-from shm.report.diagnosis.content import Claim, DiagnosisSheet, claims
+from shm.report.content import DiagnosisSheet
+from shm.report.diagnosis.content import Claim, claims
 from shm.report.diagnosis.phrases import label
 from shm.report.diagnosis.summary import verdict
 from shm.report.figures.member import Member

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.report import words
-from shm.report.content import NORMAL_90
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.content import DiagnosisSheet
 from shm.report.diagnosis.figures.modes import aside, by_plane, kept, measured, planes
 from shm.report.diagnosis.phrases import title
 from shm.report.figures.member import Member
@@ -30,6 +29,7 @@ from shm.report.figures.specification import (
     Symbol,
     limits,
 )
+from shm.report.intervals import NORMAL_90
 from shm.values import GapPlace, Plane, Residual, Trend
 
 _SPREAD = 0.62

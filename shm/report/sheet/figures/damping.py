@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report.content import NORMAL_90
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -20,6 +19,7 @@ from shm.report.figures.specification import (
     log_axis,
     stacked,
 )
+from shm.report.intervals import NORMAL_90
 from shm.report.sheet.spectra import Shown, shown_range
 from shm.values import PLANES, FloatArray, Mode
 

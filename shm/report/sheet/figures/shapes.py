@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from shm.report import words
-from shm.report.content import NORMAL_90
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -20,6 +19,7 @@ from shm.report.figures.specification import (
     Rule,
     Specification,
 )
+from shm.report.intervals import NORMAL_90
 from shm.report.sheet.content import TestSheet
 from shm.report.sheet.shapes import (
     ROOM,
