@@ -18,9 +18,7 @@ from shm.report.as_html import as_html
 from shm.report.figures import Illustration
 from shm.report.paper import Table
 from shm.report.trial.figures import trial_figures
-from shm.report.trial.summary import misses, summary
-from shm.report.trial.tables import answers, evidence
-from shm.report.trial_report import trial_paper
+from shm.report.trial_report import answers, evidence, misses, summary, trial_paper
 from shm.values import TrialScore
 
 DOCS = Path(__file__).parent

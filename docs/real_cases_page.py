@@ -27,11 +27,10 @@ from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
 from shm.report.as_text import as_text
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.phrases import label
-from shm.report.diagnosis.sizes import quantity, size
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_paper
-from shm.report.words import probability
+from shm.report.diagnosis_wording import label, quantity, size
+from shm.report.formatting import probability
 from shm.values import (
     Cause,
     Diagnosis,

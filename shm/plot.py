@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.content import DiagnosisSheet, HangerReport, TrendRow, trend_row
+from shm.report.contents import DiagnosisSheet, HangerReport, TestSheet, TrendRow, trend_row
 from shm.report.diagnosis.figures.causes import FIGURE as CAUSES
 from shm.report.diagnosis.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.frequencies import FIGURE as FREQUENCIES
@@ -27,7 +27,6 @@ from shm.report.figures.pairs import FIGURE as PAIRS
 from shm.report.figures.stiffness import FIGURE as STIFFNESS
 from shm.report.figures.tension import FIGURE as TENSION
 from shm.report.figures.trend import FIGURE as TREND
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures.response import FIGURE as RESPONSE
 from shm.report.sheet.figures.shapes import FIGURE as SHAPES
 from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION

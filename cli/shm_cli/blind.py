@@ -213,8 +213,7 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     from shm.blind.scoring import opened
     from shm.report.as_html import as_html
     from shm.report.as_text import as_text
-    from shm.report.trial.document import trial_json
-    from shm.report.trial_report import trial_paper
+    from shm.report.trial_report import trial_json, trial_paper
 
     found = opened(directory, key or key_beside(directory))
     if html is not None:

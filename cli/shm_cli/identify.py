@@ -18,7 +18,7 @@ from shm.modes_document import modes_document
 from shm.read.apart import read_test
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.report.sheet.figures import test_figures
 from shm.report.sheet_report import sheet_paper
 from shm.settings import Settings

@@ -17,14 +17,11 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
 from shm.report.as_text import as_text
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge_report import bridge_paper
-from shm.report.document import json
-from shm.report.hanger_report import hanger_paper
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.paper import Paper
 from shm.report.period import Period, period_since
-from shm.report.sheet.document import sheet_json
-from shm.report.sheet_report import sheet_paper
+from shm.report.sheet_report import sheet_json, sheet_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 from shm_cli.writable import NewFile
 
@@ -123,7 +120,7 @@ def _gathered(
             return _Report(content, bridge_paper, bridge_json)
         if test_id is None:
             of_hanger = hanger_report(workspace, store, hanger_id, now, period)
-            return _Report(of_hanger, hanger_paper, json)
+            return _Report(of_hanger, hanger_paper, hanger_json)
         sheet = test_sheet(workspace, store, hanger_id, test_id)
         return _Report(replace(sheet, generated_at=now), sheet_paper, sheet_json)
 

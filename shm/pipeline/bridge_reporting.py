@@ -11,8 +11,7 @@ from datetime import datetime
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.origins import settings_words, software
-from shm.report.bridge.content import BridgeReport, Course, HangerLine
-from shm.report.content import status_of
+from shm.report.contents import BridgeReport, Course, HangerLine, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
-from shm.report import words
-from shm.report.content import HangerReport, status
-from shm.report.diagnosis.part import diagnosed, how_to_diagnose
-from shm.report.diagnosis_report import diagnosis_part
-from shm.report.facts import facts
+from shm import documents, modes_document
+from shm.report import formatting
+from shm.report.bridge_report import pattern_json
+from shm.report.contents import DiagnosisSheet, HangerReport, of_nominal, status
+from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
+from shm.report.hanger_summary import advice, is_found, summary, tension_change
+from shm.report.hanger_tables import numbers, origins
 from shm.report.paper import CREDIBLE, Paper, Part
-from shm.report.summary import summary
-from shm.report.tables import numbers, origins
+from shm.report.period import period_json
+from shm.report.temperatures import temperature_documents
+from shm.values import FrequencyResponse
+from shm.values.stated_tension import StatedTension, stated
 
 if TYPE_CHECKING:
     from shm.report.figures.member import Illustration
@@ -22,7 +27,7 @@ def hanger_paper(data: HangerReport) -> Paper:
     """Summary, figures, numbers, gap diagnosis, origin."""
     state = status(data)
     return Paper(
-        title=words.hanger_name(data.hanger.id, data.hanger.name),
+        title=formatting.hanger_name(data.hanger.id, data.hanger.name),
         bridge=data.bridge,
         period=str(data.period) if data.period else "",
         status=state.value,
@@ -52,3 +57,134 @@ def _figures(data: HangerReport) -> Sequence[Illustration]:
     from shm.report.figures import illustrations
 
     return illustrations(data)
+
+
+def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
+    """The latest diagnosis of the report's hanger."""
+    if data.diagnosis is None:
+        return None
+    return DiagnosisSheet(data.diagnosis, data.hanger, data.bridge)
+
+
+def how_to_diagnose(data: HangerReport) -> str:
+    """What to do where no diagnosis was made."""
+    return (
+        "The gap between model and measurement has not been diagnosed. To learn where it lies, "
+        "what causes it and what that does to the tension: "
+        f"shm gap diagnose --hanger {data.hanger.id}"
+    )
+
+
+def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
+    """What, value, what stands beside it."""
+    unit = data.tension_unit
+    said = stated(data.averaged, unit)
+    repeats = f"; repeatability {said.repeatability}" if said.repeatability else ""
+    return (
+        ("Tension", said.tension, f"90 % interval {said.interval}{repeats}"),
+        *_limits(data, said),
+        _of_nominal(data),
+        _since_baseline(data),
+        (
+            "Latest test",
+            formatting.moment(data.latest.time),
+            formatting.temperature(data.latest.temperature_c),
+        ),
+        (
+            "Model class",
+            formatting.model_class(data.posterior.model),
+            f"{formatting.counted(len(data.latest.modes), 'mode')} identified",
+        ),
+    )
+
+
+def _limits(data: HangerReport, said: StatedTension) -> tuple[tuple[str, str, str], ...]:
+    """The probabilities that the owner's limits ask for."""
+    limits, unit = data.hanger.limits, data.tension_unit
+    asked = (
+        ("Above its limit", said.above, limits.tension_max_n),
+        ("Slack", said.slack, limits.tension_min_n),
+    )
+    return tuple(
+        (what, probability, f"probability; limit {formatting.rounded_tension(limit_n, unit)}")
+        for what, probability, limit_n in asked
+        if probability
+    )
+
+
+def _of_nominal(data: HangerReport) -> tuple[str, str, str]:
+    share = of_nominal(data.tension_n, data.hanger)
+    if share is None:
+        return ("Of nominal", "not known", "the hanger has no nominal tension")
+    nominal = formatting.rounded_tension(data.hanger.nominal_tension_n, data.tension_unit)
+    return (
+        "Of nominal",
+        f"{formatting.mean(share)} %",
+        f"90 % interval {formatting.span(share)} %; nominal {nominal}",
+    )
+
+
+def _since_baseline(data: HangerReport) -> tuple[str, str, str]:
+    change = tension_change(data)
+    if change is None:
+        return ("Since the baseline", "first test", "nothing earlier to compare with")
+    percent = change.scaled(100)
+    return (
+        "Since the baseline",
+        f"{formatting.mean(percent, signed=True)} %",
+        f"90 % interval {formatting.span(percent, signed=True)} %"
+        f"{'' if is_found(data) else ', if it has moved at all'}",
+    )
+
+
+REPORT_SCHEMA = "shm.report/1"
+
+
+def hanger_json(data: HangerReport) -> dict[str, Any]:
+    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    return {
+        "schema": REPORT_SCHEMA,
+        "bridge": data.bridge,
+        "hanger": asdict(data.hanger),
+        "status": status(data).name.lower(),
+        "summary": summary(data),
+        "advice": list(advice(data)),
+        "test": modes_document.test_document(data.latest),
+        "posterior": documents.posterior_document(data.posterior),
+        "baseline": documents.posterior_document(data.baseline) if data.baseline else None,
+        "selection": (
+            documents.selection_document(data.selection, data.hanger.limits)
+            if data.selection
+            else None
+        ),
+        "averaged": documents.averaged_document(data.averaged),
+        "trend": [asdict(row) for row in data.trend],
+        "drifts": [documents.drift_document(drift) for drift in data.drifts],
+        "alerts": [documents.alert_document(alert) for alert in data.alerts],
+        "acknowledged": dict(data.acknowledged),
+        "frequency_response": _response(data.frequency_response),
+        "quality": [asdict(check) for check in data.quality],
+        "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
+        "gap_watch": data.gap_watch,
+        "drift_watch": data.drift_watch,
+        "redescribed": list(data.redescribed),
+        "temperature_coefficients": temperature_documents(data.states),
+        "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
+        "period": period_json(data.period),
+        "lineage": dict(data.lineage),
+        "settings": dict(data.settings),
+        "version": data.version,
+        "generated_at": data.generated_at,
+    }
+
+
+def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:
+    """What was measured, without the lines: those stand in the archived recording."""
+    if response is None:
+        return None
+    return {
+        "source": response.source,
+        "points": [asdict(point) for point in response.points],
+        "lines": len(response.frequency_hz),
+        "highest_frequency_hz": float(response.frequency_hz[-1]),
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.paper import Table
 from shm.settings import TABLE
 from shm.values import ModalTest
@@ -23,7 +23,7 @@ _LINEAGE = {
 
 def lineage(told: Mapping[str, str]) -> dict[str, str]:
     """What a result was made from, its keys in words."""
-    return {_LINEAGE.get(key, words.quantity(key)): value for key, value in told.items()}
+    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in told.items()}
 
 
 def added_mass(test: ModalTest) -> str:

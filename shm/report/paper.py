@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from shm.report import words
+from shm.report import formatting
 
 if TYPE_CHECKING:
     from shm.report.figures.member import Illustration
@@ -120,7 +120,7 @@ class Paper:
     @property
     def made(self) -> str:
         """`Made 2026-05-01 10:00 UTC by shm 0.1.0`; empty where nobody says."""
-        when = f"Made {words.moment(self.generated_at)}" if self.generated_at else ""
+        when = f"Made {formatting.moment(self.generated_at)}" if self.generated_at else ""
         return f"{when} by shm {self.version}" if when and self.version else when
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.values import NAN, TENSION, Drift
@@ -18,18 +18,18 @@ _LARGEST_FACTOR = 1e3
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
     """Quantity, shift, 90 % interval, threshold, probability beyond it."""
     if not math.isfinite(row.shift_mean + row.shift_sd):
-        unknown = ("not known", "not known", threshold_cell(row), words.probability(NAN))
-        return (words.quantity(row.quantity), *unknown)
+        unknown = ("not known", "not known", threshold_cell(row), formatting.probability(NAN))
+        return (formatting.quantity(row.quantity), *unknown)
     interval = Interval.normal(row.shift_mean, row.shift_sd)
     # Of the baseline's own test, and where the data leave no room for a shift.
     unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
     size, span = _tension(interval) if row.quantity == TENSION else _stiffness(interval)
     return (
-        words.quantity(row.quantity),
+        formatting.quantity(row.quantity),
         "no change seen" if unmoved else size,
         _about_none(row) if unmoved else span,
         threshold_cell(row),
-        words.probability(row.probability),
+        formatting.probability(row.probability),
     )
 
 
@@ -66,7 +66,7 @@ def factor(decades: float) -> str:
 
 def _tension(interval: Interval) -> tuple[str, str]:
     percent = interval.scaled(100)
-    return f"{words.mean(percent, True)} %", f"{words.span(percent, True)} %"
+    return f"{formatting.mean(percent, True)} %", f"{formatting.span(percent, True)} %"
 
 
 def _stiffness(interval: Interval) -> tuple[str, str]:
@@ -85,7 +85,9 @@ def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
     return shift_table(pattern), Table(
         "What explains them",
         ("explanation", "probability"),
-        tuple((each.name, words.probability(each.probability)) for each in pattern.explanations),
+        tuple(
+            (each.name, formatting.probability(each.probability)) for each in pattern.explanations
+        ),
     )
 
 
@@ -125,7 +127,7 @@ def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
         str(row.hanger),
         _signed(newtons.in_unit(unit), places),
         _signed(fraction.scaled(100), _PERCENT_DECIMALS),
-        f"{row.way} ({words.probability(row.probability)})",
+        f"{row.way} ({formatting.probability(row.probability)})",
         _day(row.time),
     )
 

@@ -10,7 +10,7 @@ import time
 from dataclasses import replace
 
 from shm.report.as_html import as_html
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.report.sheet.figures import test_figures as report_test_figures
 from shm.report.sheet_report import sheet_paper
 from tests.report.sheets import make_points, make_recording, make_sheet, warned

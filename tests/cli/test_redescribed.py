@@ -12,8 +12,7 @@ from shm.pipeline.redescribed import MOVES_NOTHING, redescribed
 from shm.pipeline.reporting import hanger_report
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.document import json
-from shm.report.hanger_report import hanger_paper
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
 from shm.values import Hanger
 from tests.cli.conftest import Shm
@@ -57,7 +56,7 @@ def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_ba
     assert "description of hanger 3 has changed since its baseline" in first
     assert "shm drift rebaseline --hanger 3" in first
     assert "has changed since its baseline" in as_html(hanger_paper(data))
-    assert json(data)["redescribed"] == ["length_m from 12 to 12.4"]
+    assert hanger_json(data)["redescribed"] == ["length_m from 12 to 12.4"]
     told = shm("--workspace", workspace.folder, "doctor").out
     assert "described otherwise since the baseline: 3" in told
     command = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}")

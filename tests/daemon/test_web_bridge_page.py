@@ -13,8 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.report.bridge.content import HangerLine
-from shm.report.content import Status
+from shm.report.contents import HangerLine, Status
 from shm.report.intervals import Interval
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger

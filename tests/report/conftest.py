@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from shm.report.content import HangerReport, trend_row
+from shm.report.contents import HangerReport, trend_row
 from shm.report.figures import member
 from shm.report.figures.member import Illustration, Member, illustration
 from shm.values import (

@@ -15,17 +15,20 @@ from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
-from shm.report.bridge.content import BridgeReport, Course, HangerLine
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Status, TrendRow
-from shm.report.document import json
-from shm.report.hanger_report import hanger_paper
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.contents import (
+    BridgeReport,
+    Course,
+    HangerLine,
+    HangerReport,
+    Status,
+    TestSheet,
+    TrendRow,
+)
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.intervals import Interval
 from shm.report.period import Period
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.document import sheet_json
-from shm.report.sheet_report import sheet_paper
+from shm.report.sheet_report import sheet_json, sheet_paper
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
@@ -150,7 +153,7 @@ def document_words(document: object) -> str:
 def test_a_hanger_of_any_kind_is_told_in_numbers_and_words(kind: str, season: HangerReport) -> None:
     data = KINDS[kind](season)
     assert_spoken(as_text(hanger_paper(data)))
-    assert_spoken(document_words(json(data)))
+    assert_spoken(document_words(hanger_json(data)))
     # Drawing takes its time: who has no figure or table of its own is told by the others' words.
     if kind in DRAWN:
         assert_spoken(page_words(as_html(hanger_paper(data))))
@@ -161,7 +164,7 @@ def test_a_bare_hanger_is_told_in_numbers_and_words(bare: HangerReport) -> None:
     assert_spoken(as_text(hanger_paper(bare)))
     assert_spoken(page_words(as_html(hanger_paper(bare))))
     assert_spoken(Pdf.parse(as_pdf(hanger_paper(bare))).words)
-    assert_spoken(document_words(json(bare)))
+    assert_spoken(document_words(hanger_json(bare)))
 
 
 @pytest.mark.parametrize("with_period", [False, True])

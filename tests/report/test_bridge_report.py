@@ -10,14 +10,12 @@ import pytest
 
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Status
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
+from shm.report.hanger_summary import summary
+from shm.report.hanger_tables import neighbours
 from shm.report.intervals import Interval
 from shm.report.shifts import bar
-from shm.report.summary import summary
-from shm.report.tables import neighbours
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from tests.report.outline import Outline

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.report.colours import PALETTE
-from shm.report.content import DiagnosisSheet
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.figures import Illustration
 from shm.values import TensionEstimate

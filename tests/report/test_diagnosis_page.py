@@ -12,10 +12,9 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.content import DiagnosisSheet, HangerReport
-from shm.report.diagnosis.document import diagnosis_json
-from shm.report.diagnosis_report import diagnosis_paper, facts
-from shm.report.document import json as report_json
+from shm.report.contents import DiagnosisSheet, HangerReport
+from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper, facts
+from shm.report.hanger_report import hanger_json as report_json
 from shm.report.hanger_report import hanger_paper
 from shm.values import TensionEstimate
 from tests.report.diagnoses import CASES, HANGER, LED, STRING, STRING_HANGER, sheet

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from shm.report.colours import PALETTE
-from shm.report.content import HangerReport
+from shm.report.contents import HangerReport
 from shm.report.figures import Illustration, illustrations
 from shm.values import FrequencyResponse
 

@@ -13,20 +13,18 @@ import pytest
 from shm import notebook
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import DiagnosisSheet, HangerReport, Status
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerLine, HangerReport, Status
 from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
 from shm.report.diagnosis_report import diagnosis_paper
-from shm.report.document import json
 from shm.report.figures import illustrations
 from shm.report.figures.bridge_shift import bridge_illustration
 from shm.report.figures.drift import STATES
-from shm.report.hanger_report import hanger_paper
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_tables import history, models, tension
 from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
-from shm.report.tables import history, models, tension
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.force_units import force_unit
 from shm.watch.history import Band
@@ -109,7 +107,7 @@ def test_a_report_tells_every_tension_in_that_unit(
     for table, columns in ((history(data), (4, 5)), (models(data), (4, 5)), (tension(data), (1,))):
         cells = [row[column] for row in table.rows for column in columns]
         assert not [cell for cell in cells if NOTHING.search(cell)], cells
-    assert json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)
+    assert hanger_json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)

@@ -12,9 +12,8 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.content import HangerReport
-from shm.report.document import json
-from shm.report.hanger_report import hanger_paper
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.values import QualityCheck
 from tests.report.outline import Outline
 
@@ -92,7 +91,7 @@ def test_names_from_outside_cannot_inject_markup(bare: HangerReport) -> None:
 
 
 def test_the_document_survives_json_and_holds_the_contract(season: HangerReport) -> None:
-    document = standard_json.loads(documents.dump(json(season)))
+    document = standard_json.loads(documents.dump(hanger_json(season)))
     assert document["schema"] == "shm.report/1"
     assert document["posterior"] == standard_json.loads(
         documents.dump(documents.posterior_document(season.posterior))
@@ -108,7 +107,7 @@ def test_the_document_survives_json_and_holds_the_contract(season: HangerReport)
 
 
 def test_unknown_numbers_become_null_in_the_document(bare: HangerReport) -> None:
-    document = standard_json.loads(documents.dump(json(bare)))
+    document = standard_json.loads(documents.dump(hanger_json(bare)))
     assert document["baseline"] is None
     assert document["selection"] is None
     assert document["posterior"]["r_hat"] is None
@@ -127,6 +126,6 @@ def test_the_quality_of_the_latest_test_stands_in_page_text_document_and_advice(
         assert "clipping ! warning 0.99 0.95 acc_1 clips Lower the gain." in page
         assert "Mend what the quality of the latest test warns of: clipping." in page
     assert ("tr", {"class": "warning"}) in parsed.tags
-    document = standard_json.loads(documents.dump(json(judged)))
+    document = standard_json.loads(documents.dump(hanger_json(judged)))
     assert document["quality"][0]["name"] == "clipping"
     assert document["quality"][0]["verdict"] == "warning"

@@ -13,9 +13,8 @@ import shm.report
 from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
-from shm.report.bridge.content import BridgeReport, HangerLine
 from shm.report.bridge_report import bridge_paper
-from shm.report.content import HangerReport, Status
+from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
 from shm.report.paper import Paper, Part, Table

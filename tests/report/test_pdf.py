@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shm.report.as_pdf import WIDTH, as_pdf, widths
-from shm.report.content import HangerReport
+from shm.report.contents import HangerReport
 from shm.report.hanger_report import hanger_paper
 from shm.report.paper import Paper, Part, Table
 from tests.helpers.painting import paint_blank

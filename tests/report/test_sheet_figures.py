@@ -16,9 +16,9 @@ from matplotlib.lines import Line2D
 
 from shm.report import colours
 from shm.report.colours import PALETTE
+from shm.report.contents import TestSheet
 from shm.report.figures import Illustration
 from shm.report.figures.member import drawn as members_drawn
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures import MEMBERS
 from shm.report.sheet.figures import test_figures as report_test_figures
 from shm.report.sheet.spectra import Shown

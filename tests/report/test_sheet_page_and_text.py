@@ -13,9 +13,8 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.document import sheet_json
-from shm.report.sheet_report import sheet_paper
+from shm.report.contents import TestSheet
+from shm.report.sheet_report import sheet_json, sheet_paper
 from shm.values import ModalTest, QualityCheck
 from tests.report.outline import Outline
 from tests.report.sheets import (

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from shm.report.as_text import as_text, laid_out
-from shm.report.content import HangerReport
+from shm.report.contents import HangerReport
 from shm.report.hanger_report import hanger_paper
+from shm.report.hanger_tables import frequencies, numbers, origins
 from shm.report.paper import Table
-from shm.report.tables import frequencies, numbers, origins
 from shm.values import Mode, PredictedFrequency
 
 WHOLE = [

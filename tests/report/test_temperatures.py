@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from shm.report.as_text import as_text
-from shm.report.content import HangerReport
-from shm.report.document import json
-from shm.report.hanger_report import hanger_paper
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.states import StatesOverTime
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.values import FloatArray, TemperatureCoefficient
@@ -65,7 +64,7 @@ def test_text_and_document_of_a_report_hold_them(season: HangerReport) -> None:
     data = replace(season, states=states(TENSION))
     assert "CHANGE WITH THE TEMPERATURE" in as_text(hanger_paper(data))
     assert "-0.120 ± 0.030 % per K" in as_text(hanger_paper(data))
-    assert json(data)["temperature_coefficients"] == [
+    assert hanger_json(data)["temperature_coefficients"] == [
         {
             "quantity": "tension", "unit": "fraction per K", "mean": -0.0012, "sd": 0.0003,
             "prior_sd": 0.004, "known": True, "why_not_known": "",

@@ -15,9 +15,8 @@ from shm.blind.scoring import trial_score
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.figures import Illustration
-from shm.report.trial.document import trial_json
 from shm.report.trial.figures import trial_figures
-from shm.report.trial_report import trial_paper
+from shm.report.trial_report import trial_json, trial_paper
 from shm.values import TrialScore
 from tests.helpers.trial_answers import a_truth, an_answer, oracle, plausible, some_truths
 from tests.report.outline import Outline

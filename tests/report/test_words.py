@@ -6,7 +6,7 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.intervals import Interval
 
 
@@ -21,17 +21,17 @@ from shm.report.intervals import Interval
 def test_an_interval_shows_as_many_decimals_as_its_width_deserves(
     interval: Interval, expected: str
 ) -> None:
-    assert words.with_interval(interval, "kN") == expected
+    assert formatting.with_interval(interval, "kN") == expected
 
 
 def test_a_width_that_is_not_known_gets_one_decimal() -> None:
-    assert words.decimals(float("nan")) == 1
-    assert words.decimals(0.0) == 1
+    assert formatting.decimals(float("nan")) == 1
+    assert formatting.decimals(0.0) == 1
 
 
 def test_a_relative_change_carries_its_sign_and_its_interval() -> None:
     change = Interval(-0.0804, -0.0991, -0.0612)
-    assert words.signed_percent(change) == "-8.0 % (90 % interval -9.9 to -6.1 %)"
+    assert formatting.signed_percent(change) == "-8.0 % (90 % interval -9.9 to -6.1 %)"
 
 
 @pytest.mark.parametrize(
@@ -39,31 +39,31 @@ def test_a_relative_change_carries_its_sign_and_its_interval() -> None:
     [(0.5, "0.500"), (0.99999, "> 0.999"), (1e-9, "< 0.001"), (float("nan"), "not known")],
 )
 def test_a_probability_pretends_no_certainty(value: float, expected: str) -> None:
-    assert words.probability(value) == expected
+    assert formatting.probability(value) == expected
 
 
 def test_a_probability_is_spelled_out_in_a_sentence() -> None:
-    told = [words.told_probability(value) for value in (0.99999, 0.5, 1e-9)]
+    told = [formatting.told_probability(value) for value in (0.99999, 0.5, 1e-9)]
     assert told == ["above 0.999", "0.500", "below 0.001"]
 
 
 def test_what_is_unknown_is_said_in_words() -> None:
-    assert words.number(float("nan"), ".3f") == "not known"
-    assert words.temperature(float("nan")) == "temperature not recorded"
-    assert words.moment(None) == "time not recorded"
+    assert formatting.number(float("nan"), ".3f") == "not known"
+    assert formatting.temperature(float("nan")) == "temperature not recorded"
+    assert formatting.moment(None) == "time not recorded"
 
 
 def test_times_are_given_in_utc() -> None:
     time = datetime(2026, 5, 1, 12, 30, tzinfo=timezone(timedelta(hours=2)))
-    assert words.moment(time) == "2026-05-01 10:30 UTC"
+    assert formatting.moment(time) == "2026-05-01 10:30 UTC"
 
 
 def test_parameters_and_springs_have_plain_names_and_units() -> None:
-    assert words.quantity("transverse_end_stiffness") == "transverse end stiffness"
-    beam, solid = words.meaning("log10_k3", "beam2"), words.meaning("log10_krx", "solid1")
+    assert formatting.quantity("transverse_end_stiffness") == "transverse end stiffness"
+    beam, solid = formatting.meaning("log10_k3", "beam2"), formatting.meaning("log10_krx", "solid1")
     assert beam == "log10 of end stiffness k3 (transverse, arch end) in N m/rad"
     assert solid == "log10 of spring krx (across the bridge, deck end) in N/m per node"
-    assert words.meaning("theta_F", "beam2") == "tension over nominal tension"
+    assert formatting.meaning("theta_F", "beam2") == "tension over nominal tension"
 
 
 def test_a_normal_interval_holds_ninety_percent() -> None:
@@ -84,4 +84,4 @@ def test_a_normal_interval_holds_ninety_percent() -> None:
     ],
 )
 def test_an_adopted_class_is_told_without_its_ranges(name: str, told: str) -> None:
-    assert words.model_class(name) == told
+    assert formatting.model_class(name) == told

@@ -14,7 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.redescribed import redescribed
-from shm.report.words import counted
+from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import quick_troubles
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from shm.report.contents import TestSheet
 from shm.report.figures.member import Member
 from shm.report.figures.specification import Specification
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures.damping import FIGURE as DAMPING
 from shm.report.sheet.figures.hits import FIGURE as HITS
 from shm.report.sheet.figures.response import FIGURE as RESPONSE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.bridge.content import BridgeReport
+from shm.report.contents import BridgeReport
 from shm.report.figures.bridge_shift import bridge_illustration
 from shm.report.figures.bridge_tension import FIGURE as TENSIONS
 from shm.report.figures.member import Illustration, drawn

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.content import HangerReport
+from shm.report.contents import HangerReport
 from shm.report.figures.drift import FIGURE as DRIFT
 from shm.report.figures.frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.member import Illustration, Member, drawn

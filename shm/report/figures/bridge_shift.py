@@ -12,7 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from shm.report import colours, words
+from shm.report import colours, formatting
 from shm.report.figures import style
 from shm.report.figures.member import Illustration, Member, drawn
 from shm.report.shifts import shift_unit
@@ -197,7 +197,7 @@ def _alt(pattern: BridgePattern) -> str:
         for row in pattern.rows
         if row.way != "unchanged"
     ]
-    told = words.listed(moved) if moved else "none moved"
+    told = formatting.listed(moved) if moved else "none moved"
     return f"Shifts of the tension of {len(pattern.rows)} hangers along the bridge: {told}."
 
 

@@ -6,9 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import colours, words
-from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.content import Status
+from shm.report import colours, formatting
+from shm.report.contents import BridgeReport, HangerLine, Status
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.report.intervals import Interval
@@ -82,7 +81,7 @@ def _numbers(axes: Axes, data: BridgeReport) -> None:
 
 def _caption(data: BridgeReport) -> str:
     missing = len(data.hangers) - len(_shares(data))
-    left_out = f" {words.counted(missing, 'hanger')} without a tension." if missing else ""
+    left_out = f" {formatting.counted(missing, 'hanger')} without a tension." if missing else ""
     return (
         "Tension of each hanger by its latest test, in percent of its nominal tension: mean and "
         "90 % interval, which may reach beyond the view; its state by mark and colour. Dotted: "
@@ -92,7 +91,7 @@ def _caption(data: BridgeReport) -> str:
 
 def _alt(data: BridgeReport) -> str:
     told = [f"{line.hanger.id} {share.mean:.0f} %" for _, line, share in _shares(data)]
-    return f"Tension over nominal of {words.counted(len(told), 'hanger')}: {', '.join(told)}."
+    return f"Tension over nominal of {formatting.counted(len(told), 'hanger')}: {', '.join(told)}."
 
 
 FIGURE = Member("bridge_tension", "Tension of the hangers", _draw, _caption, _alt)

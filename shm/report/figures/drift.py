@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.report.content import HangerReport
+from shm.report.contents import HangerReport
 from shm.report.figures import over_time
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (

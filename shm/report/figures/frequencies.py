@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import HangerReport
+from shm.report import formatting
+from shm.report.contents import HangerReport
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -24,8 +24,8 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
+from shm.report.hanger_summary import residuals_percent
 from shm.report.intervals import NORMAL_90, Interval
-from shm.report.summary import residuals_percent
 from shm.values import PLANES, Mode, Plane, PredictedFrequency
 
 _BESIDE = {"transverse": -0.12, "longitudinal": 0.12}
@@ -99,16 +99,16 @@ def _sigma(data: HangerReport) -> Interval:
 
 
 def _model_error(data: HangerReport) -> str:
-    return "sigma " + words.with_interval(_sigma(data).scaled(100), "%")
+    return "sigma " + formatting.with_interval(_sigma(data).scaled(100), "%")
 
 
 def _caption(data: HangerReport) -> str:
     return (
-        f"Frequencies predicted by {words.model_class(data.posterior.model)} after updating, over "
-        "the measured ones of the latest test. Bars: 90 % interval that the uncertainty of the "
-        "parameters leaves; dark boxes: that of the measurement, where known; light band: model "
-        f"error ({_model_error(data)}). A mode outside the band is one that the model does not "
-        "explain."
+        f"Frequencies predicted by {formatting.model_class(data.posterior.model)} after updating, "
+        "over the measured ones of the latest test. Bars: 90 % interval that the uncertainty of "
+        "the parameters leaves; dark boxes: that of the measurement, where known; light band: "
+        f"model error ({_model_error(data)}). A mode outside the band is one that the model does "
+        "not explain."
     )
 
 

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.report.content import HangerReport, TrendRow
+from shm.report.contents import HangerReport, TrendRow
 from shm.report.figures.specification import (
     Axis,
     Band,

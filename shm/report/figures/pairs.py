@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import HangerReport
+from shm.report import formatting
+from shm.report.contents import HangerReport
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     Axis,
@@ -127,11 +127,11 @@ def _correlation(columns: list[_Column]) -> FloatArray:
 def caption(posterior: Posterior) -> str:
     shown = posterior.names[:_MOST_PARAMETERS]
     meanings = "; ".join(
-        f"{name.removeprefix('log10_')}: {words.meaning(name, posterior.model)}"
+        f"{name.removeprefix('log10_')}: {formatting.meaning(name, posterior.model)}"
         for name in shown
         if name != "theta_F"
     )
-    left = words.some(len(shown), len(posterior.names), "parameters")
+    left = formatting.some(len(shown), len(posterior.names), "parameters")
     return (
         "Samples of the posterior by the latest test: the share of each value on the diagonal, "
         "each parameter against each below it, their correlation above; cross: most probable "

@@ -9,8 +9,8 @@ from datetime import datetime
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import HangerReport
+from shm.report import formatting
+from shm.report.contents import HangerReport
 from shm.report.figures import over_time
 from shm.report.figures.member import Member
 from shm.report.figures.specification import Axis, Mark, Panel, Specification, limits, stacked
@@ -125,7 +125,7 @@ def _courses(data: HangerReport) -> list[Course]:
     base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
     return [
         Course(
-            words.quantity(name),
+            formatting.quantity(name),
             [row.time for row in rows],
             [row.row.test for row in rows],
             over_time.bounds_of([row.row.stiffness.get(name) for row in rows]),

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import colours, words
-from shm.report.content import HangerReport
+from shm.report import colours, formatting
+from shm.report.contents import HangerReport
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.values.force_units import ForceUnit
@@ -92,7 +92,7 @@ def _histogram(axes: Axes, data: HangerReport) -> None:
 
 
 def _caption(data: HangerReport) -> str:
-    tension = words.tension(data.tension_n, data.tension_unit)
+    tension = formatting.tension(data.tension_n, data.tension_unit)
     baseline = (
         "There is no earlier baseline."
         if data.baseline_tension_n is None
@@ -105,7 +105,7 @@ def _caption(data: HangerReport) -> str:
 
 
 def _alt(data: HangerReport) -> str:
-    tension = words.tension(data.tension_n, data.tension_unit)
+    tension = formatting.tension(data.tension_n, data.tension_unit)
     return f"Histogram of {len(data.posterior.samples)} posterior samples of tension, {tension}."
 
 

@@ -9,8 +9,8 @@ from datetime import datetime
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import HangerReport
+from shm.report import formatting
+from shm.report.contents import HangerReport
 from shm.report.figures import over_time
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
@@ -206,7 +206,8 @@ def _marks(course: Course) -> str:
 
 def alt(course: Course) -> str:
     first, last = (
-        f"{words.tension(course.tensions_n[place], course.unit)} on {course.times[place]:%Y-%m-%d}"
+        f"{formatting.tension(course.tensions_n[place], course.unit)} on "
+        f"{course.times[place]:%Y-%m-%d}"
         for place in (0, -1)
     )
     called = (
@@ -214,7 +215,7 @@ def alt(course: Course) -> str:
         if course.changes is not None
         else ""
     )
-    count = words.counted(len(course.times), "test")
+    count = formatting.counted(len(course.times), "test")
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
 
 
@@ -222,7 +223,7 @@ def _course(data: HangerReport) -> Course:
     rows = over_time.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
-    left = f"{words.counted(undated, 'test')} without a time left out." if undated else ""
+    left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
     return Course(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],

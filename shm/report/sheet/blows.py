@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.identify import Hit
+from shm.report.contents import TestSheet
 from shm.report.sheet.channels import strongest_row
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.thinning import peak_places
 from shm.report.sheet.timeline import channel_of, located_hits
 from shm.values import NAN, BoolArray, FloatArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.values import Channel
 
 _MOST_FAULTY = 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.values import FloatArray, Mode
 
 ROOM = 1.35

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.values import FloatArray, Mode, Recording, ResponsePoint
 
 _LEAST_SEGMENT_S = 20.0

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.identify import Hit
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.report.sheet.thinning import envelope_places
 from shm.values import Channel, FloatArray, Recording
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from shm.report import words
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.content import claimed
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis.figures import before_and_after, causes, gap_map
 from shm.report.diagnosis.figures.modes import kept, measured
-from shm.report.diagnosis.phrases import title
+from shm.report.diagnosis_wording import claimed, title
 from shm.report.figures.specification import stacked
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
@@ -34,7 +33,7 @@ GAP_MAP = HangerFigure(
 
 def _alt_of_places(view: HangerView) -> str:
     places = "; ".join(
-        f"as {title(place.kind)} it would sit at {words.number(place.x_m, '.2f')} m"
+        f"as {title(place.kind)} it would sit at {formatting.number(place.x_m, '.2f')} m"
         for place in gap_map.local(_sheet(view))
     )
     return f"Along the hanger: {places}."

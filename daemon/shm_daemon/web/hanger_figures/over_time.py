@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.figures import stiffness, trend
 from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
@@ -60,7 +60,9 @@ def _course(view: HangerView) -> trend.Course:
 def _remark(view: HangerView) -> str:
     undated = sum(point.taken_at is None for point in view.trend)
     told = (
-        f"{words.counted(undated, 'test')} without a time drawn at the receipt." if undated else "",
+        f"{formatting.counted(undated, 'test')} without a time drawn at the receipt."
+        if undated
+        else "",
         "The state over time is being worked out." if view.states is None else "",
     )
     return " ".join(filter(None, told))
@@ -99,7 +101,7 @@ def _by_tests(view: HangerView, name: str) -> stiffness.Course:
     base = view.baseline.stiffness.get(name) if view.baseline else None
     found = [point.stiffness.get(name) for point in view.trend]
     return stiffness.Course(
-        words.quantity(name),
+        formatting.quantity(name),
         [point.time for point in view.trend],
         [point.test for point in view.trend],
         bounds_of([Interval.of_summary(each) if each else None for each in found]),
@@ -162,7 +164,9 @@ def _over_temperature(view: HangerView) -> Specification:
 def _caption_of_temperature(view: HangerView) -> str:
     known = len(_with_temperature(view))
     without = len(view.trend) - known
-    left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
+    left = (
+        f" {formatting.counted(without, 'test')} without a temperature left out." if without else ""
+    )
     return (
         "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
         f"is lies along one line; what leaves it has another reason than the weather.{left}"
@@ -178,7 +182,7 @@ def _alt_of_temperature(view: HangerView) -> str:
         f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
     )
     return (
-        f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
+        f"Tension of {formatting.counted(len(known), 'test')} between {min(temperatures):.1f} and "
         f"{max(temperatures):.1f} °C: {low} to {high} {unit.name}."
     )
 

@@ -9,14 +9,13 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
-from shm.report import words
+from shm.report import formatting, sheet_report
 from shm.report.intervals import Interval
 from shm.report.paper import Table
-from shm.report.sheet import tables
+from shm.report.quality_table import overall
 from shm.report.sheet.figures.response import point_name
 from shm.report.sheet.spectra import shown_points
-from shm.report.sheet.summary import HEADLINES, name
-from shm.report.verdicts import overall
+from shm.report.sheet_report import HEADLINES, name
 from shm.values import ResponsePoint, Verdict
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
@@ -66,7 +65,9 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         missing=view.missing,
         before=before and (before, test_page(hanger_id, before)),
         after=after and (after, test_page(hanger_id, after)),
-        results=_filled(tables.modes(sheet), tables.quality(sheet), tables.set_aside(sheet)),
+        results=_filled(
+            sheet_report.modes(sheet), sheet_report.quality(sheet), sheet_report.set_aside(sheet)
+        ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],
         chosen=chosen,
@@ -74,7 +75,7 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         document=test_json(hanger_id, view.stored.test.id),
         hits=_hit_tables(view),
         at_work=AT_WORK,
-        details=_filled(tables.notes(sheet), *_dropped(view), _conditions(view)),
+        details=_filled(sheet_report.notes(sheet), *_dropped(view), _conditions(view)),
         lineage=_filled(origin(view), steps(view), superseded(view)),
     )
 
@@ -104,7 +105,7 @@ def _dropped(view: TestView) -> tuple[Table, ...]:
 def _conditions(view: TestView) -> Table:
     if view.worked:
         return view.worked.conditions
-    found = tables.conditions(view.as_stored)
+    found = sheet_report.conditions(view.as_stored)
     return replace(found, rows=tuple(row for row in found.rows if row[0] not in _NOT_STORED))
 
 
@@ -133,16 +134,20 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
     planes = {mode.plane for mode in sheet.modes}
     aside = len(sheet.identification.set_aside)
     return (
-        ("Modes", str(len(sheet.modes)), f"in {words.counted(len(planes), 'plane')}"),
+        ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         _tension(view),
         ("Temperature", _temperature(test.temperature_c), "of the test"),
-        ("Tested", words.moment(test.time), f"received {words.moment(view.recording.received_at)}"),
+        (
+            "Tested",
+            formatting.moment(test.time),
+            f"received {formatting.moment(view.recording.received_at)}",
+        ),
         ("Set aside", str(aside), "resonances not of the hanger"),
     )
 
 
 def _temperature(celsius: float) -> str:
-    return words.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
+    return formatting.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
 
 
 def _tension(view: TestView) -> tuple[str, str, str]:
@@ -153,6 +158,6 @@ def _tension(view: TestView) -> tuple[str, str, str]:
     tension_n = Interval.of_samples(posterior.tension_n)
     unit = force_unit(tension_n.mean)
     tension = tension_n.in_unit(unit)
-    span = f"90 % interval {words.span(tension)} {unit.name}"
-    beside = f"{span}, {words.model_class(posterior.model)}"
-    return "Tension by this test", f"{words.mean(tension)} {unit.name}", beside
+    span = f"90 % interval {formatting.span(tension)} {unit.name}"
+    beside = f"{span}, {formatting.model_class(posterior.model)}"
+    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", beside

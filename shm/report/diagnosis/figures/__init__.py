@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.content import DiagnosisSheet
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis.figures.before_and_after import FIGURE as BEFORE_AND_AFTER
 from shm.report.diagnosis.figures.causes import FIGURE as CAUSES
 from shm.report.diagnosis.figures.gap_map import FIGURE as GAP_MAP

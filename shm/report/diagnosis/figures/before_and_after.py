@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.content import claimed
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis.figures.modes import by_plane, kept, orders, planes
-from shm.report.diagnosis.phrases import label
+from shm.report.diagnosis_wording import claimed, label
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -118,7 +117,7 @@ def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
     known = [value for value in values if math.isfinite(value)]
     if not known:
         return "unknown"
-    return f"{words.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
+    return f"{formatting.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
 
 
 FIGURE = Member("before_and_after", "The gap before and after by mode", specify, _caption, _alt)

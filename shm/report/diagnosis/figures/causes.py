@@ -6,11 +6,10 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shm.report import words
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.content import Claim, claims
-from shm.report.diagnosis.phrases import label
-from shm.report.diagnosis.summary import verdict
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_wording import Claim, claims, label
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     Axis,
@@ -85,8 +84,8 @@ def probability_bars(
     drawn = [
         Bars(
             x=[row], y=[bar.probability], lying=True, width=0.62, colour=bar.colour,
-            labels=[words.probability(bar.probability)],
-            texts=[f"{bar.label}: {words.probability(bar.probability)}"],
+            labels=[formatting.probability(bar.probability)],
+            texts=[f"{bar.label}: {formatting.probability(bar.probability)}"],
         )
         for row, bar in enumerate(bars)
     ]  # fmt: skip
@@ -108,7 +107,7 @@ def _bars(diagnosis: Diagnosis) -> list[Bar]:
                 label(cause),
                 cause.probability,
                 "blue",
-                words.number(cause.log_bayes_factor, "+z.1f"),
+                formatting.number(cause.log_bayes_factor, "+z.1f"),
                 claim if len(claim.causes) > 1 else None,
             )
             for claim, cause in _shown(diagnosis)
@@ -144,7 +143,7 @@ def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
         x = max(bars[row].probability for row in rows) + 0.13
         top, bottom = rows[0] - 0.3, rows[-1] + 0.3
         sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
-        told = f"not told apart:\n{words.probability(claim.probability)} together"
+        told = f"not told apart:\n{formatting.probability(claim.probability)} together"
         marks += [
             Line(x=sides, y=heights, colour="purple", width=1.4),
             _notes([x + 0.01], [(top + bottom) / 2], [told], "purple", "right"),
@@ -165,7 +164,7 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     diagnosis = sheet.diagnosis
     shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
     left = len(diagnosis.causes) - shown
-    more = f" {words.counted(left, 'less probable cause')} {_are(left)} not drawn."
+    more = f" {formatting.counted(left, 'less probable cause')} {_are(left)} not drawn."
     alike = (
         "Causes with the same letter cannot be told apart with these data"
         if is_on_screen
@@ -183,7 +182,9 @@ def _are(count: int) -> str:
 
 
 def _alt(sheet: DiagnosisSheet) -> str:
-    bars = [f"{bar.label} {words.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)]
+    bars = [
+        f"{bar.label} {formatting.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)
+    ]
     return f"{verdict(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import DiagnosisSheet
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis.figures.modes import aside, by_plane, kept, measured, planes
-from shm.report.diagnosis.phrases import title
+from shm.report.diagnosis_wording import title
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -121,7 +121,7 @@ def _set_aside(
 def _told(residuals: Sequence[Residual]) -> list[str]:
     return [
         f"{r.plane} {r.order}, {r.test}: {r.residual_percent:+.2f} %, measured "
-        f"{words.number(r.measured_hz, '.3f')} Hz"
+        f"{formatting.number(r.measured_hz, '.3f')} Hz"
         for r in residuals
     ]
 
@@ -233,11 +233,11 @@ def _alt(sheet: DiagnosisSheet) -> str:
     worst = sorted(residuals, key=lambda r: -abs(r.residual_percent))[:3]
     told = ", ".join(f"{r.plane} {r.order} in {r.test} {r.residual_percent:+z.2f} %" for r in worst)
     places = "; ".join(
-        f"as {title(place.kind)} it would sit at {words.number(place.x_m, '.2f')} m"
+        f"as {title(place.kind)} it would sit at {formatting.number(place.x_m, '.2f')} m"
         for place in local(sheet)
     )
     there = f" Along the hanger: {places}." if places else ""
-    count = words.counted(len(residuals), "residual")
+    count = formatting.counted(len(residuals), "residual")
     gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in aside(sheet))
     set_aside = f" Set aside as a gross error: {gross}." if gross else ""
     return f"{count} of frequencies; the largest: {told}.{set_aside}{there}"

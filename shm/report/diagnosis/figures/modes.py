@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.content import is_set_aside
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_wording import is_set_aside
 from shm.report.figures.specification import PLANE_HUES, Axis, Mark, Panel, Rule
 from shm.values import PLANES, Plane, Residual
 

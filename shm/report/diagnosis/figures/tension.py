@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report import colours
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.tensions import AFTER, tension_of, tension_unit, tension_words
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_wording import AFTER, tension_of, tension_unit, tension_words
 from shm.report.figures import style
 from shm.report.figures.member import Member
 from shm.values import TensionEstimate

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from shm.report.contents import TestSheet
 from shm.report.figures.member import Illustration, Member, drawn
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.figures.damping import FIGURE as DAMPING
 from shm.report.sheet.figures.hits import FIGURE as HITS
 from shm.report.sheet.figures.quality import FIGURE as QUALITY

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     Axis,
@@ -126,7 +126,7 @@ def _fades(hits: Sequence[Blow]) -> Panel:
 
 def _caption(shown: Shown) -> str:
     sheet = shown.sheet
-    some = words.some(len(shown_blows(sheet)), len(sheet.hits), "hits")
+    some = formatting.some(len(shown_blows(sheet)), len(sheet.hits), "hits")
     return (
         "Above, the force of each hit and its spectrum, each relative to its largest value: it "
         "should stay above a tenth (-20 dB) up to the end of the band. Below, the largest "
@@ -141,8 +141,8 @@ def _alt(shown: Shown) -> str:
     forces = [blow.hit.peak_force_n for blow in hits]
     reach = f" A tenth of the force is left at {np.median(reaches):.0f} Hz." if reaches else ""
     return (
-        f"{words.counted(len(hits), 'hit')} of {words.plain(min(forces))} to "
-        f"{words.plain(max(forces))} N laid over each other.{reach}"
+        f"{formatting.counted(len(hits), 'hit')} of {formatting.plain(min(forces))} to "
+        f"{formatting.plain(max(forces))} N laid over each other.{reach}"
     )
 
 

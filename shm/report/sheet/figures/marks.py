@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shm.report.contents import TestSheet
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
@@ -16,7 +17,6 @@ from shm.report.figures.specification import (
     Points,
     Symbol,
 )
-from shm.report.sheet.content import TestSheet
 from shm.values import PLANES
 
 _ROWS = {"transverse": 0.94, "longitudinal": 0.83}

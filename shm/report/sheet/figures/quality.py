@@ -11,8 +11,8 @@ from shm.report import colours
 from shm.report.colours import VERDICT_COLOURS
 from shm.report.figures import style
 from shm.report.figures.member import Member
+from shm.report.quality_table import SYMBOLS, overall, verdict_label, with_unit
 from shm.report.sheet.spectra import Shown
-from shm.report.verdicts import SYMBOLS, label, overall, quantity
 from shm.values import QualityCheck
 
 _LINE_INCHES = 0.155
@@ -51,10 +51,10 @@ def _cells(check: QualityCheck) -> tuple[list[str], ...]:
     found = textwrap.wrap(check.found, _WORDS_WIDTH)
     todo = textwrap.wrap(f"→ {check.remedy}", _WORDS_WIDTH) if check.remedy else []
     return (
-        [label(check.verdict)],
+        [verdict_label(check.verdict)],
         textwrap.wrap(check.name, _CELL_WIDTH),
-        textwrap.wrap(quantity(check.value, check.unit), _CELL_WIDTH),
-        textwrap.wrap(quantity(check.limit, check.unit), _CELL_WIDTH),
+        textwrap.wrap(with_unit(check.value, check.unit), _CELL_WIDTH),
+        textwrap.wrap(with_unit(check.limit, check.unit), _CELL_WIDTH),
         [*found, *todo],
     )
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.report import words
+from shm.report import formatting
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     Axis,
@@ -138,7 +138,7 @@ def _coherence(
 
 def point_name(point: ResponsePoint) -> str:
     """Name, plane and place of a response."""
-    return words.place(point.name, point.plane, point.x_m)
+    return formatting.place(point.name, point.plane, point.x_m)
 
 
 def _caption(shown: Shown) -> str:
@@ -146,7 +146,9 @@ def _caption(shown: Shown) -> str:
     assert found is not None
     response = identified.frequency_response
     on_screen = f"{point_name(found.points[shown.point])}: " if shown.point is not None else ""
-    some = words.some(min(_MOST_POINTS, len(found.points)), len(found.points), "measured points")
+    some = formatting.some(
+        min(_MOST_POINTS, len(found.points)), len(found.points), "measured points"
+    )
     some = "" if on_screen else some
     if response is None:
         density = "power spectral density of the accelerations; nobody hit."

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from shm.report import words
+from shm.report import formatting
+from shm.report.contents import TestSheet
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -20,7 +21,6 @@ from shm.report.figures.specification import (
     Specification,
 )
 from shm.report.intervals import NORMAL_90
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.shapes import (
     ROOM,
     extent_m,
@@ -106,7 +106,7 @@ def _caption(shown: Shown) -> str:
         if sheet.hanger is not None
         else "Thin lines only join the measured places."
     )
-    some = words.some(len(shown_modes(sheet)), len(modes_with_shape(sheet)), "shapes")
+    some = formatting.some(len(shown_modes(sheet)), len(modes_with_shape(sheet)), "shapes")
     return (
         "Each panel is a mode: its order and frequency, its component in its own plane with the "
         "90 % interval where it is known, and that in the other plane as diamonds. The deck end "
@@ -118,7 +118,7 @@ def _alt(shown: Shown) -> str:
     modes = shown_modes(shown.sheet)
     places = len({point.x_m for mode in modes for point in mode.shape})
     listed = ", ".join(f"{mode.plane} {mode.order}" for mode in modes)
-    return f"Shapes of {len(modes)} modes at {words.counted(places, 'place')}: {listed}."
+    return f"Shapes of {len(modes)} modes at {formatting.counted(places, 'place')}: {listed}."
 
 
 FIGURE = Member("shapes", "Mode shapes", _draw, _caption, _alt)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify import Hit
-from shm.report import words
+from shm.report import formatting
+from shm.report.contents import TestSheet
 from shm.report.figures.member import Member
 from shm.report.figures.specification import (
     Axis,
@@ -21,7 +22,6 @@ from shm.report.figures.specification import (
 )
 from shm.report.sheet.blows import Blow, blows
 from shm.report.sheet.channels import shown_rows, strongest_row
-from shm.report.sheet.content import TestSheet
 from shm.report.sheet.spectra import Shown
 from shm.report.sheet.thinning import envelope_places
 from shm.report.sheet.timeline import (
@@ -115,7 +115,7 @@ def _title(sheet: TestSheet, row: int | None) -> tuple[str, str]:
     first = channels[0]
     assert first is not None
     there = {c.x_m for c in channels if c is not None and np.isfinite(c.x_m)}
-    title = words.place(first.name, first.plane, first.x_m if len(there) == 1 else np.nan)
+    title = formatting.place(first.name, first.plane, first.x_m if len(there) == 1 else np.nan)
     if len(there) > 1:
         title += ", place differs"
     fault = sheet.channel_faults.get(first.name)
@@ -140,7 +140,7 @@ def _hit_marks(sheet: TestSheet) -> list[Mark]:
         groups.setdefault("" if hit.used else hit.reason, []).append((number, hit))
     found: list[Mark] = []
     for reason, hits in groups.items():
-        counted = words.counted(len(hits), "hit")
+        counted = formatting.counted(len(hits), "hit")
         found.append(
             Points(
                 x=[hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
@@ -156,7 +156,7 @@ def _hit_marks(sheet: TestSheet) -> list[Mark]:
 
 def _told(number: int, hit: Hit) -> str:
     what = "used" if hit.used else f"dropped: {hit.reason}"
-    return f"hit {number}, {hit.start_s:.3f} s, {words.plain(hit.peak_force_n, 4)} N, {what}"
+    return f"hit {number}, {hit.start_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
 
 
 def _typical(sheet: TestSheet) -> Blow | None:
@@ -174,7 +174,7 @@ def _near(sheet: TestSheet, near: Blow) -> list[Panel]:
     assert motion is not None
     rate = record.sampling_rate_hz
     across = Axis(label=f"time from the start of hit {near.number} (ms)")
-    name = words.place(motion.name, motion.plane, motion.x_m)
+    name = formatting.place(motion.name, motion.plane, motion.x_m)
     return [
         Panel(
             y=Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
@@ -201,7 +201,7 @@ def _zoom(
 def _caption(shown: Shown) -> str:
     sheet = shown.sheet
     channels = len(sheet.recordings[0].accelerations)
-    some = words.some(len(shown_rows(sheet, _MOST_CHANNELS)), channels, "accelerations")
+    some = formatting.some(len(shown_rows(sheet, _MOST_CHANNELS)), channels, "accelerations")
     kind = "Force and accelerations" if sheet.recordings[0].force else "Accelerations"
     hits = (
         " Numbers and lines are the hits, in green those that were used, in red and dashed those "
@@ -218,7 +218,7 @@ def _caption(shown: Shown) -> str:
 def _alt(shown: Shown) -> str:
     sheet = shown.sheet
     seconds = sum(record.duration_s for record in sheet.recordings)
-    used = words.counted(len(sheet.used_hits), "hit")
+    used = formatting.counted(len(sheet.used_hits), "hit")
     dropped = [
         f"hit {number} at {hit.start_s:.1f} s: {hit.reason}"
         for number, hit in located_hits(sheet)

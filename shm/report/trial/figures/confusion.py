@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from shm.report import colours, words
+from shm.report import colours, formatting
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import judged, large
+from shm.report.trial_scores import judged, large
 from shm.values import CaseScore, TrialScore
 from shm.values.diagnosis import parted
 
@@ -59,9 +59,9 @@ def _draw(score: TrialScore) -> Figure | None:
             column, row, f"{table[row, column]:.0f}", ha="center", va="center",
             fontsize=style.TINY, color="white" if dark else colours.INK,
         )  # fmt: skip
-    axes.set_xticks(range(len(columns)), list(map(words.quantity, columns)), rotation=60,
+    axes.set_xticks(range(len(columns)), list(map(formatting.quantity, columns)), rotation=60,
                     ha="right", rotation_mode="anchor")  # fmt: skip
-    axes.set_yticks(range(len(rows)), list(map(words.quantity, rows)))
+    axes.set_yticks(range(len(rows)), list(map(formatting.quantity, rows)))
     axes.tick_params(length=0, labelsize=style.TINY)
     return figure
 
@@ -77,7 +77,7 @@ def _caption(score: TrialScore) -> str:
 def _alt(score: TrialScore) -> str:
     _, _, counts = _counts(score)
     told = [
-        f"{words.quantity(planted)} called {words.quantity(said)} {number}"
+        f"{formatting.quantity(planted)} called {formatting.quantity(said)} {number}"
         for (planted, said), number in sorted(counts.items())
     ]
     return f"Confusion matrix, cases: {'; '.join(told)}."

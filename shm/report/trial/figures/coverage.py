@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import find
 from shm.report.trial.figures.points import name_richness, of_richness, points
-from shm.report.trial.phrases import value
+from shm.report.trial_scores import find, value
 from shm.values import MarkName, TrialScore
 
 _PANELS: tuple[tuple[MarkName, str, float], ...] = (

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import RICHNESS, find, large
 from shm.report.trial.figures.points import points
-from shm.report.trial.phrases import value
+from shm.report.trial_scores import RICHNESS, find, large, value
 from shm.values import Bin, Richness, TrialScore
 
 _TICKS = (1, 4, 16, 64, 256, 1024)

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import find
-from shm.report.trial.phrases import value
+from shm.report.trial_scores import find, value
 from shm.values import TrialScore, Way
 
 _COLOURS: dict[Way, str] = {"modes": colours.BLUE, "recordings": colours.ORANGE}

@@ -6,10 +6,10 @@ from collections import Counter
 
 from matplotlib.figure import Figure
 
-from shm.report import colours, words
+from shm.report import colours, formatting
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import RICHNESS, judged
+from shm.report.trial_scores import RICHNESS, judged
 from shm.values import CaseScore, TrialScore
 
 _OUTCOMES = {
@@ -76,7 +76,7 @@ def _alt(score: TrialScore) -> str:
         f"{name}: {', '.join(f'{what} {number}' for what, number in counts.items())}"
         for name, counts in _counts(score)
     ]
-    return f"Answers without the true effect, {words.listed(told)}."
+    return f"Answers without the true effect, {formatting.listed(told)}."
 
 
 FIGURE = Member("trial_left_out", "With the true effect left out", _draw, _caption, _alt)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from shm.report.figures import style
-from shm.report.trial.content import RICHNESS, find
+from shm.report.trial_scores import RICHNESS, find
 from shm.values import MarkName, Richness, Score, TrialScore
 
 

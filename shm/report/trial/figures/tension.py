@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.member import Member
-from shm.report.trial.content import find, judged
-from shm.report.trial.phrases import value
+from shm.report.trial_scores import find, judged, value
 from shm.values import CaseScore, PlantedKind, TrialScore
 
 _KINDS: dict[PlantedKind, tuple[str, str, str]] = {

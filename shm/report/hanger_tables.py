@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from shm.report import words
-from shm.report.content import HangerReport, TrendRow, of_nominal
+from shm.report import formatting
+from shm.report.contents import HangerReport, TrendRow, of_nominal
+from shm.report.hanger_summary import misfits_percent, tension_change, told_tests
 from shm.report.intervals import Interval
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
-from shm.report.quality import quality_table
+from shm.report.quality_table import quality_table
 from shm.report.shifts import factor, shift_cells, shift_table
-from shm.report.summary import misfits_percent, tension_change, told_tests
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
@@ -38,8 +38,8 @@ def tension(data: HangerReport) -> Table:
         change = fraction.scaled(100)
         rows.append(
             (
-                "change since baseline", f"{words.mean(change, True)} %",
-                f"{words.span(change, True)} %", "",
+                "change since baseline", f"{formatting.mean(change, True)} %",
+                f"{formatting.span(change, True)} %", "",
             )
         )  # fmt: skip
     nominal_n = data.hanger.nominal_tension_n
@@ -57,9 +57,9 @@ def _tension_row(
     tension, share = tension_n.in_unit(unit), of_nominal(tension_n, hanger)
     return (
         label,
-        f"{words.mean(tension)} {unit.name}",
-        f"{words.span(tension)} {unit.name}",
-        f"{words.with_span(share)} %" if share else "no nominal",
+        f"{formatting.mean(tension)} {unit.name}",
+        f"{formatting.span(tension)} {unit.name}",
+        f"{formatting.with_span(share)} %" if share else "no nominal",
     )
 
 
@@ -134,7 +134,7 @@ def _irregular(data: HangerReport) -> list[Mode]:
 
 
 def _irregular_row(mode: Mode) -> tuple[str, ...]:
-    measured = f"{mode.frequency_hz:.3f}", words.number(mode.frequency_sd_hz, ".4f")
+    measured = f"{mode.frequency_hz:.3f}", formatting.number(mode.frequency_sd_hz, ".4f")
     return (mode.plane, str(mode.order), *measured, "not followed", "", "")
 
 
@@ -146,11 +146,11 @@ def _frequency_row(
     return (
         predicted.plane,
         str(predicted.order),
-        words.number(predicted.measured_hz, ".3f", "not measured"),
-        words.number(sd, ".4f"),
+        formatting.number(predicted.measured_hz, ".3f", "not measured"),
+        formatting.number(sd, ".4f"),
         f"{interval.mean:.3f}",
         f"{interval.low:.3f} to {interval.high:.3f}",
-        words.with_span(off, signed=True) if off else "not measured",
+        formatting.with_span(off, signed=True) if off else "not measured",
     )
 
 
@@ -161,7 +161,7 @@ def quality(data: HangerReport) -> Table:
 def parameters(data: HangerReport) -> Table:
     posterior = data.posterior
     return Table(
-        f"Parameters of the model class {words.model_class(posterior.model)}",
+        f"Parameters of the model class {formatting.model_class(posterior.model)}",
         ("name", "meaning", "mean", "90 % interval", "most probable"),
         tuple(_parameter_row(posterior, name) for name in posterior.names),
         note="Ratios and fractions have no unit; of the most probable set the interval is that of "
@@ -174,10 +174,10 @@ def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
     best = posterior.most_probable[posterior.names.index(name)]
     return (
         name,
-        words.meaning(name, posterior.model),
-        words.mean(interval),
-        words.span(interval),
-        f"{best:.{words.decimals(interval.width)}f}",
+        formatting.meaning(name, posterior.model),
+        formatting.mean(interval),
+        formatting.span(interval),
+        f"{best:.{formatting.decimals(interval.width)}f}",
     )
 
 
@@ -187,7 +187,7 @@ def models(data: HangerReport) -> Table:
     unit = force_unit(*(float(posterior.tension_n.mean()) for posterior, _ in pairs))
     return Table(
         "Model classes",
-        ("model", "probability", "log evidence", "its sd", *words.tension_headings(unit)),
+        ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
         tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
         note=f"Compared on {told_tests(pairs[0][0].tests)}, all classes held equally probable "
         "before. Evidence in natural logarithms, with the standard deviation of its sampling."
@@ -199,12 +199,12 @@ def models(data: HangerReport) -> Table:
 def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str, ...]:
     tension = Interval.of_samples(posterior.tension_n).in_unit(unit)
     return (
-        words.model_class(posterior.model),
-        words.probability(share),
+        formatting.model_class(posterior.model),
+        formatting.probability(share),
         f"{posterior.log_evidence:.2f}",
-        words.number(posterior.log_evidence_sd, ".2f"),
-        words.mean(tension),
-        words.span(tension),
+        formatting.number(posterior.log_evidence_sd, ".2f"),
+        formatting.mean(tension),
+        formatting.span(tension),
     )
 
 
@@ -217,11 +217,14 @@ def period(data: HangerReport) -> Table:
         f"In the period {data.period}",
         ("what", "at its first test", "at its last test", "change (90 % interval)"),
         (
-            ("test", first.test, last.test, words.counted(len(data.trend), "test")),
-            ("time", words.moment(first.time), words.moment(last.time), _days(first, last)),
+            ("test", first.test, last.test, formatting.counted(len(data.trend), "test")),
             (
-                "temperature", words.temperature(first.temperature_c),
-                words.temperature(last.temperature_c), _kelvins(first, last),
+                "time", formatting.moment(first.time), formatting.moment(last.time),
+                _days(first, last),
+            ),
+            (
+                "temperature", formatting.temperature(first.temperature_c),
+                formatting.temperature(last.temperature_c), _kelvins(first, last),
             ),
             _tension_course(first.tension_n, last.tension_n),
             *(
@@ -238,28 +241,28 @@ def period(data: HangerReport) -> Table:
 def _days(first: TrendRow, last: TrendRow) -> str:
     if first.time is None or last.time is None:
         return "not known"
-    return words.counted((last.time - first.time).days, "day")
+    return formatting.counted((last.time - first.time).days, "day")
 
 
 def _kelvins(first: TrendRow, last: TrendRow) -> str:
-    kelvins = words.number(last.temperature_c - first.temperature_c, "+z.1f")
+    kelvins = formatting.number(last.temperature_c - first.temperature_c, "+z.1f")
     return f"{kelvins} K" if kelvins != "not known" else kelvins
 
 
 def _tension_course(first: Interval, last: Interval) -> tuple[str, ...]:
     change = last.since(first).scaled(100)
     unit = force_unit(first.mean, last.mean)
-    both = (f"{words.with_span(each.in_unit(unit))} {unit.name}" for each in (first, last))
-    return ("tension", *both, f"{words.with_span(change, signed=True)} %")
+    both = (f"{formatting.with_span(each.in_unit(unit))} {unit.name}" for each in (first, last))
+    return ("tension", *both, f"{formatting.with_span(change, signed=True)} %")
 
 
 def _stiffness_course(name: str, first: Interval, last: Interval) -> tuple[str, ...]:
     change = last.less(first)
     mean, low, high = (factor(each) for each in (change.mean, change.low, change.high))
     return (
-        f"{words.quantity(name)}, log10 of N m/rad",
-        words.with_span(first),
-        words.with_span(last),
+        f"{formatting.quantity(name)}, log10 of N m/rad",
+        formatting.with_span(first),
+        formatting.with_span(last),
         f"{mean} times ({low} to {high} times)",
     )
 
@@ -269,7 +272,7 @@ def history(data: HangerReport) -> Table:
     unit = force_unit(*(row.tension_n.mean for row in data.trend))
     return Table(
         f"Tests{within}, latest first",
-        ("time", "test", "temperature", "model", *words.tension_headings(unit)),
+        ("time", "test", "temperature", "model", *formatting.tension_headings(unit)),
         tuple(_history_row(row, unit) for row in reversed(data.trend)),
         rest=_EARLIER,
     ).shortened(_ROWS_SHOWN)
@@ -278,13 +281,13 @@ def history(data: HangerReport) -> Table:
 def _history_row(row: TrendRow, unit: ForceUnit) -> tuple[str, ...]:
     tension = row.tension_n.in_unit(unit)
     return (
-        words.moment(row.time),
+        formatting.moment(row.time),
         row.test,
-        words.number(row.temperature_c, ".1f", "not recorded")
+        formatting.number(row.temperature_c, ".1f", "not recorded")
         + (" °C" if math.isfinite(row.temperature_c) else ""),
-        words.model_class(row.model),
-        words.mean(tension),
-        words.span(tension),
+        formatting.model_class(row.model),
+        formatting.mean(tension),
+        formatting.span(tension),
     )
 
 
@@ -299,7 +302,7 @@ def alerts(data: HangerReport) -> Table:
 
 
 def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
-    return (words.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
+    return (formatting.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
 
 
 _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
@@ -320,21 +323,21 @@ _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
 def origin(data: HangerReport) -> Table:
     posterior, test = data.posterior, data.latest
     facts = {
-        "test": f"{test.id}, {words.moment(test.time)}",
-        "temperature": words.temperature(test.temperature_c),
-        "hit level over reference level": words.plain(test.amplitude, absent="not recorded"),
+        "test": f"{test.id}, {formatting.moment(test.time)}",
+        "temperature": formatting.temperature(test.temperature_c),
+        "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
         "added mass": added_mass(test),
         "modes identified": f"{len(test.modes)}",
-        "model class": words.model_class(posterior.model),
+        "model class": formatting.model_class(posterior.model),
         "tests in this posterior": ", ".join(posterior.tests),
         "posterior samples": f"{len(posterior.samples)} (effective "
-        f"{words.number(posterior.effective_sample_size, '.0f')})",
-        "R-hat (1 is settled)": words.number(posterior.r_hat, ".3f"),
+        f"{formatting.number(posterior.effective_sample_size, '.0f')})",
+        "R-hat (1 is settled)": formatting.number(posterior.r_hat, ".3f"),
         "model evaluations": f"{posterior.evaluations}",
         "random seed": f"{posterior.seed}",
         "computing time": _seconds(posterior.seconds),
         **lineage(data.lineage),
-        "report made": f"{words.moment(data.generated_at)} by shm version {data.version}",
+        "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
     }
     return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
 

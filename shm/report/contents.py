@@ -1,15 +1,16 @@
-"""What a report is made from: one frozen value, complete at birth."""
+"""What each kind of report is made from: one frozen value, complete at birth."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
+from shm.identify import Dropped, Hit, Identification
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
@@ -22,9 +23,11 @@ from shm.values import (
     FrequencyResponse,
     Hanger,
     ModalTest,
+    Mode,
     Posterior,
     PredictedFrequency,
     QualityCheck,
+    Recording,
     Selection,
     Summary,
 )
@@ -229,3 +232,129 @@ class DiagnosisSheet:
     diagnosis: Diagnosis
     hanger: Hanger
     bridge: str = ""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What became of a hanger in the period of the report.
+
+    `change` is that of the tension from the first test of the period to the last, as a fraction;
+    None where it has fewer than two.
+    """
+
+    tests: int = 0
+    alerts: int = 0
+    change: Interval | None = None
+
+
+@dataclass(frozen=True)
+class HangerLine:
+    """A hanger as the report of its bridge shows it.
+
+    `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
+    it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
+    says in a few words what was called since; `open_alerts` counts those that nobody took note of.
+    `course` is None without a period.
+    """
+
+    hanger: Hanger
+    status: Status | None
+    latest: datetime | None = None
+    tension_n: Interval | None = None
+    called: str = ""
+    open_alerts: int = 0
+    drift: Drift | None = None
+    test: str = ""
+    model: str = ""
+    course: Course | None = None
+    baseline_tension_n: Interval | None = None
+    averaged: Averaged | None = None
+
+    @property
+    def of_nominal(self) -> Interval | None:
+        """The tension in percent of the nominal one."""
+        return of_nominal(self.tension_n, self.hanger) if self.tension_n else None
+
+    @property
+    def is_hardly_known(self) -> bool:
+        """Whether the interval of the tension is so wide that a shift could hardly be seen."""
+        return self.tension_n is not None and self.tension_n.is_wide
+
+
+def hangers_unit(lines: Iterable[HangerLine]) -> ForceUnit:
+    """The one unit of all their tensions, so that they compare at a glance."""
+    return force_unit(*(line.tension_n.mean for line in lines if line.tension_n))
+
+
+@dataclass(frozen=True)
+class BridgeReport:
+    """All that a report of a bridge says; `why_no_pattern` stands where there is no pattern."""
+
+    bridge: str
+    hangers: tuple[HangerLine, ...]
+    pattern: BridgePattern | None
+    why_no_pattern: str
+    generated_at: datetime
+    version: str
+    period: Period | None = None
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def worst(self) -> Status | None:
+        """The status of the hanger that is worst off; None before the first test."""
+        found = {line.status for line in self.hangers}
+        return next((status for status in Status if status in found), None)
+
+
+@dataclass(frozen=True, eq=False)
+class TestSheet:
+    """One identified test as a person checks it.
+
+    `records` are those it came from, in the order in which they were given; empty where they are
+    not at hand. `band_hz` is where modes were looked for; None where nobody says. `lineage` names
+    what it was made from, as in a hanger's report; who made the sheet when is empty where unsaid.
+    """
+
+    __test__: ClassVar[bool] = False  # Told to pytest, which takes every `Test...` for a test.
+
+    identification: Identification
+    records: Sequence[Recording | FrequencyResponse] = ()
+    hanger: Hanger | None = None
+    band_hz: tuple[float, float] | None = None
+    bridge: str = ""
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    generated_at: datetime | None = None
+    version: str = ""
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        return tuple(record for record in self.records if isinstance(record, Recording))
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes by plane and order."""
+        return self.identification.test.modes
+
+    @property
+    def hits(self) -> tuple[Hit, ...]:
+        return self.identification.hits
+
+    @property
+    def used_hits(self) -> tuple[Hit, ...]:
+        return tuple(hit for hit in self.hits if hit.used)
+
+    @property
+    def dropped(self) -> tuple[Dropped, ...]:
+        return self.identification.dropped
+
+    @property
+    def channel_faults(self) -> dict[str, str]:
+        """Why a channel was left out, by its name."""
+        prefix = "channel "
+        return {
+            each.what.removeprefix(prefix): each.reason
+            for each in self.dropped
+            if each.what.startswith(prefix)
+        }

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import math
 
-from shm.report import words
-from shm.report.content import DiagnosisSheet
-from shm.report.diagnosis.content import Answer, Claim, answer, claimed, claims
-from shm.report.diagnosis.phrases import label, phrase
-from shm.report.diagnosis.tensions import AFTER, tension_unit, tension_words
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_wording import (
+    AFTER,
+    Answer,
+    Claim,
+    answer,
+    claimed,
+    claims,
+    label,
+    phrase,
+    tension_unit,
+    tension_words,
+)
 from shm.report.intervals import Interval
 from shm.values import Diagnosis, NextMeasurement, Trend
 
@@ -34,7 +43,7 @@ _CONDITIONS = {
 
 def name(sheet: DiagnosisSheet) -> str:
     """`Gap diagnosis, Hanger 3`."""
-    return f"Gap diagnosis, {words.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
+    return f"Gap diagnosis, {formatting.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
 
 
 def summary(sheet: DiagnosisSheet) -> str:
@@ -65,12 +74,12 @@ def verdict(diagnosis: Diagnosis) -> str:
             return (
                 f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
                 "explains the measurements, probability "
-                f"{words.told_probability(diagnosis.no_gap_probability)}."
+                f"{formatting.told_probability(diagnosis.no_gap_probability)}."
             )
         case Answer.UNEXPLAINED:
             return (
                 f"{_none_explains(diagnosis)}: the probability of something else is "
-                f"{words.told_probability(diagnosis.unexplained_probability)}."
+                f"{formatting.told_probability(diagnosis.unexplained_probability)}."
             )
         case Answer.UNDECIDED:
             return _undecided(diagnosis)
@@ -83,7 +92,7 @@ def _none_explains(diagnosis: Diagnosis) -> str:
     start = "None" if diagnosis.unexplained_probability >= _SURE else "Most likely none"
     if not diagnosis.left_out:
         return f"{start} of the effects in the catalogue explains it"
-    left_out = words.listed([words.quantity(effect) for effect in diagnosis.left_out])
+    left_out = formatting.listed([formatting.quantity(effect) for effect in diagnosis.left_out])
     return f"{start} of the effects that were tried ({left_out} left out) explains it"
 
 
@@ -99,7 +108,7 @@ def _told(claim: Claim) -> str:
         return f"{phrase(claim.leading)}, {_odds(claim)}"
     if len(others) > _MOST_NAMED:
         others = [*others[:_MOST_NAMED], f"{len(others) - _MOST_NAMED} more"]
-    alike = words.listed(others)
+    alike = formatting.listed(others)
     return (
         f"{phrase(claim.leading)}, or what these data cannot tell from it: {alike}; together "
         f"{_odds(claim)}"
@@ -107,7 +116,7 @@ def _told(claim: Claim) -> str:
 
 
 def _odds(claim: Claim) -> str:
-    return f"probability {words.told_probability(claim.probability)}"
+    return f"probability {formatting.told_probability(claim.probability)}"
 
 
 def _undecided(diagnosis: Diagnosis) -> str:
@@ -120,21 +129,22 @@ def _undecided(diagnosis: Diagnosis) -> str:
     known = sorted((each for each in possible if math.isfinite(each[0])), reverse=True)
     if not known:
         return "Undecided: these data give no probability to any explanation."
-    told = [f"{what} ({words.told_probability(share)})" for share, what in known[:_MOST_NAMED]]
-    return f"Undecided: these data leave open {words.listed(told)}."
+    told = [f"{what} ({formatting.told_probability(share)})" for share, what in known[:_MOST_NAMED]]
+    return f"Undecided: these data leave open {formatting.listed(told)}."
 
 
 def _set_aside(diagnosis: Diagnosis) -> str:
     """The frequencies that are gross errors, and what should have been measured."""
     told = [
-        f"{each.plane} {each.order} of test {each.test} ({words.number(each.measured_hz, '.2f')} "
-        f"Hz, {words.number(each.expected_hz, '.2f')} Hz expected)"
+        f"{each.plane} {each.order} of test {each.test} "
+        f"({formatting.number(each.measured_hz, '.2f')} Hz, "
+        f"{formatting.number(each.expected_hz, '.2f')} Hz expected)"
         for each in diagnosis.outliers
     ]
     if not told:
         return ""
     gross = "as a gross error" if len(told) == 1 else "as gross errors"
-    return f"Set aside {gross}: {words.listed(told)}."
+    return f"Set aside {gross}: {formatting.listed(told)}."
 
 
 def _runner_up(diagnosis: Diagnosis) -> str:
@@ -162,7 +172,7 @@ def _pattern(diagnosis: Diagnosis) -> str:
     if not sure:
         return ""
     told = [f"{_CONDITIONS.get(t.condition, t.condition)} ({_slope(t)})" for t in sure]
-    return f"The gap changes with {words.listed(told)}."
+    return f"The gap changes with {formatting.listed(told)}."
 
 
 def sure_trend(trend: Trend) -> bool:
@@ -173,8 +183,8 @@ def sure_trend(trend: Trend) -> bool:
 
 def _slope(trend: Trend) -> str:
     over = "from transverse to longitudinal" if trend.condition == "plane" else "over its range"
-    interval = words.span(slope(trend), signed=True)
-    return f"{words.mean(slope(trend), signed=True)} % {over}, 90 % interval {interval} %"
+    interval = formatting.span(slope(trend), signed=True)
+    return f"{formatting.mean(slope(trend), signed=True)} % {over}, 90 % interval {interval} %"
 
 
 def slope(trend: Trend) -> Interval:
@@ -215,13 +225,13 @@ def _held_out(diagnosis: Diagnosis) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{words.plain(value, 2)} %"
+    return f"{formatting.plain(value, 2)} %"
 
 
 def _misfit(diagnosis: Diagnosis) -> str:
     if not diagnosis.fit_p_value < _POOR_FIT or answer(diagnosis) is Answer.UNEXPLAINED:
         return ""
-    chance = words.told_probability(diagnosis.fit_p_value)
+    chance = formatting.told_probability(diagnosis.fit_p_value)
     return (
         "Even so the fit is poor: were this all, measurements as far off would come with "
         f"probability {chance} only. Something is left."
@@ -280,4 +290,4 @@ def _odds_to_expect(measurement: NextMeasurement) -> str:
 
 def contender(effect: str) -> str:
     """What a measurement separates in plain words."""
-    return words.quantity(effect)
+    return formatting.quantity(effect)

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import HangerReport, Status, status
-from shm.report.diagnosis.summary import next_step, verdict
-from shm.report.diagnosis.tensions import AFTER, tension_of
+from shm.report import formatting
+from shm.report.contents import HangerReport, Status, status
+from shm.report.diagnosis_summary import next_step, verdict
+from shm.report.diagnosis_wording import AFTER, tension_of
 from shm.report.intervals import Interval
-from shm.report.redescription import redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
@@ -93,12 +92,12 @@ def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
 
 
 def _tension(data: HangerReport) -> str:
-    name = words.hanger_name(data.hanger.id, data.hanger.name)
-    tension = words.tension(data.tension_n, data.tension_unit)
-    when = words.moment(data.latest.time)
+    name = formatting.hanger_name(data.hanger.id, data.hanger.name)
+    tension = formatting.tension(data.tension_n, data.tension_unit)
+    when = formatting.moment(data.latest.time)
     return (
         f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
-        f"({when}, {words.temperature(data.latest.temperature_c)})."
+        f"({when}, {formatting.temperature(data.latest.temperature_c)})."
     )
 
 
@@ -113,17 +112,19 @@ def _against_nominal(data: HangerReport) -> str:
         return "It has no nominal tension to compare with."
     shift = data.tension_n.scaled(1 / nominal)
     fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
-    given = words.rounded_tension(nominal, data.tension_unit)
-    return f"Against the nominal {given} that is {words.signed_percent(fraction)}."
+    given = formatting.rounded_tension(nominal, data.tension_unit)
+    return f"Against the nominal {given} that is {formatting.signed_percent(fraction)}."
 
 
 def _against_baseline(data: HangerReport) -> str:
     then, change = data.baseline_tension_n, tension_change(data)
     if then is None or change is None or data.baseline is None:
         return "There is no earlier test to compare with: this one is the baseline."
-    tension = words.tension(then, data.tension_unit)
+    tension = formatting.tension(then, data.tension_unit)
     tests = told_tests(data.baseline.tests)
-    found = f"Against the baseline, {tests} with {tension}, it is {words.signed_percent(change)}"
+    found = (
+        f"Against the baseline, {tests} with {tension}, it is {formatting.signed_percent(change)}"
+    )
     return f"{found}{'' if is_found(data) else ', if it has moved at all'}."
 
 
@@ -148,8 +149,8 @@ def _change(data: HangerReport) -> str:
     top = max(data.drifts, key=lambda drift: drift.probability)
     return (
         f"No quantity has surely moved beyond its threshold: the likeliest is "
-        f"{words.quantity(top.quantity)}, with probability "
-        f"{words.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
+        f"{formatting.quantity(top.quantity)}, with probability "
+        f"{formatting.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
         f"{_unseen(data)}"
     )
 
@@ -176,8 +177,8 @@ def _shift(drift: Drift) -> str:
     _, shift, span, threshold, _ = shift_cells(drift)
     size = "" if drift.quantity == TENSION else f" to {shift} what it was (90 % interval {span})"
     return (
-        f"The {words.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
-        f"beyond its threshold of {threshold} is {words.told_probability(drift.probability)}."
+        f"The {formatting.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
+        f"beyond its threshold of {threshold} is {formatting.told_probability(drift.probability)}."
     )
 
 
@@ -185,9 +186,11 @@ def in_period(data: HangerReport) -> str:
     """What lay in the period of the report, and what changed in it against its start."""
     if data.period is None:
         return ""
-    tests = words.counted(len(data.trend), "test")
-    raised = words.counted(len(data.alerts), "alert")
-    called = words.listed([each.words for each in _called_in(data)] or ["no change was called"])
+    tests = formatting.counted(len(data.trend), "test")
+    raised = formatting.counted(len(data.alerts), "alert")
+    called = formatting.listed(
+        [each.words for each in _called_in(data)] or ["no change was called"]
+    )
     return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
 
 
@@ -199,7 +202,7 @@ def _course(data: HangerReport) -> str:
     if len(data.trend) < 2:
         return "with one test in it nothing in it can be compared"
     first, last = data.trend[0], data.trend[-1]
-    change = words.signed_percent(last.tension_n.since(first.tension_n))
+    change = formatting.signed_percent(last.tension_n.since(first.tension_n))
     return f"from its first test ({first.test}) to its last the tension moved by {change}"
 
 
@@ -211,8 +214,9 @@ def _model(data: HangerReport) -> str:
     count = "one measured mode" if len(misfits) == 1 else f"{len(misfits)} measured modes"
     return (
         f"{_chosen(data)}; over {count} it misses the frequencies by "
-        f"{words.plain(_rms_percent(data), 2)} % (rms), at most {worst.plane} {worst.order} by "
-        f"{words.mean(off, signed=True)} % (90 % interval {words.span(off, signed=True)} %)."
+        f"{formatting.plain(_rms_percent(data), 2)} % (rms), at most {worst.plane} {worst.order} "
+        f"by {formatting.mean(off, signed=True)} % (90 % interval "
+        f"{formatting.span(off, signed=True)} %)."
     )
 
 
@@ -247,9 +251,9 @@ def _outside(data: HangerReport) -> str:
 
 def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
-    told = words.listed([f"{each.plane} {each.order}" for each in modes])
+    told = formatting.listed([f"{each.plane} {each.order}" for each in modes])
     named = f"{told[0].upper()}{told[1:]}"
-    who = named if len(modes) <= _MOST_NAMED else words.counted(len(modes), "mode")
+    who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
 
 
@@ -270,22 +274,22 @@ def _allowing(data: HangerReport, diagnosis: Diagnosis) -> str:
     estimate = diagnosis.tension_after_n
     if math.isnan(estimate.mean):
         return ""
-    tension = words.tension(tension_of(estimate), data.tension_unit)
+    tension = formatting.tension(tension_of(estimate), data.tension_unit)
     return f"{AFTER.capitalize()}, the tension is {tension}."
 
 
 def _chosen(data: HangerReport) -> str:
-    model = words.model_class(data.posterior.model)
+    model = formatting.model_class(data.posterior.model)
     if data.selection is None or len(data.selection.posteriors) < 2:
         return f"The model class is {model}"
-    names = [words.model_class(posterior.model) for posterior in data.selection.posteriors]
+    names = [formatting.model_class(posterior.model) for posterior in data.selection.posteriors]
     if model not in names:
         return f"The model class is {model}"
     share = data.selection.probabilities[names.index(model)]
     best = "the most probable" if names[0] == model else f"not the most probable ({names[0]} is)"
     return (
         f"The model class is {model}, {best} of {', '.join(names)} "
-        f"(probability {words.told_probability(share)})"
+        f"(probability {formatting.told_probability(share)})"
     )
 
 
@@ -314,7 +318,7 @@ def _quality(data: HangerReport) -> str:
     doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
     if not doubted:
         return ""
-    return f"Mend what the quality of the latest test warns of: {words.listed(doubted)}."
+    return f"Mend what the quality of the latest test warns of: {formatting.listed(doubted)}."
 
 
 def _sampling(data: HangerReport) -> str:
@@ -354,3 +358,20 @@ def _thermometer(data: HangerReport) -> str:
     if math.isfinite(data.latest.temperature_c):
         return ""
     return "Record the temperature with the next test: it moves the tension."
+
+
+_MOST_CHANGES = 3
+
+
+def redescribed(data: HangerReport) -> str:
+    """That the description has changed since the baseline, and what to do; empty where not."""
+    if not data.redescribed:
+        return ""
+    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
+    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
+    number = data.hanger.id
+    return (
+        f"The description of hanger {number} has changed since its baseline: {named}. "
+        f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`. "
+        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
+    )
