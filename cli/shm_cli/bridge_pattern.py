@@ -8,7 +8,7 @@ import rich_click as click
 
 from shm.pipeline.bridge_reporting import stored_pattern
 from shm.report.bridge_report import pattern_json
-from shm.report.figures.bridge_shift import bridge_illustration
+from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.report.shifts import pattern_tables
 from shm_cli.common import json_option, opened_store, paragraph, show, show_texts
 from shm_cli.writable import NewFile

@@ -16,8 +16,8 @@ from shm.pipeline.terms import diagnosis_lineage
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis.figures import diagnosis_figures
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.figures.every_figure import diagnosis_figures
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion
 from shm_cli.adopt import adopt, adopted, drop

@@ -19,7 +19,7 @@ from shm.read.apart import read_test
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import TestSheet
-from shm.report.sheet.figures import test_figures
+from shm.report.figures.every_figure import sheet_figures
 from shm.report.sheet_report import sheet_paper
 from shm.settings import Settings
 from shm.values import Hanger, Recording
@@ -247,7 +247,7 @@ def _write(
     if html is not None:
         html.write_text(as_html(sheet_paper(sheets[0])), encoding="utf-8")
     for sheet in sheets if figures is not None else ():
-        for illustration in test_figures(sheet):
+        for illustration in sheet_figures(sheet):
             assert figures is not None
             figures.mkdir(parents=True, exist_ok=True)
             name = f"{sheet.identification.test.id}-{illustration.name}.png"

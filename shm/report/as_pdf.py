@@ -37,7 +37,7 @@ from reportlab.platypus import (
 from reportlab.platypus import Table as SetTable
 
 from shm.report import colours
-from shm.report.figures.member import Illustration
+from shm.report.figures.illustration import Illustration
 from shm.report.paper import Fact, Paper, Part, Table
 
 WIDTH = 174 * mm

@@ -20,7 +20,7 @@ from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
@@ -42,9 +42,9 @@ def bridge_paper(data: BridgeReport) -> Paper:
 
 
 def _figures(data: BridgeReport) -> Sequence[Illustration]:
-    from shm.report.bridge.figures import bridge_illustrations
+    from shm.report.figures.every_figure import bridge_figures
 
-    return bridge_illustrations(data)
+    return bridge_figures(data)
 
 
 def facts(data: BridgeReport) -> tuple[tuple[str, str, str], ...]:

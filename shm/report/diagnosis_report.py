@@ -40,7 +40,7 @@ from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Tr
 from shm.values.force_units import ForceUnit
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 _STYLES = {
     Answer.EXPLAINED: "first",
@@ -87,7 +87,7 @@ def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] 
 
 
 def _figures(sheet: DiagnosisSheet) -> Sequence[Illustration]:
-    from shm.report.diagnosis.figures import diagnosis_figures
+    from shm.report.figures.every_figure import diagnosis_figures
 
     return diagnosis_figures(sheet)
 

@@ -20,7 +20,7 @@ from shm.values import FrequencyResponse
 from shm.values.stated_tension import StatedTension, stated
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 
 def hanger_paper(data: HangerReport) -> Paper:
@@ -54,9 +54,9 @@ def gap_part(data: HangerReport) -> Part:
 
 
 def _figures(data: HangerReport) -> Sequence[Illustration]:
-    from shm.report.figures import illustrations
+    from shm.report.figures.every_figure import hanger_figures
 
-    return illustrations(data)
+    return hanger_figures(data)
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from shm.report import formatting
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 Fact = tuple[str, str, str]
 """What, value, what stands beside it."""

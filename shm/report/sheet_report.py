@@ -20,7 +20,7 @@ from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Rec
 from shm.values.force_units import force_unit
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 
 def sheet_paper(sheet: TestSheet) -> Paper:
@@ -44,9 +44,9 @@ def sheet_paper(sheet: TestSheet) -> Paper:
 
 
 def _figures(sheet: TestSheet) -> Sequence[Illustration]:
-    from shm.report.sheet.figures import page_figures
+    from shm.report.figures.every_figure import sheet_page_figures
 
-    return page_figures(sheet)
+    return sheet_page_figures(sheet)
 
 
 def facts(sheet: TestSheet) -> tuple[Fact, ...]:

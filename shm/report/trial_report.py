@@ -30,7 +30,7 @@ from shm.report.trial_scores import (
 from shm.values import CaseScore, Mark, MarkName, TrialScore
 
 if TYPE_CHECKING:
-    from shm.report.figures.member import Illustration
+    from shm.report.figures.illustration import Illustration
 
 _FACTS: tuple[tuple[MarkName, str], ...] = (
     ("detected", "Gaps seen"),
@@ -69,7 +69,7 @@ def trial_paper(score: TrialScore) -> Paper:
 
 
 def _figures(score: TrialScore) -> Sequence[Illustration]:
-    from shm.report.trial.figures import trial_figures
+    from shm.report.figures.every_figure import trial_figures
 
     return trial_figures(score)
 

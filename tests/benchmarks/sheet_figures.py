@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from shm.report.as_html import as_html
 from shm.report.contents import TestSheet
-from shm.report.sheet.figures import test_figures as report_test_figures
+from shm.report.figures.every_figure import sheet_figures as report_test_figures
 from shm.report.sheet_report import sheet_paper
 from tests.report.sheets import make_points, make_recording, make_sheet, warned
 

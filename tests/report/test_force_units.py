@@ -15,11 +15,11 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
 from shm.report.contents import BridgeReport, DiagnosisSheet, HangerLine, HangerReport, Status
-from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
 from shm.report.diagnosis_report import diagnosis_paper
-from shm.report.figures import illustrations
-from shm.report.figures.bridge_shift import bridge_illustration
-from shm.report.figures.drift import STATES
+from shm.report.figures.along_the_bridge import bridge_illustration
+from shm.report.figures.every_figure import hanger_figures
+from shm.report.figures.gap_before_and_after import GAP_TENSION
+from shm.report.figures.hanger_states import STATES
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_tables import history, models, tension
 from shm.report.intervals import Interval
@@ -114,7 +114,7 @@ def test_a_report_tells_every_tension_in_that_unit(
 def test_figures_are_labelled_in_that_unit(
     season: HangerReport, tension_n: float, unit: str
 ) -> None:
-    drawn = {each.name: each for each in illustrations(of_size(season, tension_n))}
+    drawn = {each.name: each for each in hanger_figures(of_size(season, tension_n))}
     (trend,), (posterior,) = drawn["trend"].figure.axes, drawn["tension"].figure.axes
     assert trend.get_ylabel() == posterior.get_xlabel() == f"tension ({unit})"
     assert posterior.get_ylabel() == f"probability density (1/{unit})"

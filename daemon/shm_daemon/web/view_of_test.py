@@ -20,8 +20,8 @@ from shm.identify import Identification, Poles
 from shm.pipeline.reporting import test_sheet
 from shm.pipeline.terms import identify_lineage
 from shm.report.contents import TestSheet
+from shm.report.figures.sheet_spectra import Shown, Spectrum
 from shm.report.paper import Table
-from shm.report.sheet.spectra import Shown, Spectrum
 from shm.report.sheet_report import advice, conditions, dropped, hits, summary, trust
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX

@@ -6,9 +6,9 @@ import math
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis.figures import before_and_after, causes, gap_map
-from shm.report.diagnosis.figures.modes import kept, measured
 from shm.report.diagnosis_wording import claimed, title
+from shm.report.figures import gap_before_and_after, gap_causes, gap_map
+from shm.report.figures.gap_map import kept, measured
 from shm.report.figures.specification import stacked
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
@@ -56,12 +56,12 @@ GAP_PLACES = HangerFigure(
 
 CAUSES = HangerFigure(
     "causes",
-    causes.FIGURE.title,
+    gap_causes.FIGURE.title,
     "gap",
     lambda view: view.sheet is not None and bool(view.sheet.diagnosis.causes),
-    lambda view: causes.specify_on_screen(_sheet(view)),
-    lambda view: causes.caption(_sheet(view), is_on_screen=True),
-    lambda view: causes.FIGURE.alt(_sheet(view)),
+    lambda view: gap_causes.specify_on_screen(_sheet(view)),
+    lambda view: gap_causes.caption(_sheet(view), is_on_screen=True),
+    lambda view: gap_causes.FIGURE.alt(_sheet(view)),
     height_px=430,
 )
 
@@ -77,8 +77,8 @@ BEFORE_AND_AFTER = HangerFigure(
     "How far the gap shrinks",
     "gap",
     _shrinks,
-    lambda view: before_and_after.specify(_sheet(view), is_on_screen=True),
-    lambda view: before_and_after.FIGURE.caption(_sheet(view)),
-    lambda view: before_and_after.FIGURE.alt(_sheet(view)),
+    lambda view: gap_before_and_after.specify(_sheet(view), is_on_screen=True),
+    lambda view: gap_before_and_after.BEFORE_AND_AFTER.caption(_sheet(view)),
+    lambda view: gap_before_and_after.BEFORE_AND_AFTER.alt(_sheet(view)),
     height_px=480,
 )

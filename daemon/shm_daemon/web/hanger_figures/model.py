@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.diagnosis.figures.causes import Bar, probability_bars
-from shm.report.figures.frequencies import FIGURE as OF_REPORT
-from shm.report.figures.frequencies import compared_modes
-from shm.report.figures.pairs import FIGURE as OF_PAIRS
+from shm.report.figures.gap_causes import Bar, probability_bars
+from shm.report.figures.hanger_frequencies import FIGURE as OF_REPORT
+from shm.report.figures.hanger_frequencies import compared_modes
+from shm.report.figures.parameter_pairs import FIGURE as OF_PAIRS
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 

@@ -10,11 +10,11 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.report import formatting, sheet_report
+from shm.report.figures.sheet_response import point_name
+from shm.report.figures.sheet_spectra import shown_points
 from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.report.quality_table import overall
-from shm.report.sheet.figures.response import point_name
-from shm.report.sheet.spectra import shown_points
 from shm.report.sheet_report import HEADLINES, name
 from shm.values import ResponsePoint, Verdict
 from shm.values.force_units import force_unit
