@@ -19,6 +19,7 @@ from shm.report.diagnosis_wording import (
     tension_words,
 )
 from shm.report.intervals import Interval
+from shm.report.paper import Fact
 from shm.values import Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
@@ -291,3 +292,59 @@ def _odds_to_expect(measurement: NextMeasurement) -> str:
 def contender(effect: str) -> str:
     """What a measurement separates in plain words."""
     return formatting.quantity(effect)
+
+
+def facts(sheet: DiagnosisSheet) -> tuple[Fact, ...]:
+    """The figures on top: what, value, what stands beside it."""
+    facts = (_claim(sheet), _misses(sheet), _tension_fact(sheet), _fit(sheet))
+    return tuple(fact for fact in facts if fact is not None)
+
+
+def _claim(sheet: DiagnosisSheet) -> Fact:
+    diagnosis, claim = sheet.diagnosis, claimed(sheet.diagnosis)
+    if claim is not None:
+        more = len(claim.causes) - 1
+        alike = f" or {formatting.counted(more, 'cause')} like it" if more else ""
+        told = formatting.probability(claim.probability)
+        return ("Probability of the cause", told, f"{label(claim.leading)}{alike}")
+    no_gap, unknown = diagnosis.no_gap_probability, diagnosis.unexplained_probability
+    if diagnosis.leads == "no gap":
+        return ("Probability of no gap", formatting.probability(no_gap), f"by {diagnosis.baseline}")
+    return ("Something else", formatting.probability(unknown), "probability, not in the catalogue")
+
+
+def _misses(sheet: DiagnosisSheet) -> Fact | None:
+    found = sheet.diagnosis.shrinkage
+    if math.isnan(found.rms_before_percent):
+        return None
+    both = (found.rms_before_percent, found.rms_after_percent)
+    before, with_it = (formatting.plain(value, 2) for value in both)
+    if math.isnan(found.rms_after_percent) or claimed(sheet.diagnosis) is None:
+        return ("Error of the frequencies", f"{before} %", "rms, by the baseline")
+    held = found.held_out_after_percent
+    told = f"rms; held out {formatting.plain(held, 2)} %" if math.isfinite(held) else "rms"
+    return ("Error of the frequencies", f"{before} → {with_it} %", told)
+
+
+def _tension_fact(sheet: DiagnosisSheet) -> Fact | None:
+    plain, better = sheet.diagnosis.tension_before_n, sheet.diagnosis.tension_after_n
+    if math.isnan(plain.mean):
+        return None
+    unit = tension_unit(sheet.diagnosis)
+    if math.isnan(better.mean):
+        told = f"baseline: {tension_words(plain, unit)}"
+        return ("Tension", formatting.rounded_tension(plain.mean, unit), told)
+    told = f"{tension_words(better, unit)}; baseline alone {tension_words(plain, unit)}"
+    return ("Tension", formatting.rounded_tension(better.mean, unit), told)
+
+
+def _fit(sheet: DiagnosisSheet) -> Fact | None:
+    p_value = sheet.diagnosis.fit_p_value
+    if math.isnan(p_value):
+        return None
+    told = "good" if p_value >= 0.05 else "doubtful" if p_value >= 0.01 else "poor"
+    return (
+        "Fit of the answer",
+        told,
+        f"posterior predictive p-value {formatting.probability(p_value)}",
+    )

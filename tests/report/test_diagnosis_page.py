@@ -13,7 +13,8 @@ from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper, facts
+from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.diagnosis_summary import facts
 from shm.report.hanger_report import hanger_json as report_json
 from shm.report.hanger_report import hanger_paper
 from shm.values import TensionEstimate

@@ -47,11 +47,12 @@ OF_TRIAL: tuple[Member[TrialScore], ...] = (
 
 
 def hanger_figures(data: HangerReport) -> tuple[Illustration, ...]:
-    """Those that a hanger's report has the data for, in reading order; so the others."""
+    """Those that the report of a hanger has the data for, in reading order."""
     return drawn(OF_HANGER, data)
 
 
 def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
+    """Those of a bridge: what moved, where it was compared, and what each hanger carries."""
     shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
     return (*shifts, *drawn((TENSIONS,), data))
 
@@ -67,8 +68,10 @@ def sheet_page_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
 
 
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
+    """Those of a gap diagnosis."""
     return drawn(OF_DIAGNOSIS, sheet)
 
 
 def trial_figures(score: TrialScore) -> tuple[Illustration, ...]:
+    """Those of a blind trial."""
     return drawn(OF_TRIAL, score)
