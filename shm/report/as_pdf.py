@@ -124,7 +124,7 @@ def _around(canvas: Canvas, paper: Paper) -> None:
     canvas.setFillColor(_QUIET)
     canvas.setStrokeColor(_GRID)
     right, top, bottom = _SIDE + WIDTH, _PAGE_HEIGHT - 13 * mm, 11 * mm
-    canvas.drawString(_SIDE, top, _cut(paper.bridge))
+    canvas.drawString(_SIDE, top, _cut(paper.above))
     canvas.drawRightString(right, top, _cut(paper.title))
     canvas.line(_SIDE, top - 2 * mm, right, top - 2 * mm)
     canvas.line(_SIDE, bottom + 4 * mm, right, bottom + 4 * mm)
@@ -165,9 +165,8 @@ def _flowables(paper: Paper) -> list[Flowable]:
     figures, tables = count(1), count(1)
     colour = colours.STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
-    above = ", ".join(word for word in (paper.bridge, paper.period) if word)
     return [
-        Paragraph(escape(above), _LABEL),
+        Paragraph(escape(paper.above), _LABEL),
         Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
         *(
             each

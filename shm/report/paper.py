@@ -108,6 +108,12 @@ class Paper:
     version: str = ""
 
     @property
+    def above(self) -> str:
+        """`Arch bridge, period 2026-03-01 to 2026-05-25`: what stands above the title."""
+        period = f"period {self.period}" if self.period else ""
+        return ", ".join(word for word in (self.bridge, period) if word)
+
+    @property
     def name(self) -> str:
         """`Hanger 3, Arch bridge`: for a list of files, and the properties of one."""
         return ", ".join(word for word in (self.title, self.bridge, self.period) if word)

@@ -14,9 +14,9 @@ from shm.report.figures.sheet_signals import (
     CURVE_BINS,
     LOWEST_DB,
     REACH_DB,
-    Blow,
-    blow_name,
-    shown_blows,
+    HitRecord,
+    hit_name,
+    shown_hits,
 )
 from shm.report.figures.sheet_spectra import Shown, searched_range
 from shm.report.figures.specification import (
@@ -37,19 +37,19 @@ _FADE_ROOM = 1.3
 
 
 def _draw(shown: Shown) -> Specification | None:
-    hits = shown_blows(shown.sheet)
+    hits = shown_hits(shown.sheet)
     if not hits:
         return None
     panels = [_pulses(hits), _spectra(shown, hits), _fades(hits)]
     rows = [[each] for each in panels] if shown.is_on_screen else [panels[:2], panels[2:]]
-    columns = 6 if all(blow.hit.used for blow in hits) else 3
+    columns = 6 if all(hit_record.hit.used for hit_record in hits) else 3
     return Specification(rows=rows, height_inches=5.4, legend_columns=columns)
 
 
-def _look(blow: Blow, place: int) -> dict[str, Any]:
+def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
     """Colour, dashes and name of a hit: a dropped one is red."""
-    name = blow_name(blow)
-    if not blow.hit.used:
+    name = hit_name(hit_record)
+    if not hit_record.hit.used:
         dashes = _DROPPED_DASHES[place % len(_DROPPED_DASHES)]
         return {"name": name, "colour": "red", "dash": dashes, "width": 1.1}
     dashes = _DASHES[place // len(_COLOURS) % len(_DASHES)]
@@ -57,17 +57,18 @@ def _look(blow: Blow, place: int) -> dict[str, Any]:
     return {"name": name, "colour": colour, "dash": dashes, "width": 0.9}
 
 
-def _pulses(hits: Sequence[Blow]) -> Panel:
+def _pulses(hits: Sequence[HitRecord]) -> Panel:
     lines = []
-    for place, blow in enumerate(hits):
-        kept = envelope_places(blow.force_n, CURVE_BINS)
+    for place, hit_record in enumerate(hits):
+        kept = envelope_places(hit_record.force_n, CURVE_BINS)
         lines.append(
             Line(
-                x=1e3 * blow.time_s[kept], y=blow.force_n[kept], hover="%{x:.1f} ms: %{y:.4g} N",
-                **_look(blow, place),
+                x=1e3 * hit_record.time_s[kept], y=hit_record.force_n[kept],
+                hover="%{x:.1f} ms: %{y:.4g} N",
+                **_look(hit_record, place),
             )
         )  # fmt: skip
-    spans_ms = 1e3 * np.array([blow.near_s for blow in hits])
+    spans_ms = 1e3 * np.array([hit_record.near_s for hit_record in hits])
     return Panel(
         y=Axis(label="force (N)"), marks=lines,
         x=Axis(
@@ -77,21 +78,21 @@ def _pulses(hits: Sequence[Blow]) -> Panel:
     )  # fmt: skip
 
 
-def _spectra(shown: Shown, hits: Sequence[Blow]) -> Panel:
+def _spectra(shown: Shown, hits: Sequence[HitRecord]) -> Panel:
     highest = float(hits[0].spectrum_hz[-1])
     low, high = searched_range(shown.sheet)
     high = min(high, highest)
     end = min(2 * high, highest)
     lines = []
-    for place, blow in enumerate(hits):
+    for place, hit_record in enumerate(hits):
         # Far below the panel nothing is drawn, as lines to there would cross others outside it.
-        kept = (blow.spectrum_hz <= end) & (blow.spectrum_db > LOWEST_DB - 20)
-        found = np.where(kept, blow.spectrum_db, np.nan)
+        kept = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
+        found = np.where(kept, hit_record.spectrum_db, np.nan)
         places = envelope_places(found, CURVE_BINS)
         lines.append(
             Line(
-                x=blow.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
-                **_look(blow, place),
+                x=hit_record.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
+                **_look(hit_record, place),
             )
         )  # fmt: skip
     level = Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
@@ -103,8 +104,8 @@ def _spectra(shown: Shown, hits: Sequence[Blow]) -> Panel:
     )  # fmt: skip
 
 
-def _fades(hits: Sequence[Blow]) -> Panel:
-    values = np.concatenate([blow.fade_m_s2_n for blow in hits])
+def _fades(hits: Sequence[HitRecord]) -> Panel:
+    values = np.concatenate([hit_record.fade_m_s2_n for hit_record in hits])
     known = values[np.isfinite(values) & (values > 0)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.1, 1.0)
     axis = Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
@@ -112,21 +113,21 @@ def _fades(hits: Sequence[Blow]) -> Panel:
         y=replace(axis, label="largest acceleration\nper peak force (m/s²/N)"),
         marks=[
             Line(
-                x=blow.fade_s, y=blow.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
-                **_look(blow, place),
+                x=hit_record.fade_s, y=hit_record.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
+                **_look(hit_record, place),
             )
-            for place, blow in enumerate(hits)
+            for place, hit_record in enumerate(hits)
         ],
         x=Axis(
             label="time from the start of the hit (s)",
-            range=(0, max(float(blow.fade_s[-1]) for blow in hits)),
+            range=(0, max(float(hit_record.fade_s[-1]) for hit_record in hits)),
         ),
     )  # fmt: skip
 
 
 def _caption(shown: Shown) -> str:
     sheet = shown.sheet
-    some = formatting.some(len(shown_blows(sheet)), len(sheet.hits), "hits")
+    some = formatting.some(len(shown_hits(sheet)), len(sheet.hits), "hits")
     return (
         "Above, the force of each hit and its spectrum, each relative to its largest value: it "
         "should stay above a tenth (-20 dB) up to the end of the band. Below, the largest "
@@ -136,9 +137,9 @@ def _caption(shown: Shown) -> str:
 
 
 def _alt(shown: Shown) -> str:
-    hits = shown_blows(shown.sheet)
+    hits = shown_hits(shown.sheet)
     reaches = [b.reach_hz for b in hits if b.hit.used and np.isfinite(b.reach_hz)]
-    forces = [blow.hit.peak_force_n for blow in hits]
+    forces = [hit_record.hit.peak_force_n for hit_record in hits]
     reach = f" A tenth of the force is left at {np.median(reaches):.0f} Hz." if reaches else ""
     return (
         f"{formatting.counted(len(hits), 'hit')} of {formatting.plain(min(forces))} to "

@@ -134,7 +134,7 @@ _FADE_BINS = 80
 
 
 @dataclass(frozen=True, eq=False)
-class Blow:
+class HitRecord:
     """One hit. `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins;
     `spectrum_hz` and `spectrum_db` (lines,), relative to the spectrum's largest value;
     `fade_s` and `fade_m_s2_n` (bins,): largest accelerations after the hit per peak force.
@@ -167,26 +167,26 @@ class Blow:
         return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
 
 
-def blows(sheet: TestSheet) -> list[Blow]:
+def hit_records(sheet: TestSheet) -> list[HitRecord]:
     """Every hit whose record is at hand, in the order of the hits."""
     row = strongest_row(sheet) if sheet.recordings else 0
-    found = [_blow(sheet, number, hit, row) for number, hit in located_hits(sheet)]
-    return [blow for blow in found if blow is not None]
+    found = [_hit_record(sheet, number, hit, row) for number, hit in located_hits(sheet)]
+    return [hit_record for hit_record in found if hit_record is not None]
 
 
-def shown_blows(sheet: TestSheet) -> list[Blow]:
+def shown_hits(sheet: TestSheet) -> list[HitRecord]:
     """All hits, or some of them with every dropped one first."""
-    dropped_first = sorted(blows(sheet), key=lambda blow: blow.hit.used)
-    return sorted(dropped_first[:_MOST_SHOWN], key=lambda blow: blow.number)
+    dropped_first = sorted(hit_records(sheet), key=lambda hit_record: hit_record.hit.used)
+    return sorted(dropped_first[:_MOST_SHOWN], key=lambda hit_record: hit_record.number)
 
 
-def blow_name(blow: Blow) -> str:
+def hit_name(hit_record: HitRecord) -> str:
     """`hit 2, dropped: double hit`."""
-    reason = "" if blow.hit.used else f", dropped: {blow.hit.reason}"
-    return f"hit {blow.number}{reason}"
+    reason = "" if hit_record.hit.used else f", dropped: {hit_record.hit.reason}"
+    return f"hit {hit_record.number}{reason}"
 
 
-def _blow(sheet: TestSheet, number: int, hit: Hit, row: int) -> Blow | None:
+def _hit_record(sheet: TestSheet, number: int, hit: Hit, row: int) -> HitRecord | None:
     record = sheet.recordings[hit.record]
     force, motion = record.force, channel_of(record, row)
     if force is None or motion is None:
@@ -195,7 +195,7 @@ def _blow(sheet: TestSheet, number: int, hit: Hit, row: int) -> Blow | None:
     time_s, force_n = _pulse(force.values[:stop], hit, rate)
     spectrum_hz, spectrum_db = _spectrum(force_n, rate)
     fade_s, fade = _fade(motion.values[hit.start : stop], rate)
-    return Blow(
+    return HitRecord(
         number, hit, time_s, force_n, spectrum_hz, spectrum_db, fade_s, fade / hit.peak_force_n
     )
 

@@ -11,10 +11,10 @@ from shm.report import formatting
 from shm.report.contents import TestSheet
 from shm.report.figures.illustration import Member
 from shm.report.figures.sheet_signals import (
-    Blow,
-    blows,
+    HitRecord,
     borders_s,
     channel_of,
+    hit_records,
     hit_time_s,
     located_hits,
     offsets_s,
@@ -161,15 +161,15 @@ def _told(number: int, hit: Hit) -> str:
     return f"hit {number}, {hit.start_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
 
 
-def _typical(sheet: TestSheet) -> Blow | None:
+def _typical(sheet: TestSheet) -> HitRecord | None:
     """The used hit of median force, else any."""
-    found = blows(sheet)
-    hits = [blow for blow in found if blow.hit.used] or found
-    hits = sorted(hits, key=lambda blow: blow.hit.peak_force_n)
+    found = hit_records(sheet)
+    hits = [hit_record for hit_record in found if hit_record.hit.used] or found
+    hits = sorted(hits, key=lambda hit_record: hit_record.hit.peak_force_n)
     return hits[len(hits) // 2] if hits else None
 
 
-def _near(sheet: TestSheet, near: Blow) -> list[Panel]:
+def _near(sheet: TestSheet, near: HitRecord) -> list[Panel]:
     record, start = sheet.recordings[near.hit.record], near.hit.start
     force, motion = record.force, channel_of(record, strongest_row(sheet))
     assert force is not None

@@ -10,13 +10,14 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.report import formatting, sheet_report
+from shm.report.colours import VERDICT_STYLES
 from shm.report.figures.sheet_response import point_name
 from shm.report.figures.sheet_spectra import shown_points
 from shm.report.intervals import Interval
-from shm.report.paper import Table
+from shm.report.paper import Table, filled
 from shm.report.quality_table import overall
 from shm.report.sheet_report import HEADLINES, name
-from shm.values import ResponsePoint, Verdict
+from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address_of_test import test_json, test_page
@@ -29,12 +30,6 @@ from shm_daemon.web.view_of_test import AT_WORK, TestView
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
 Response = Annotated[int | None, Query(ge=0, le=100_000)]
-_STYLES: dict[Verdict, str] = {
-    "good": "steady",
-    "warning": "watch",
-    "refused": "alert",
-    "unknown": "first",
-}
 _NOT_STORED = ("exponential window on the responses", "records")
 """Conditions that only the raw file tells."""
 
@@ -59,13 +54,13 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         title=name(sheet),
         hanger=hanger_id,
         verdict=HEADLINES[verdict],
-        style=_STYLES[verdict],
+        style=VERDICT_STYLES[verdict],
         summary=view.summary,
         facts=_facts(view),
         missing=view.missing,
         before=before and (before, test_page(hanger_id, before)),
         after=after and (after, test_page(hanger_id, after)),
-        results=_filled(
+        results=filled(
             sheet_report.modes(sheet), sheet_report.quality(sheet), sheet_report.set_aside(sheet)
         ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
@@ -75,8 +70,8 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         document=test_json(hanger_id, view.stored.test.id),
         hits=_hit_tables(view),
         at_work=AT_WORK,
-        details=_filled(sheet_report.notes(sheet), *_dropped(view), _conditions(view)),
-        lineage=_filled(origin(view), steps(view), superseded(view)),
+        details=filled(sheet_report.notes(sheet), *_dropped(view), _conditions(view)),
+        lineage=filled(origin(view), steps(view), superseded(view)),
     )
 
 
@@ -90,11 +85,7 @@ def _hits(request: Request, view: TestView) -> HTMLResponse:
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
     whole = None if view.missing else view.workshop.kept(view.order)
-    return _filled(whole.hits) if whole else None
-
-
-def _filled(*found: Table) -> tuple[Table, ...]:
-    return tuple(table for table in found if table.rows)
+    return filled(whole.hits) if whole else None
 
 
 def _dropped(view: TestView) -> tuple[Table, ...]:
