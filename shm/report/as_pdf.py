@@ -184,7 +184,7 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
     found: list[Flowable] = []
     for paragraph in part.paragraphs:
         found += [Paragraph(escape(paragraph), _BODY), Spacer(1, 6)]
-    if part.told:
+    if part.full_summary:
         lead = f"<b>{escape(part.lead)}</b> " if part.lead else ""
         told = Paragraph(f"{lead}{escape(part.summary)}", _BODY)
         found += [_panel(told, colour), Spacer(1, 6)]

@@ -32,7 +32,7 @@ def as_text(paper: Paper, width: int = WIDTH) -> str:
 
 
 def _part(part: Part, width: int) -> Iterator[str]:
-    for paragraph in (*part.paragraphs, part.told):
+    for paragraph in (*part.paragraphs, part.full_summary):
         if paragraph:
             yield f"{_folded(paragraph, width)}\n"
     if part.remarks:
@@ -58,16 +58,17 @@ def _folded(text: str, width: int, start: str = "") -> str:
 def in_terminal(table: Table) -> Table:
     """The rows that a terminal shows, with the column that stands for a figure there."""
     rows, headings, note = table.rows, table.headings, table.note
-    if table.sketch:
-        heading, *strokes = table.sketch
+    if table.terminal_column:
+        heading, *strokes = table.terminal_column
         headings = (headings[0], heading, *headings[1:])
         rows = tuple((row[0], s, *row[1:]) for row, s in zip(rows, strokes, strict=True))
-    if table.brief is not None:
-        more = table.rest.format(len(rows) - len(table.brief))
-        rows = tuple(rows[index] for index in table.brief)
+    if table.terminal_rows is not None:
+        more = table.hidden_note.format(len(rows) - len(table.terminal_rows))
+        rows = tuple(rows[index] for index in table.terminal_rows)
         note = f"{note} {more}".strip() if rows else more
     return replace(
-        table, headings=headings, rows=rows, note=note, brief=None, sketch=(), marks=()
+        table, headings=headings, rows=rows, note=note, marks=(), terminal_rows=None,
+        terminal_column=(),
     )  # fmt: skip
 
 

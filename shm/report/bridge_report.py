@@ -11,7 +11,7 @@ from shm.report import formatting
 from shm.report.contents import BridgeReport, Course, HangerLine, Status, hangers_unit
 from shm.report.intervals import Interval
 from shm.report.origin import lineage, settings
-from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
 from shm.report.period import period_json
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.values import Drift
@@ -47,7 +47,7 @@ def _figures(data: BridgeReport) -> Sequence[Illustration]:
     return bridge_figures(data)
 
 
-def facts(data: BridgeReport) -> tuple[tuple[str, str, str], ...]:
+def facts(data: BridgeReport) -> tuple[Fact, ...]:
     """What, value, what stands beside it."""
     tested = [line for line in data.hangers if line.latest is not None]
     alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
@@ -248,7 +248,7 @@ def _since_baseline(data: BridgeReport) -> Table:
     )
 
 
-def _shifted(drift: Drift) -> tuple[str, str, str]:
+def _shifted(drift: Drift) -> Fact:
     _, size, span, threshold, probability = shift_cells(drift)
     return (size, span, f"{probability} ({threshold})")
 

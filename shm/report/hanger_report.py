@@ -13,7 +13,7 @@ from shm.report.contents import DiagnosisSheet, HangerReport, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
 from shm.report.hanger_summary import advice, is_found, summary, tension_change
 from shm.report.hanger_tables import numbers, origins
-from shm.report.paper import CREDIBLE, Paper, Part
+from shm.report.paper import CREDIBLE, Fact, Paper, Part
 from shm.report.period import period_json
 from shm.report.temperatures import temperature_documents
 from shm.values import FrequencyResponse
@@ -75,7 +75,7 @@ def how_to_diagnose(data: HangerReport) -> str:
     )
 
 
-def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
+def facts(data: HangerReport) -> tuple[Fact, ...]:
     """What, value, what stands beside it."""
     unit = data.tension_unit
     said = stated(data.averaged, unit)
@@ -98,7 +98,7 @@ def facts(data: HangerReport) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-def _limits(data: HangerReport, said: StatedTension) -> tuple[tuple[str, str, str], ...]:
+def _limits(data: HangerReport, said: StatedTension) -> tuple[Fact, ...]:
     """The probabilities that the owner's limits ask for."""
     limits, unit = data.hanger.limits, data.tension_unit
     asked = (
@@ -112,7 +112,7 @@ def _limits(data: HangerReport, said: StatedTension) -> tuple[tuple[str, str, st
     )
 
 
-def _of_nominal(data: HangerReport) -> tuple[str, str, str]:
+def _of_nominal(data: HangerReport) -> Fact:
     share = of_nominal(data.tension_n, data.hanger)
     if share is None:
         return ("Of nominal", "not known", "the hanger has no nominal tension")
@@ -124,7 +124,7 @@ def _of_nominal(data: HangerReport) -> tuple[str, str, str]:
     )
 
 
-def _since_baseline(data: HangerReport) -> tuple[str, str, str]:
+def _since_baseline(data: HangerReport) -> Fact:
     change = tension_change(data)
     if change is None:
         return ("Since the baseline", "first test", "nothing earlier to compare with")

@@ -97,7 +97,7 @@ def neighbours(data: HangerReport) -> Table:
     made = shift_table(replace(pattern, rows=near, not_compared=()))
     told = " ".join((pattern.sentence, *pattern.remarks))
     note = f"{told} The whole bridge: shm report --bridge."
-    return replace(made, title=title, note=note, sketch=())
+    return replace(made, title=title, note=note, terminal_column=())
 
 
 def frequencies(data: HangerReport) -> Table:
@@ -274,7 +274,7 @@ def history(data: HangerReport) -> Table:
         f"Tests{within}, latest first",
         ("time", "test", "temperature", "model", *formatting.tension_headings(unit)),
         tuple(_history_row(row, unit) for row in reversed(data.trend)),
-        rest=_EARLIER,
+        hidden_note=_EARLIER,
     ).shortened(_ROWS_SHOWN)
 
 
@@ -297,7 +297,7 @@ def alerts(data: HangerReport) -> Table:
         f"Alerts{within}, latest first",
         ("time", "test", "message", "acknowledged"),
         tuple(_alert_row(row, data.acknowledged) for row in reversed(data.alerts)),
-        rest=_EARLIER,
+        hidden_note=_EARLIER,
     ).shortened(_ROWS_SHOWN)
 
 

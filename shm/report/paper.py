@@ -25,9 +25,10 @@ class Table:
     """One table; every cell is a text with its unit in the cell or in the heading.
 
     `marks` names a style for each row; empty: none has one. A terminal shows the rows whose
-    indices are in `brief`, all where it is None; `rest` says in place of `{}` how many more there
-    are, and a table without either is left out there. `sketch`, a heading and a cell for each row,
-    is a column that stands after the first in a terminal, which has no figures.
+    indices are in `terminal_rows`, all where it is None; `hidden_note` says in place of `{}` how
+    many more there are, and a table without either is left out there. `terminal_column`, a
+    heading and a cell for each row, stands after the first column in a terminal, which has no
+    figures.
     """
 
     title: str
@@ -35,20 +36,20 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     marks: tuple[str, ...] = ()
-    brief: tuple[int, ...] | None = None
-    rest: str = "... and {} more rows (in HTML and JSON)."
-    sketch: tuple[str, ...] = ()
+    terminal_rows: tuple[int, ...] | None = None
+    hidden_note: str = "... and {} more rows (in HTML and JSON)."
+    terminal_column: tuple[str, ...] = ()
 
     def shortened(self, most: int, last: int = 0) -> Table:
         """With so many rows in a terminal, of which so many are the last; one more may stay."""
         count = len(self.rows)
         if count <= most + 1:
             return self
-        return replace(self, brief=(*range(most - last), *range(count - last, count)))
+        return replace(self, terminal_rows=(*range(most - last), *range(count - last, count)))
 
-    def without_terminal(self) -> Table:
+    def not_in_terminal(self) -> Table:
         """Left out in a terminal."""
-        return replace(self, brief=(), rest="")
+        return replace(self, terminal_rows=(), hidden_note="")
 
 
 def filled(*tables: Table) -> tuple[Table, ...]:
@@ -83,7 +84,7 @@ class Part:
         return ": ".join(word for word in (self.title, self.status) if word)
 
     @property
-    def told(self) -> str:
+    def full_summary(self) -> str:
         """The summary with its lead."""
         return " ".join(word for word in (self.lead, self.summary) if word)
 

@@ -210,21 +210,21 @@ def advice(sheet: TestSheet) -> str:
 
 def results(sheet: TestSheet) -> tuple[Table, ...]:
     """What came of the test, as far as there is any of it."""
-    return filled(modes(sheet), _doubts_first(quality(sheet)), set_aside(sheet))
+    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
 
 
-def _doubts_first(checks: Table) -> Table:
+def _doubts_in_terminal(checks: Table) -> Table:
     """In a terminal the checks that are not good, and how many are."""
     doubts = tuple(row for row, verdict in enumerate(checks.marks) if verdict != "good")
     good = len(checks.rows) - len(doubts)
-    what = f"{'further ' if doubts else ''}{'check' if good == 1 else 'checks'}"
-    return replace(checks, brief=doubts, rest=f"{{}} {what} good.") if good else checks
+    note = f"{{}} {'further ' if doubts else ''}{'check' if good == 1 else 'checks'} good."
+    return replace(checks, terminal_rows=doubts, hidden_note=note) if good else checks
 
 
 def details(sheet: TestSheet) -> tuple[Table, ...]:
     """How it came about, as far as there is any of it."""
     told = (hits(sheet), conditions(sheet), settings(sheet.settings))
-    hit, *others = (table.without_terminal() for table in told)
+    hit, *others = (table.not_in_terminal() for table in told)
     return filled(notes(sheet), hit, dropped(sheet), *others)
 
 

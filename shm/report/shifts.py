@@ -106,7 +106,7 @@ def shift_table(pattern: BridgePattern) -> Table:
         note="Shift of the tension since the baseline at each hanger's latest test, if there is "
         "any, the swing with the temperature taken out, with 90 % intervals; whether it has lost "
         "or gained, with the probability of that.",
-        sketch=(
+        terminal_column=(
             "lost | gained",
             *(bar(share) for share in _shares(pattern)),
             *("" for _ in pattern.not_compared),

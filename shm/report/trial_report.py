@@ -210,7 +210,7 @@ _STYLES = {"met": "good", "missed": "refused", "too few": "unknown"}
 def answers(score: TrialScore) -> tuple[Table, ...]:
     """The marks, then all scores by richness, effect and way, then those of no bound."""
     scores = (by_richness(score), by_effect(score), by_way(score), others(score))
-    return filled(marks(score), *(table.without_terminal() for table in scores))
+    return filled(marks(score), *(table.not_in_terminal() for table in scores))
 
 
 def evidence(score: TrialScore) -> tuple[Table, ...]:

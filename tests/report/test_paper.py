@@ -69,7 +69,7 @@ def unabridged(paper: Paper) -> Paper:
     return replace(
         paper,
         parts=[
-            replace(part, tables=[replace(table, brief=None) for table in part.tables])
+            replace(part, tables=[replace(table, terminal_rows=None) for table in part.tables])
             for part in paper.parts
         ],
     )
@@ -86,8 +86,8 @@ def texts(paper: Paper, renderer: str) -> Iterator[str]:
 
 def _texts_of_part(part: Part, renderer: str, is_first: bool) -> Iterator[str]:
     figures = () if renderer == "as_text" else part.figures()
-    told = (*part.paragraphs, part.told, *part.facts, *part.remarks, *figures, *part.tables)
-    if not any(told) or (renderer == "as_text" and not (is_first or part.tables or part.told)):
+    told = (*part.paragraphs, part.full_summary, *part.facts, *part.remarks, *figures, *part.tables)
+    if not any(told):
         return
     if not is_first or renderer != "as_text":
         yield from (part.title, part.status)
@@ -162,7 +162,7 @@ def test_a_cell_that_is_lost_or_out_of_order_is_found(
 def test_every_kind_leads_with_its_state_and_a_summary(kind: str, papers: dict[str, Paper]) -> None:
     paper = papers[kind]
     assert paper.parts[0].title == "In short"
-    assert paper.parts[0].told
+    assert paper.parts[0].full_summary
     assert paper.status
     first_line = as_text(paper).splitlines()[0]
     assert first_line == paper.headline
@@ -184,9 +184,9 @@ def test_a_terminal_says_how_many_rows_it_leaves_out() -> None:
     assert [line.split()[0] for line in told.splitlines() if line.endswith("  x")] == [
         "0", "1", "2", "28", "29",
     ]  # fmt: skip
-    assert replace(long, rows=rows[:6]).shortened(5).brief is None
-    assert "LONG" not in as_text(_paper(long.without_terminal()))
-    only = as_text(_paper(replace(long, brief=(), rest="{} checks good.")))
+    assert replace(long, rows=rows[:6]).shortened(5).terminal_rows is None
+    assert "LONG" not in as_text(_paper(long.not_in_terminal()))
+    only = as_text(_paper(replace(long, terminal_rows=(), hidden_note="{} checks good.")))
     assert "LONG\n30 checks good.\n" in only
 
 
