@@ -14,12 +14,11 @@ from pathlib import Path
 
 from docs.filling import fill_in, write_csv
 from shm.blind.scoring import opened
-from shm.report.figures import Illustration
-from shm.report.table import Table
-from shm.report.trial.figures import trial_figures
-from shm.report.trial.page import trial_page
-from shm.report.trial.summary import misses, summary
-from shm.report.trial.tables import answers, evidence
+from shm.report.as_html import as_html
+from shm.report.figures.every_figure import trial_figures
+from shm.report.figures.illustration import Illustration
+from shm.report.paper import Table
+from shm.report.trial_report import answers, evidence, misses, summary, trial_paper
 from shm.values import TrialScore
 
 DOCS = Path(__file__).parent
@@ -67,7 +66,7 @@ def write(
     (folder / _IN_WORDS).write_text(f"{in_words}\n", encoding="utf-8")
     for item in drawn:
         (figures / f"{item.name}.png").write_bytes(item.png(_DOTS_PER_INCH))
-    page.with_name(_HTML).write_text(trial_page(score), encoding="utf-8")
+    page.with_name(_HTML).write_text(as_html(trial_paper(score)), encoding="utf-8")
     fill_in(page, "blind trial", fragment(score, drawn))
 
 

@@ -26,11 +26,11 @@ from docs.filling import fill_in, write_csv
 from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
 from shm.identify import IdentifyOptions, identify
-from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.phrases import label
-from shm.report.diagnosis.sizes import quantity, size
-from shm.report.diagnosis.text import diagnosis_text
-from shm.report.words import probability
+from shm.report.as_text import as_text
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_report import diagnosis_paper
+from shm.report.diagnosis_wording import label, quantity, size
+from shm.report.formatting import probability
 from shm.values import (
     Cause,
     Diagnosis,
@@ -266,7 +266,8 @@ def _one_hinge(hinges: list[EffectEstimate]) -> str:
 def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
     """The causes above 1 %; the answer of `shm gap diagnose` in words goes into a file beside."""
     found = diagnose(tests, hanger, GapOptions(seed=SEED))
-    text = diagnosis_text(DiagnosisSheet(found, hanger)).split("\nCAUSES, LIKELIEST FIRST")[0]
+    paper = diagnosis_paper(DiagnosisSheet(found, hanger))
+    text = as_text(paper).split(f"\n{paper.parts[2].title}\n")[0]
     rows = [_cause_row(cause) for cause in found.causes if cause.probability >= _WORTH_A_ROW]
     rows += [
         ("no gap", probability(found.no_gap_probability), "", ""),

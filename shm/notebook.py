@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shm.report.content import Interval
+    from shm.report.intervals import Interval
     from shm.values import Diagnosis, Hanger, Posterior, Selection
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
@@ -40,7 +40,7 @@ def load_ipython_extension(shell: Any) -> None:
 
 def hanger_html(hanger: Hanger) -> str:
     """The description of a hanger, in the units of a drawing."""
-    from shm.report import words
+    from shm.report import formatting
     from shm.values.force_units import force_unit
 
     nominal_n, stiffness = hanger.nominal_tension_n, hanger.bending_stiffness_n_m2
@@ -51,18 +51,18 @@ def hanger_html(hanger: Hanger) -> str:
         ("length", f"{hanger.length_m:.3f} m"),
         ("area", f"{1e6 * hanger.area_m2:.0f} mm²"),
         ("mass", f"{hanger.mass_per_length_kg_m:.1f} kg/m"),
-        ("bending stiffness", f"{words.rounded_tension(stiffness, force_unit(stiffness))} m²"),
+        ("bending stiffness", f"{formatting.rounded_tension(stiffness, force_unit(stiffness))} m²"),
         ("nominal tension", f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"),
         ("ends", f"{hanger.supports.deck} (deck), {hanger.supports.arch} (arch)"),
         ("end plates", "yes" if hanger.plate else "none"),
     ]
-    return _table(words.hanger_name(hanger.id, hanger.name), ("", ""), rows)
+    return _table(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows)
 
 
 def posterior_html(posterior: Posterior) -> str:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
-    from shm.report import words
-    from shm.report.content import Interval
+    from shm.report import formatting
+    from shm.report.intervals import Interval
     from shm.values.force_units import force_unit
 
     tension_n = Interval.of_samples(posterior.tension_n)
@@ -74,19 +74,21 @@ def posterior_html(posterior: Posterior) -> str:
     ]
     for name in posterior.names:
         interval = Interval.of_samples(posterior.parameter(name))
-        rows.append(_interval_row(name, interval, best[name], words.meaning(name, posterior.model)))
+        rows.append(
+            _interval_row(name, interval, best[name], formatting.meaning(name, posterior.model))
+        )
     head = ("", "mean", "90 % interval", "most probable", "what it is")
-    return _table(f"{_whose(posterior)}, {words.model_class(posterior.model)}", head, rows) + (
+    return _table(f"{_whose(posterior)}, {formatting.model_class(posterior.model)}", head, rows) + (
         f"<p>{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "
-        f"± {words.number(posterior.log_evidence_sd, '.2f')}, "
-        f"R-hat {words.number(posterior.r_hat, '.3f')}.</p>"
+        f"± {formatting.number(posterior.log_evidence_sd, '.2f')}, "
+        f"R-hat {formatting.number(posterior.r_hat, '.3f')}.</p>"
     )
 
 
 def selection_html(selection: Selection) -> str:
     """The model classes, most probable first, with the tension that each gives."""
-    from shm.report import words
-    from shm.report.content import Interval
+    from shm.report import formatting
+    from shm.report.intervals import Interval
     from shm.values.force_units import force_unit
 
     tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
@@ -98,35 +100,36 @@ def selection_html(selection: Selection) -> str:
         tension = tension_n.in_unit(unit)
         rows.append(
             (
-                words.model_class(posterior.model),
-                words.probability(probability),
+                formatting.model_class(posterior.model),
+                formatting.probability(probability),
                 f"{posterior.log_evidence:.2f}",
-                words.mean(tension),
-                words.span(tension),
+                formatting.mean(tension),
+                formatting.span(tension),
             )
         )
-    head = ("class", "probability", "log evidence", *words.tension_headings(unit))
+    head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
     return _table(f"{_whose(selection.selected)}, model classes", head, rows)
 
 
 def diagnosis_html(diagnosis: Diagnosis) -> str:
     """The verdict in words, the likeliest causes, no gap, something unknown."""
-    from shm.report import words
-    from shm.report.diagnosis.content import claims
-    from shm.report.diagnosis.phrases import label
-    from shm.report.diagnosis.summary import consequences, verdict
+    from shm.report import formatting
+    from shm.report.diagnosis_summary import consequences, verdict
+    from shm.report.diagnosis_wording import claims, label
 
     causes = [cause for claim in claims(diagnosis) for cause in claim.causes]
-    rows = [(label(each), words.probability(each.probability)) for each in causes[:_CAUSES_SHOWN]]
+    rows = [
+        (label(each), formatting.probability(each.probability)) for each in causes[:_CAUSES_SHOWN]
+    ]
     rows += [
-        ("no gap", words.probability(diagnosis.no_gap_probability)),
+        ("no gap", formatting.probability(diagnosis.no_gap_probability)),
         (
             "something not in the catalogue",
-            words.probability(diagnosis.unexplained_probability),
+            formatting.probability(diagnosis.unexplained_probability),
         ),
     ]
     whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
-    title = f"Gap{whose} to {words.model_class(diagnosis.baseline)}"
+    title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
     paragraph = f"{verdict(diagnosis)} {consequences(diagnosis)}".strip()
     return _table(title, ("cause", "probability"), rows) + f"<p>{escape(paragraph)}</p>"
 
@@ -143,13 +146,13 @@ def _whose(posterior: Posterior) -> str:
 
 
 def _interval_row(name: str, interval: Interval, best: float, meaning: str) -> tuple[str, ...]:
-    from shm.report import words
+    from shm.report import formatting
 
     return (
         name,
-        words.mean(interval),
-        words.span(interval),
-        f"{best:.{words.decimals(interval.width)}f}",
+        formatting.mean(interval),
+        formatting.span(interval),
+        f"{best:.{formatting.decimals(interval.width)}f}",
         meaning,
     )
 

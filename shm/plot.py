@@ -18,21 +18,19 @@ from matplotlib.figure import Figure
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.content import HangerReport, TrendRow, trend_row
-from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.figures.causes import FIGURE as CAUSES
-from shm.report.diagnosis.figures.gap_map import FIGURE as GAP_MAP
-from shm.report.figures.frequencies import FIGURE as FREQUENCIES
-from shm.report.figures.member import Member
-from shm.report.figures.pairs import FIGURE as PAIRS
-from shm.report.figures.stiffness import FIGURE as STIFFNESS
-from shm.report.figures.tension import FIGURE as TENSION
-from shm.report.figures.trend import FIGURE as TREND
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures.response import FIGURE as RESPONSE
-from shm.report.sheet.figures.shapes import FIGURE as SHAPES
-from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
-from shm.report.sheet.spectra import Shown
+from shm.report.contents import DiagnosisSheet, HangerReport, TestSheet, TrendRow, trend_row
+from shm.report.figures.gap_causes import FIGURE as CAUSES
+from shm.report.figures.gap_map import FIGURE as GAP_MAP
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_tension import FIGURE as TENSION
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.illustration import Member
+from shm.report.figures.parameter_pairs import FIGURE as PAIRS
+from shm.report.figures.sheet_response import FIGURE as RESPONSE
+from shm.report.figures.sheet_shapes import FIGURE as SHAPES
+from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
 from shm.values import Diagnosis, Hanger, ModalTest, Posterior
 
 __all__ = [

@@ -11,7 +11,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
-from shm.report.words import model_class
+from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
 from shm_cli import completion
 from shm_cli.common import (

@@ -212,17 +212,17 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     Example: shm gap blind score trial --html trial.html --gate
     """
     from shm.blind.scoring import opened
-    from shm.report.trial.document import trial_json
-    from shm.report.trial.page import trial_page
-    from shm.report.trial.text import trial_text
+    from shm.report.as_html import as_html
+    from shm.report.as_text import as_text
+    from shm.report.trial_report import trial_json, trial_paper
 
     found = opened(directory, key or key_beside(directory))
     if html is not None:
-        html.write_text(trial_page(found), encoding="utf-8")
+        html.write_text(as_html(trial_paper(found)), encoding="utf-8")
     if as_json:
         show(trial_json(found))
     else:
-        click.echo(trial_text(found, readable_width()).rstrip())
+        click.echo(as_text(trial_paper(found), readable_width()).rstrip())
     if gate:
         _refuse_missed(found)
 

@@ -37,7 +37,7 @@ from shm.values import Hanger, ModalTest
 from shm_cli import completion
 
 if TYPE_CHECKING:
-    from shm.report.table import Table as Texts
+    from shm.report.paper import Table as Texts
     from shm.store import Store, Workspace
 
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
@@ -203,12 +203,15 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def show_texts(texts: Texts) -> None:
     """Prints a table of a report, and its note."""
-    made = table(texts.title, *texts.headings)
-    for row in texts.rows:
+    from shm.report.as_text import in_terminal
+
+    shown = in_terminal(texts)
+    made = table(shown.title, *shown.headings)
+    for row in shown.rows:
         made.add_row(*row)
     show_table(made)
-    if texts.note:
-        click.echo(paragraph(texts.note))
+    if shown.note:
+        click.echo(paragraph(shown.note))
 
 
 def readable_width() -> int:

@@ -27,7 +27,8 @@ from shm.pipeline import utc_now
 from shm.pipeline.reporting import hanger_report
 from shm.read import write
 from shm.read.atomic import replace_text
-from shm.report.page import html
+from shm.report.as_html import as_html
+from shm.report.hanger_report import hanger_paper
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.values import Hanger, Posterior
@@ -274,6 +275,6 @@ def _conclude(workspace: Workspace, alerts: Sequence[StoredAlert]) -> None:
         for hanger_id in (MEASURED, LOSING):
             content = hanger_report(workspace, store, hanger_id, utc_now())
             path = workspace.folder / f"hanger{hanger_id}.html"
-            path.write_text(html(content), encoding="utf-8")
+            path.write_text(as_html(hanger_paper(content)), encoding="utf-8")
             click.echo(f"Report of hanger {hanger_id}: {path}")
     click.echo(f"Look around: shm --workspace {workspace.folder} status")

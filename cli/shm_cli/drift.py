@@ -22,10 +22,9 @@ from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
 from shm.pipeline.rebaselining import Order, changes_within
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.pipeline.reporting import hanger_states
-from shm.report.bridge.document import pattern_json
-from shm.report.bridge.tables import pattern_tables
-from shm.report.figures.bridge_shift import bridge_illustration
-from shm.report.shifts import shift_cells
+from shm.report.bridge_report import pattern_json
+from shm.report.figures.along_the_bridge import bridge_illustration
+from shm.report.shifts import pattern_tables, shift_cells
 from shm.report.states import NOTHING_WATCHED
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.store import Baseline
@@ -76,7 +75,7 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     if as_json:
         show(pattern_json(pattern))
         return
-    for each in pattern_tables(pattern, bars=True):
+    for each in pattern_tables(pattern):
         show_texts(each)
     for sentence in (pattern.sentence, *pattern.remarks):
         click.echo(paragraph(sentence))

@@ -13,11 +13,11 @@ from shm.gap import GapOptions
 from shm.gap import diagnose as diagnosed
 from shm.pipeline import utc_now
 from shm.pipeline.terms import diagnosis_lineage
-from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.document import diagnosis_json
-from shm.report.diagnosis.figures import diagnosis_figures
-from shm.report.diagnosis.page import diagnosis_page
-from shm.report.diagnosis.text import diagnosis_text
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.figures.every_figure import diagnosis_figures
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion
 from shm_cli.adopt import adopt, adopted, drop
@@ -138,7 +138,7 @@ def diagnose(
     if as_json:
         show(diagnosis_json(sheet))
     else:
-        click.echo(diagnosis_text(sheet, readable_width()).rstrip())
+        click.echo(as_text(diagnosis_paper(sheet), readable_width()).rstrip())
 
 
 command.add_command(adopt)
@@ -172,7 +172,7 @@ def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) 
 
 def _write(sheet: DiagnosisSheet, html: Path | None, figures: Path | None) -> None:
     if html is not None:
-        html.write_text(diagnosis_page(sheet), encoding="utf-8")
+        html.write_text(as_html(diagnosis_paper(sheet)), encoding="utf-8")
     if figures is not None:
         figures.mkdir(parents=True, exist_ok=True)
         for illustration in diagnosis_figures(sheet):

@@ -16,10 +16,11 @@ from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
 from shm.read.apart import read_test
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import test_figures
-from shm.report.sheet.page import test_page
-from shm.report.sheet.text import test_text
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.contents import TestSheet
+from shm.report.figures.every_figure import sheet_figures
+from shm.report.sheet_report import sheet_paper
 from shm.settings import Settings
 from shm.values import Hanger, Recording
 from shm_cli.common import (
@@ -170,7 +171,7 @@ def command(
         show(_document(sheets))
     else:
         for sheet in sheets:
-            click.echo(test_text(sheet, readable_width()).rstrip())
+            click.echo(as_text(sheet_paper(sheet), readable_width()).rstrip())
 
 
 def _options(
@@ -244,9 +245,9 @@ def _write(
     if out is not None:
         out.write_text(dump(_document(sheets)) + "\n", encoding="utf-8")
     if html is not None:
-        html.write_text(test_page(sheets[0]), encoding="utf-8")
+        html.write_text(as_html(sheet_paper(sheets[0])), encoding="utf-8")
     for sheet in sheets if figures is not None else ():
-        for illustration in test_figures(sheet):
+        for illustration in sheet_figures(sheet):
             assert figures is not None
             figures.mkdir(parents=True, exist_ok=True)
             name = f"{sheet.identification.test.id}-{illustration.name}.png"

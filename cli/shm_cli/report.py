@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,60 +16,41 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, test_sheet
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge.text import bridge_text
-from shm.report.document import json
-from shm.report.paper import bridge_pdf, pdf
-from shm.report.paper import test_pdf as report_test_pdf
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.paper import Paper
 from shm.report.period import Period, period_since
-from shm.report.sheet.document import test_json as report_test_json
-from shm.report.sheet.text import test_text as report_test_text
-from shm.report.text import text
+from shm.report.sheet_report import sheet_json, sheet_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 from shm_cli.writable import NewFile
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
-_DRAWN = ("html", "pdf")
-_Writers = dict[str, Callable[[Any], str | bytes]]
 
 
-# Pages draw figures: what that takes is loaded where one is asked for.
-def _hanger_page(content: Any) -> str:
-    from shm.report.page import html
+@dataclass(frozen=True)
+class _Report:
+    """What is to be written: of what, as which paper, as which document."""
 
-    return html(content)
-
-
-def _bridge_page(content: Any) -> str:
-    from shm.report.bridge.page import bridge_page
-
-    return bridge_page(content)
+    content: Any
+    paper: Callable[[Any], Paper]
+    document: Callable[[Any], dict[str, Any]]
 
 
-def _test_page(sheet: Any) -> str:
-    from shm.report.sheet.page import test_page
+def _written(report: _Report, form: str) -> str | bytes:
+    if form == "json":
+        return dump(report.document(report.content))
+    if form == "text":
+        return as_text(report.paper(report.content), readable_width())
+    # What draws and sets is loaded where a page is asked for.
+    with drawing():
+        if form == "html":
+            from shm.report.as_html import as_html
 
-    return test_page(sheet)
+            return as_html(report.paper(report.content))
+        from shm.report.as_pdf import as_pdf
 
-
-_OF_HANGER: _Writers = {
-    "text": lambda content: text(content, readable_width()),
-    "html": _hanger_page,
-    "pdf": pdf,
-    "json": lambda content: dump(json(content)),
-}
-_OF_BRIDGE: _Writers = {
-    "text": lambda content: bridge_text(content, readable_width()),
-    "html": _bridge_page,
-    "pdf": bridge_pdf,
-    "json": lambda content: dump(bridge_json(content)),
-}
-_OF_TEST: _Writers = {
-    "text": lambda sheet: report_test_text(sheet, readable_width()),
-    "html": _test_page,
-    "pdf": report_test_pdf,
-    "json": lambda sheet: dump(report_test_json(sheet)),
-}
+        return as_pdf(report.paper(report.content))
 
 
 @click.command()
@@ -124,10 +104,7 @@ def command(
     _refuse_pdf_on_a_terminal(form, out)
     now = utc_now()
     period = period_since(since, now) if since else None
-    writers, content = _gathered(ctx, hanger_id, test_id, now, period)
-    with drawing() if form in _DRAWN else nullcontext():
-        written = writers[form](content)
-    _write(written, out)
+    _write(_written(_gathered(ctx, hanger_id, test_id, now, period), form), out)
 
 
 def _gathered(
@@ -136,15 +113,16 @@ def _gathered(
     test_id: str | None,
     now: datetime,
     period: Period | None,
-) -> tuple[_Writers, Any]:
-    """What is to be written, and who writes such."""
+) -> _Report:
     with opened_store(ctx) as (workspace, store), waiting("gathering the numbers"):
         if hanger_id is None:
-            return _OF_BRIDGE, bridge_report(workspace, store, now, period)
+            content = bridge_report(workspace, store, now, period)
+            return _Report(content, bridge_paper, bridge_json)
         if test_id is None:
-            return _OF_HANGER, hanger_report(workspace, store, hanger_id, now, period)
+            of_hanger = hanger_report(workspace, store, hanger_id, now, period)
+            return _Report(of_hanger, hanger_paper, hanger_json)
         sheet = test_sheet(workspace, store, hanger_id, test_id)
-        return _OF_TEST, replace(sheet, generated_at=now)
+        return _Report(replace(sheet, generated_at=now), sheet_paper, sheet_json)
 
 
 def _write(written: str | bytes, out: Path | None) -> None:

@@ -19,7 +19,7 @@ from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.adopting import GapWatch, gap_watch
-from shm.report.words import model_class
+from shm.report.formatting import model_class
 from shm.store import (
     ENDED,
     Decision,

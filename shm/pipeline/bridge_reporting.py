@@ -11,11 +11,10 @@ from datetime import datetime
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.origins import settings_words, software
-from shm.report.bridge.content import BridgeReport, Course, HangerLine
-from shm.report.content import Interval
+from shm.report.contents import BridgeReport, Course, HangerLine, status_of
+from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
-from shm.report.summary import status_of
 from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
 from shm.store.listing import of_readable
 from shm.values import TENSION, Change, Drift, Hanger

@@ -18,7 +18,16 @@ if TYPE_CHECKING:
     from shm.pipeline.terms import Terms
     from shm.settings import Settings
     from shm.store import Baseline, IdentifiedTest, StoredRecording
-    from shm.values import Alert, Averaged, Beside, Hanger, ModalTest, Posterior, Selection, WatchedTest
+    from shm.values import (
+        Alert,
+        Averaged,
+        Beside,
+        Hanger,
+        ModalTest,
+        Posterior,
+        Selection,
+        WatchedTest,
+    )
     from shm.watch import DatedTest
 
 P = ParamSpec("P")

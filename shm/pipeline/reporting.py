@@ -17,9 +17,8 @@ from shm.pipeline.steps import identify_options
 from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
 from shm.read.apart import read_test
-from shm.report.content import HangerReport, trend_row_of
+from shm.report.contents import HangerReport, TestSheet, trend_row_of
 from shm.report.period import Period
-from shm.report.sheet.content import TestSheet
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest

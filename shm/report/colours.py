@@ -31,3 +31,10 @@ VERDICT_COLOURS: dict[Verdict, str] = {
     "refused": RED,
     "unknown": QUIET,
 }
+VERDICT_STYLES: dict[Verdict, str] = {
+    "good": "steady",
+    "warning": "watch",
+    "refused": "alert",
+    "unknown": "first",
+}
+"""The page's style of a whole test's verdict."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
-from shm.report import words
-from shm.report.content import HangerReport
-from shm.report.table import Table
+from shm.report import formatting
+from shm.report.paper import Table
 from shm.settings import TABLE
 from shm.values import ModalTest
 
@@ -23,35 +21,9 @@ _LINEAGE = {
 }
 
 
-def origin(data: HangerReport) -> Table:
-    posterior, test = data.posterior, data.latest
-    facts = {
-        "test": f"{test.id}, {words.moment(test.time)}",
-        "temperature": words.temperature(test.temperature_c),
-        "hit level over reference level": words.plain(test.amplitude, absent="not recorded"),
-        "added mass": added_mass(test),
-        "modes identified": f"{len(test.modes)}",
-        "model class": words.model_class(posterior.model),
-        "tests in this posterior": ", ".join(posterior.tests),
-        "posterior samples": f"{len(posterior.samples)} (effective "
-        f"{words.number(posterior.effective_sample_size, '.0f')})",
-        "R-hat (1 is settled)": words.number(posterior.r_hat, ".3f"),
-        "model evaluations": f"{posterior.evaluations}",
-        "random seed": f"{posterior.seed}",
-        "computing time": _seconds(posterior.seconds),
-        **lineage(data.lineage),
-        "report made": f"{words.moment(data.generated_at)} by shm version {data.version}",
-    }
-    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
-
-
-def _seconds(seconds: float) -> str:
-    return f"{seconds:.1f} s" if math.isfinite(seconds) else "not known"
-
-
 def lineage(told: Mapping[str, str]) -> dict[str, str]:
     """What a result was made from, its keys in words."""
-    return {_LINEAGE.get(key, words.quantity(key)): value for key, value in told.items()}
+    return {_LINEAGE.get(key, formatting.quantity(key)): value for key, value in told.items()}
 
 
 def added_mass(test: ModalTest) -> str:

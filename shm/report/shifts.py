@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from shm.report import words
-from shm.report.content import Interval
+from shm.report import formatting
+from shm.report.intervals import Interval
+from shm.report.paper import Table
 from shm.values import NAN, TENSION, Drift
 from shm.values.force_units import ForceUnit, force_unit
-from shm.watch.neighbours import BridgePattern
+from shm.watch.neighbours import BridgePattern, HangerRow
 
 _UNMOVED = 0.01
 _LARGEST_FACTOR = 1e3
@@ -17,18 +18,18 @@ _LARGEST_FACTOR = 1e3
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
     """Quantity, shift, 90 % interval, threshold, probability beyond it."""
     if not math.isfinite(row.shift_mean + row.shift_sd):
-        unknown = ("not known", "not known", threshold_cell(row), words.probability(NAN))
-        return (words.quantity(row.quantity), *unknown)
+        unknown = ("not known", "not known", threshold_cell(row), formatting.probability(NAN))
+        return (formatting.quantity(row.quantity), *unknown)
     interval = Interval.normal(row.shift_mean, row.shift_sd)
     # Of the baseline's own test, and where the data leave no room for a shift.
     unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
     size, span = _tension(interval) if row.quantity == TENSION else _stiffness(interval)
     return (
-        words.quantity(row.quantity),
+        formatting.quantity(row.quantity),
         "no change seen" if unmoved else size,
         _about_none(row) if unmoved else span,
         threshold_cell(row),
-        words.probability(row.probability),
+        formatting.probability(row.probability),
     )
 
 
@@ -65,9 +66,90 @@ def factor(decades: float) -> str:
 
 def _tension(interval: Interval) -> tuple[str, str]:
     percent = interval.scaled(100)
-    return f"{words.mean(percent, True)} %", f"{words.span(percent, True)} %"
+    return f"{formatting.mean(percent, True)} %", f"{formatting.span(percent, True)} %"
 
 
 def _stiffness(interval: Interval) -> tuple[str, str]:
     mean, low, high = (factor(each) for each in (interval.mean, interval.low, interval.high))
     return f"{mean} times", f"{low} to {high} times"
+
+
+_BAR = 6
+
+
+_PERCENT_DECIMALS = 1
+
+
+def pattern_tables(pattern: BridgePattern) -> tuple[Table, Table]:
+    """Each hanger's shift, and the explanations of all shifts together."""
+    return shift_table(pattern), Table(
+        "What explains them",
+        ("explanation", "probability"),
+        tuple(
+            (each.name, formatting.probability(each.probability)) for each in pattern.explanations
+        ),
+    )
+
+
+def shift_table(pattern: BridgePattern) -> Table:
+    """Shifts of the tension since each hanger's baseline; those not compared stand last."""
+    unit, places = shift_unit(pattern)
+    rows = [_shift(row, unit, places) for row in pattern.rows]
+    rows += [
+        (str(each.hanger), "not known", "not known", "not compared", _day(each.time))
+        for each in pattern.not_compared
+    ]
+    return Table(
+        "Shifts along the bridge",
+        ("hanger", f"shift, {unit.name} (90 %)", "shift, % (90 %)", "it has", "test of"),
+        tuple(rows),
+        note="Shift of the tension since the baseline at each hanger's latest test, if there is "
+        "any, the swing with the temperature taken out, with 90 % intervals; whether it has lost "
+        "or gained, with the probability of that.",
+        terminal_column=(
+            "lost | gained",
+            *(bar(share) for share in _shares(pattern)),
+            *("" for _ in pattern.not_compared),
+        ),
+    )
+
+
+def _shares(pattern: BridgePattern) -> list[float]:
+    """Of the largest shift."""
+    widest = max(abs(row.shift_fraction) for row in pattern.rows) or 1.0
+    return [row.shift_fraction / widest for row in pattern.rows]
+
+
+def _shift(row: HangerRow, unit: ForceUnit, places: int) -> tuple[str, ...]:
+    newtons = Interval(row.shift_n, row.low_n, row.high_n)
+    fraction = Interval(row.shift_fraction, row.low_fraction, row.high_fraction)
+    return (
+        str(row.hanger),
+        _signed(newtons.in_unit(unit), places),
+        _signed(fraction.scaled(100), _PERCENT_DECIMALS),
+        f"{row.way} ({formatting.probability(row.probability)})",
+        _day(row.time),
+    )
+
+
+def bar(share: float) -> str:
+    """A share of the largest shift, -1 to 1, as `...<==|......`."""
+    length = round(abs(share) * _BAR)
+    stroke = "=" * (length - 1)
+    left = f"<{stroke}" if share < 0 and length else ""
+    right = f"{stroke}>" if share > 0 and length else ""
+    return f"{left.rjust(_BAR, '.')}|{right.ljust(_BAR, '.')}"
+
+
+def _signed(interval: Interval, places: int) -> str:
+    nothing = 0.5 * 10**-places
+    if max(abs(interval.low), abs(interval.high)) < nothing:
+        return f"{0:.{places}f} (within {nothing:.{places + 1}f})"
+    mean, low, high = (
+        f"{value:+z.{places}f}" for value in (interval.mean, interval.low, interval.high)
+    )
+    return f"{mean} ({low} to {high})"
+
+
+def _day(time: object) -> str:
+    return f"{time:%Y-%m-%d}" if time else "none"

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import Interval
+from shm.report import formatting
+from shm.report.intervals import Interval
+from shm.report.paper import Table
 from shm.report.states import StatesOverTime
-from shm.report.table import Table
 from shm.values import TENSION, FloatArray, TemperatureCoefficient
 
 TITLE = "Change with the temperature"
@@ -26,7 +26,9 @@ def temperature_table(states: StatesOverTime) -> Table:
     titles = {quantity.name: quantity.title for quantity in states.quantities}
     known = [_is_known(each, states) for each in states.temperature_coefficients]
     rows = tuple(
-        _row(each, titles.get(each.quantity, words.quantity(each.quantity)), "" if sure else why)
+        _row(
+            each, titles.get(each.quantity, formatting.quantity(each.quantity)), "" if sure else why
+        )
         for each, sure in zip(states.temperature_coefficients, known, strict=True)
     )
     if len(rows) > 1 and not any(known):
@@ -62,11 +64,11 @@ def _row(each: TemperatureCoefficient, title: str, why_not_known: str) -> tuple[
         return (title, f"not known: {why_not_known}", "")
     scale = 100.0 if each.quantity == TENSION else _PERCENT_A_DECADE
     change = Interval.normal(each.mean, each.sd).scaled(scale)
-    sd = f"{scale * each.sd:.{words.decimals(change.width)}f}"
+    sd = f"{scale * each.sd:.{formatting.decimals(change.width)}f}"
     return (
         title,
-        f"{words.mean(change, True)} ± {sd} % per K",
-        f"{words.span(change, True)} % per K",
+        f"{formatting.mean(change, True)} ± {sd} % per K",
+        f"{formatting.span(change, True)} % per K",
     )
 
 
@@ -83,7 +85,7 @@ def _known_c(states: StatesOverTime) -> FloatArray:
 def _why_not_known(states: StatesOverTime) -> str:
     known = _known_c(states)
     if len(known) < 2:
-        return f"{words.counted(len(known), 'test')} with a temperature"
+        return f"{formatting.counted(len(known), 'test')} with a temperature"
     span_k = float(np.ptp(known))
     if span_k >= _WIDE_K:
         return f"{len(known)} tests over {span_k:.0f} K are too few to tell it from other changes"

@@ -9,9 +9,10 @@ import sys
 import time
 from dataclasses import replace
 
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import test_figures as report_test_figures
-from shm.report.sheet.page import test_page as report_test_page
+from shm.report.as_html import as_html
+from shm.report.contents import TestSheet
+from shm.report.figures.every_figure import sheet_figures as report_test_figures
+from shm.report.sheet_report import sheet_paper
 from tests.report.sheets import make_points, make_recording, make_sheet, warned
 
 PLACES_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
@@ -39,7 +40,7 @@ def main() -> int:
     begin = time.process_time()
     figures = [item.svg() for item in report_test_figures(sheet)]
     drawn = time.process_time()
-    page = report_test_page(sheet)
+    page = as_html(sheet_paper(sheet))
     done = time.process_time()
     size = len(page.encode())
     print(f"{'figures, SVG':20} {drawn - begin:8.2f} s   {sum(map(len, figures)) / 1e6:6.2f} MB")

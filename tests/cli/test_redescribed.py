@@ -10,9 +10,9 @@ import pytest
 
 from shm.pipeline.redescribed import MOVES_NOTHING, redescribed
 from shm.pipeline.reporting import hanger_report
-from shm.report.document import json
-from shm.report.page import html
-from shm.report.text import text
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
 from shm.values import Hanger
 from tests.cli.conftest import Shm
@@ -56,9 +56,9 @@ def test_a_baseline_of_a_discarded_test_is_said_first_until_there_is_a_new_one(
     with workspace.store() as store:
         data = hanger_report(workspace, store, 3, START)
     assert data.discarded == ("t0",)
-    first = " ".join(text(data).splitlines()[:8])
+    first = " ".join(as_text(hanger_paper(data)).splitlines()[:8])
     assert "The baseline of hanger 3 was made from t0, discarded since" in first
-    assert json(data)["discarded_of_baseline"] == ["t0"]
+    assert hanger_json(data)["discarded_of_baseline"] == ["t0"]
     anew = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}", "--why", "x")
     assert shm(*say, *anew).code == 0
     with workspace.store() as store:
@@ -73,12 +73,12 @@ def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_ba
         workspace = rewritten(before, "length_m = 12.0", "length_m = 12.4")
         data = hanger_report(workspace, store, 3, START)
     assert data.redescribed == ("length_m from 12 to 12.4",)
-    lines = text(data).splitlines()
+    lines = as_text(hanger_paper(data)).splitlines()
     first = " ".join(lines[:8])
     assert "description of hanger 3 has changed since its baseline" in first
     assert "shm drift rebaseline --hanger 3" in first
-    assert "has changed since its baseline" in html(data)
-    assert json(data)["redescribed"] == ["length_m from 12 to 12.4"]
+    assert "has changed since its baseline" in as_html(hanger_paper(data))
+    assert hanger_json(data)["redescribed"] == ["length_m from 12 to 12.4"]
     told = shm("--workspace", workspace.folder, "doctor").out
     assert "described otherwise since the baseline: 3" in told
     command = ("drift", "rebaseline", "--hanger", "3", "--since", f"{START:%Y-%m-%d}")

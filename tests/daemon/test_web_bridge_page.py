@@ -13,9 +13,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.report.bridge.content import HangerLine
-from shm.report.content import Interval
-from shm.report.summary import Status
+from shm.report.contents import HangerLine, Status
+from shm.report.intervals import Interval
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view

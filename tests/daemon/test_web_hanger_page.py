@@ -14,8 +14,9 @@ import plotly.graph_objects as plotly
 import pytest
 
 from shm.pipeline.reporting import hanger_report
+from shm.report.contents import Status, status
+from shm.report.hanger_summary import summary
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
-from shm.report.summary import Status, status, summary
 from shm.store import Lineage, Workspace
 from shm_daemon.web.hanger_figures import FIGURES
 from shm_daemon.web.working_out import Order, Workshop

@@ -12,7 +12,7 @@ import numpy as np
 import plotly.graph_objects as plotly
 import pytest
 
-from shm.report.figures.over_time import MOST_POINTS, places
+from shm.report.figures.time_axes import MOST_POINTS, places
 from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
 from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
 from shm.values import NAN, Averaged, FloatArray, Summary

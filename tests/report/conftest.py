@@ -8,9 +8,9 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from shm.report.content import HangerReport, trend_row
-from shm.report.figures import member
-from shm.report.figures.member import Illustration, Member, illustration
+from shm.report.contents import HangerReport, trend_row
+from shm.report.figures import illustration as illustrations
+from shm.report.figures.illustration import Illustration, Member, illustration
 from shm.values import (
     Alert,
     Drift,
@@ -154,4 +154,4 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
             kept[key] = (data, illustration(of, data))
         return kept[key][1]
 
-    monkeypatch.setattr(member, "illustration", shared)
+    monkeypatch.setattr(illustrations, "illustration", shared)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.contents import DiagnosisSheet
 from shm.values import (
     NAN,
     PLANES,

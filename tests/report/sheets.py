@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.identify import Dropped, Hit, Identification, Poles
-from shm.report.sheet.content import TestSheet
+from shm.report.contents import TestSheet
 from shm.values import (
     NAN,
     PLANES,

@@ -12,23 +12,24 @@ import numpy as np
 import pytest
 
 from shm import documents
-from shm.report.bridge.content import BridgeReport, Course, HangerLine
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge.page import bridge_page
-from shm.report.bridge.text import bridge_text
-from shm.report.content import HangerReport, Interval, TrendRow
-from shm.report.document import json
-from shm.report.page import html
-from shm.report.paper import bridge_pdf, pdf
-from shm.report.paper import test_pdf as report_test_pdf
+from shm.report.as_html import as_html
+from shm.report.as_pdf import as_pdf
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.contents import (
+    BridgeReport,
+    Course,
+    HangerLine,
+    HangerReport,
+    Status,
+    TestSheet,
+    TrendRow,
+)
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.intervals import Interval
 from shm.report.period import Period
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.document import test_json as report_test_json
-from shm.report.sheet.page import test_page as report_test_page
-from shm.report.sheet.text import test_text as report_test_text
+from shm.report.sheet_report import sheet_json, sheet_paper
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
-from shm.report.summary import Status
-from shm.report.text import text
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
 from tests.helpers.pdf_words import Pdf
@@ -151,19 +152,19 @@ def document_words(document: object) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hanger_of_any_kind_is_told_in_numbers_and_words(kind: str, season: HangerReport) -> None:
     data = KINDS[kind](season)
-    assert_spoken(text(data))
-    assert_spoken(document_words(json(data)))
+    assert_spoken(as_text(hanger_paper(data)))
+    assert_spoken(document_words(hanger_json(data)))
     # Drawing takes its time: who has no figure or table of its own is told by the others' words.
     if kind in DRAWN:
-        assert_spoken(page_words(html(data)))
-        assert_spoken(Pdf.parse(pdf(data)).words)
+        assert_spoken(page_words(as_html(hanger_paper(data))))
+        assert_spoken(Pdf.parse(as_pdf(hanger_paper(data))).words)
 
 
 def test_a_bare_hanger_is_told_in_numbers_and_words(bare: HangerReport) -> None:
-    assert_spoken(text(bare))
-    assert_spoken(page_words(html(bare)))
-    assert_spoken(Pdf.parse(pdf(bare)).words)
-    assert_spoken(document_words(json(bare)))
+    assert_spoken(as_text(hanger_paper(bare)))
+    assert_spoken(page_words(as_html(hanger_paper(bare))))
+    assert_spoken(Pdf.parse(as_pdf(hanger_paper(bare))).words)
+    assert_spoken(document_words(hanger_json(bare)))
 
 
 @pytest.mark.parametrize("with_period", [False, True])
@@ -185,9 +186,9 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
         "Arch", lines, None, "Nothing can be compared.", START, "0.1.0", period,
         settings={"seed": "1"},
     )  # fmt: skip
-    assert_spoken(bridge_text(data))
-    assert_spoken(page_words(bridge_page(data)))
-    assert_spoken(Pdf.parse(bridge_pdf(data)).words)
+    assert_spoken(as_text(bridge_paper(data)))
+    assert_spoken(page_words(as_html(bridge_paper(data))))
+    assert_spoken(Pdf.parse(as_pdf(bridge_paper(data))).words)
     assert_spoken(document_words(bridge_json(data)))
 
 
@@ -200,11 +201,11 @@ def test_a_test_of_any_kind_is_told_in_numbers_and_words(
     make: Callable[[], TestSheet],
 ) -> None:
     sheet = make()
-    on_paper = Pdf.parse(report_test_pdf(sheet)).words
-    assert_spoken(report_test_text(sheet))
-    assert_spoken(page_words(report_test_page(sheet)))
+    on_paper = Pdf.parse(as_pdf(sheet_paper(sheet))).words
+    assert_spoken(as_text(sheet_paper(sheet)))
+    assert_spoken(page_words(as_html(sheet_paper(sheet))))
     assert_spoken(on_paper)
-    assert_spoken(document_words(report_test_json(sheet)))
+    assert_spoken(document_words(sheet_json(sheet)))
     assert ("Do not use" in on_paper) == (make is refused_sheet)
 
 

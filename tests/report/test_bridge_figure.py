@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from shm.report.figures.bridge_shift import bridge_illustration
+from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)

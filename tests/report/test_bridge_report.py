@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 
 import pytest
 
-from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.bridge.document import bridge_json
-from shm.report.bridge.page import bridge_page
-from shm.report.bridge.tables import bar
-from shm.report.bridge.text import bridge_text
-from shm.report.content import HangerReport, Interval
-from shm.report.summary import Status, summary
-from shm.report.tables import neighbours
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
+from shm.report.hanger_summary import summary
+from shm.report.hanger_tables import neighbours
+from shm.report.intervals import Interval
+from shm.report.shifts import bar
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from tests.report.outline import Outline
@@ -49,7 +49,7 @@ def report(hanger: Hanger, pattern: BridgePattern) -> BridgeReport:
 
 
 def test_the_text_tells_states_shifts_and_the_explanation(report: BridgeReport) -> None:
-    told = bridge_text(report)
+    told = as_text(bridge_paper(report))
     assert told.startswith("Arch: Alert\n")
     flat = " ".join(told.split())
     assert "Alert: 1 hanger (3); No change: 7 hangers; without a test: 1 hanger." in flat
@@ -61,7 +61,7 @@ def test_the_text_tells_states_shifts_and_the_explanation(report: BridgeReport) 
 
 
 def test_the_page_has_the_elevation_without_being_asked(report: BridgeReport) -> None:
-    page, parsed = bridge_page(report), Outline()
+    page, parsed = as_html(bridge_paper(report)), Outline()
     parsed.feed(page)
     assert parsed.open == []
     assert [tag for tag, _ in parsed.tags].count("svg") == 2
@@ -71,8 +71,8 @@ def test_the_page_has_the_elevation_without_being_asked(report: BridgeReport) ->
 
 def test_without_a_pattern_the_hangers_are_told_and_why(report: BridgeReport) -> None:
     few = replace(report, pattern=None, why_no_pattern="Nothing can be compared: too few.")
-    assert "compared: too few." in " ".join(bridge_text(few).split())
-    assert bridge_page(few).count("<svg") == 1
+    assert "compared: too few." in " ".join(as_text(bridge_paper(few)).split())
+    assert as_html(bridge_paper(few)).count("<svg") == 1
     document = bridge_json(few)
     assert document["pattern"] is None
     assert document["hangers"][2]["status"] == "alert"
@@ -103,6 +103,6 @@ def test_a_hanger_whose_tension_is_hardly_known_is_to_be_tested_for_more_modes(
 ) -> None:
     first, *rest = report.hangers
     wide = replace(first, tension_n=Interval(700e3, 400e3, 1900e3))
-    told = " ".join(bridge_text(replace(report, hangers=(wide, *rest))).split())
+    told = " ".join(as_text(bridge_paper(replace(report, hangers=(wide, *rest)))).split())
     assert "Find more modes of hanger 1: the interval of the tension is wider than half" in told
-    assert "Find more modes" not in bridge_text(report)
+    assert "Find more modes" not in as_text(bridge_paper(report))

@@ -7,10 +7,18 @@ from dataclasses import replace
 import pytest
 
 from shm.models.effects import EFFECTS, Survey
-from shm.report.diagnosis.content import Answer, DiagnosisSheet, answer, claimed
-from shm.report.diagnosis.phrases import PHRASES, label, phrase, title
-from shm.report.diagnosis.sizes import size
-from shm.report.diagnosis.summary import summary
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_summary import summary
+from shm.report.diagnosis_wording import (
+    PHRASES,
+    Answer,
+    answer,
+    claimed,
+    label,
+    phrase,
+    size,
+    title,
+)
 from shm.values import (
     NAN,
     AddedMass,

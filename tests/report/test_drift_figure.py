@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report.figures.drift import STATES
+from shm.report.figures.hanger_states import STATES
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import FloatArray
 from shm.watch.history import Band

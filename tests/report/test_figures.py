@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from shm.report.colours import PALETTE
-from shm.report.content import HangerReport
-from shm.report.figures import Illustration, illustrations
+from shm.report.contents import HangerReport
+from shm.report.figures.every_figure import Illustration, hanger_figures
 from shm.values import FrequencyResponse
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -23,7 +23,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 @pytest.fixture(scope="module")
 def drawn(season: HangerReport) -> dict[str, Illustration]:
-    return {item.name: item for item in illustrations(season)}
+    return {item.name: item for item in hanger_figures(season)}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_a_whole_report_has_all_figures(drawn: dict[str, Illustration]) -> None:
 
 
 def test_a_bare_report_has_only_the_figures_it_has_data_for(bare: HangerReport) -> None:
-    assert [item.name for item in illustrations(bare)] == ["tension", "frequencies"]
+    assert [item.name for item in hanger_figures(bare)] == ["tension", "frequencies"]
 
 
 def test_every_axis_has_a_label_and_quantities_a_unit(drawn: dict[str, Illustration]) -> None:
@@ -74,7 +74,7 @@ def test_long_names_of_channels_leave_the_axes_their_room(season: HangerReport) 
     assert response is not None
     points = tuple(replace(p, name=f"{p.name} accelerometer, WWWWWWW") for p in response.points)
     named = replace(season, frequency_response=replace(response, points=points))
-    item = next(item for item in illustrations(named) if item.name == "response")
+    item = next(item for item in hanger_figures(named) if item.name == "response")
     item.figure.draw_without_rendering()
     assert item.figure.axes[0].get_position().width > 0.8
 
@@ -82,13 +82,13 @@ def test_long_names_of_channels_leave_the_axes_their_room(season: HangerReport) 
 def test_lines_near_the_posterior_of_tension_are_drawn_and_far_ones_named(
     season: HangerReport,
 ) -> None:
-    near = next(item for item in illustrations(season) if item.name == "tension").figure.axes[0]
+    near = next(item for item in hanger_figures(season) if item.name == "tension").figure.axes[0]
     assert {line.get_label() for line in near.lines} == {"nominal", "baseline"}
     assert not near.texts
     sharp = replace(season.posterior, samples=season.posterior.samples.copy())
     sharp.samples[:, 0] = 650 / 711 + 1e-2 * (sharp.samples[:, 0] - 650 / 711)
     alone = replace(season, posterior=sharp, selection=None)
-    far = next(i for i in illustrations(alone) if i.name == "tension")
+    far = next(i for i in hanger_figures(alone) if i.name == "tension")
     told = [text.get_text() for text in far.figure.axes[0].texts]
     assert told == ["nominal 711.0 kN →", "baseline 699.8 kN →"]
 
@@ -130,7 +130,7 @@ def test_without_coherence_only_the_magnitude_is_drawn(season: HangerReport) -> 
     response = season.frequency_response
     assert response is not None
     without = replace(season, frequency_response=replace(response, coherence=None))
-    item = next(item for item in illustrations(without) if item.name == "response")
+    item = next(item for item in hanger_figures(without) if item.name == "response")
     assert len(item.figure.axes) == 1
     assert "coherence is not known" in item.caption
 
@@ -144,19 +144,19 @@ def test_of_many_responses_the_first_four_are_drawn_and_that_is_said(
         "x", response.points * 2, response.frequency_hz, np.tile(response.accelerance, (2, 1))
     )
     item = next(
-        i for i in illustrations(replace(season, frequency_response=many)) if i.name == "response"
+        i for i in hanger_figures(replace(season, frequency_response=many)) if i.name == "response"
     )
     assert "first 4 of 8" in item.caption
 
 
 def test_tests_without_a_time_are_left_out_of_the_trend_and_counted(season: HangerReport) -> None:
     undated = replace(season.trend[0], time=None)
-    item = illustrations(replace(season, trend=(undated, *season.trend[1:])))[0]
+    item = hanger_figures(replace(season, trend=(undated, *season.trend[1:])))[0]
     assert "1 test without a time left out" in item.caption
 
 
 def test_a_lone_test_stands_in_the_middle_of_a_narrow_trend(season: HangerReport) -> None:
-    (axes,) = illustrations(replace(season, trend=season.trend[:1]))[0].figure.axes
+    (axes,) = hanger_figures(replace(season, trend=season.trend[:1]))[0].figure.axes
     low, high = axes.get_xlim()
     assert high - low == pytest.approx(timedelta(days=2) / timedelta(days=1))
 
@@ -187,7 +187,7 @@ def test_colours_follow_the_page_so_that_dark_pages_stay_readable(
 
 
 def test_the_same_report_gives_the_same_svg(season: HangerReport) -> None:
-    first, second = (illustrations(season)[1].svg() for _ in range(2))
+    first, second = (hanger_figures(season)[1].svg() for _ in range(2))
     assert first == second
 
 
@@ -197,13 +197,13 @@ def test_a_png_is_a_png(drawn: dict[str, Illustration]) -> None:
 
 def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -> None:
     before = dict(mpl.rcParams)
-    illustrations(season)[0].svg()
+    hanger_figures(season)[0].svg()
     assert dict(mpl.rcParams) == before
 
 
 def test_reports_do_without_pyplot_and_its_global_figures() -> None:
     asked = (
-        "import sys, shm.report.figures, shm.report.paper.pdf; "
+        "import sys, shm.report.figures, shm.report.as_pdf; "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

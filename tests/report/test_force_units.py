@@ -11,22 +11,20 @@ import numpy as np
 import pytest
 
 from shm import notebook
-from shm.report.bridge.content import BridgeReport, HangerLine
-from shm.report.bridge.text import bridge_text
-from shm.report.content import HangerReport, Interval
-from shm.report.diagnosis.content import DiagnosisSheet
-from shm.report.diagnosis.figures.tension import FIGURE as GAP_TENSION
-from shm.report.diagnosis.text import diagnosis_text
-from shm.report.document import json
-from shm.report.figures import illustrations
-from shm.report.figures.bridge_shift import bridge_illustration
-from shm.report.figures.drift import STATES
-from shm.report.page import html
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_paper
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerLine, HangerReport, Status
+from shm.report.diagnosis_report import diagnosis_paper
+from shm.report.figures.along_the_bridge import bridge_illustration
+from shm.report.figures.every_figure import hanger_figures
+from shm.report.figures.gap_before_and_after import GAP_TENSION
+from shm.report.figures.hanger_states import STATES
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_tables import history, models, tension
+from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
-from shm.report.summary import Status
-from shm.report.tables import history, models, tension
-from shm.report.text import text
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.force_units import force_unit
 from shm.watch.history import Band
@@ -98,7 +96,10 @@ def test_a_report_tells_every_tension_in_that_unit(
     season: HangerReport, tension_n: float, unit: str
 ) -> None:
     data = of_size(season, tension_n)
-    for told in (" ".join(text(data).split()), DRAWING.sub("", html(data))):
+    for told in (
+        " ".join(as_text(hanger_paper(data)).split()),
+        DRAWING.sub("", as_html(hanger_paper(data))),
+    ):
         found = WITH_UNIT.findall(told)
         assert {each for _, each in found} == {unit}
         assert not [value for value, _ in found if NOTHING.fullmatch(value)]
@@ -106,14 +107,14 @@ def test_a_report_tells_every_tension_in_that_unit(
     for table, columns in ((history(data), (4, 5)), (models(data), (4, 5)), (tension(data), (1,))):
         cells = [row[column] for row in table.rows for column in columns]
         assert not [cell for cell in cells if NOTHING.search(cell)], cells
-    assert json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)
+    assert hanger_json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), SIZES, ids=NAMES)
 def test_figures_are_labelled_in_that_unit(
     season: HangerReport, tension_n: float, unit: str
 ) -> None:
-    drawn = {each.name: each for each in illustrations(of_size(season, tension_n))}
+    drawn = {each.name: each for each in hanger_figures(of_size(season, tension_n))}
     (trend,), (posterior,) = drawn["trend"].figure.axes, drawn["tension"].figure.axes
     assert trend.get_ylabel() == posterior.get_xlabel() == f"tension ({unit})"
     assert posterior.get_ylabel() == f"probability density (1/{unit})"
@@ -158,7 +159,7 @@ def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
         HangerLine(replace(hanger, id=number), Status.STEADY, NOW, carried)
         for number in range(1, 7)
     )
-    told = bridge_text(BridgeReport("Arch", lines, pattern, "", NOW, "0.1.0"))
+    told = as_text(bridge_paper(BridgeReport("Arch", lines, pattern, "", NOW, "0.1.0")))
     assert f"tension, {unit} (90 %)" in told
     found, places = shift_unit(pattern)
     assert f"{-0.05 * found.of(tension_n):+.{places}f} (" in told
@@ -172,7 +173,7 @@ def test_the_largest_tension_of_a_bridge_decides_for_all(hanger: Hanger) -> None
         HangerLine(replace(hanger, id=number), Status.STEADY, NOW, Interval(t, 0.9 * t, 1.1 * t))
         for number, t in ((1, 900.0), (2, 30e3))
     )
-    told = bridge_text(BridgeReport("Arch", lines, None, "too few", NOW, "0.1.0"))
+    told = as_text(bridge_paper(BridgeReport("Arch", lines, None, "too few", NOW, "0.1.0")))
     assert "tension, kN (90 %)" in told
     assert "0.900 (0.810 to 0.990)" in told
 
@@ -184,7 +185,7 @@ def test_a_diagnosis_tells_both_tensions_in_that_unit(tension_n: float, unit: st
     )
     diagnosis = replace(sheet("led").diagnosis, tension_before_n=before, tension_after_n=after)
     data = DiagnosisSheet(diagnosis, replace(HANGER, nominal_tension_n=tension_n))
-    told = diagnosis_text(data)
+    told = as_text(diagnosis_paper(data))
     table = told[told.index("TENSION BEFORE AND AFTER") : told.index("WHAT WOULD TELL")]
     assert f"mean, {unit}" in table
     assert not NOTHING.search(table)

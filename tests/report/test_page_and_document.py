@@ -10,17 +10,17 @@ from itertools import pairwise
 import pytest
 
 from shm import documents
-from shm.report.content import HangerReport
-from shm.report.document import json
-from shm.report.page import html
-from shm.report.text import text
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.values import QualityCheck
 from tests.report.outline import Outline
 
 
 @pytest.fixture(scope="module")
 def page(season: HangerReport) -> str:
-    return html(season)
+    return as_html(hanger_paper(season))
 
 
 @pytest.fixture(scope="module")
@@ -79,19 +79,19 @@ def test_the_page_leads_with_the_summary_and_the_state(outline: Outline) -> None
 @pytest.mark.parametrize("name", ["season", "bare"])
 def test_the_page_says_nan_nowhere(name: str, request: pytest.FixtureRequest) -> None:
     parsed = Outline()
-    parsed.feed(html(request.getfixturevalue(name)))
+    parsed.feed(as_html(hanger_paper(request.getfixturevalue(name))))
     assert not re.search(r"\b(nan|inf|None)\b", " ".join(parsed.words))
 
 
 def test_names_from_outside_cannot_inject_markup(bare: HangerReport) -> None:
     sly = "<script>alert(1)</script>"
-    page = html(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly)))
+    page = as_html(hanger_paper(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 
 
 def test_the_document_survives_json_and_holds_the_contract(season: HangerReport) -> None:
-    document = standard_json.loads(documents.dump(json(season)))
+    document = standard_json.loads(documents.dump(hanger_json(season)))
     assert document["schema"] == "shm.report/1"
     assert document["posterior"] == standard_json.loads(
         documents.dump(documents.posterior_document(season.posterior))
@@ -107,7 +107,7 @@ def test_the_document_survives_json_and_holds_the_contract(season: HangerReport)
 
 
 def test_unknown_numbers_become_null_in_the_document(bare: HangerReport) -> None:
-    document = standard_json.loads(documents.dump(json(bare)))
+    document = standard_json.loads(documents.dump(hanger_json(bare)))
     assert document["baseline"] is None
     assert document["selection"] is None
     assert document["posterior"]["r_hat"] is None
@@ -120,12 +120,12 @@ def test_the_quality_of_the_latest_test_stands_in_page_text_document_and_advice(
     check = QualityCheck("clipping", "warning", 0.99, 0.95, "", "acc_1 clips", "Lower the gain.")
     judged = replace(bare, quality=(check,))
     parsed = Outline()
-    parsed.feed(html(judged))
+    parsed.feed(as_html(hanger_paper(judged)))
     told = " ".join(" ".join(parsed.words).split())
-    for page in (told, " ".join(text(judged).split())):
+    for page in (told, " ".join(as_text(hanger_paper(judged)).split())):
         assert "clipping ! warning 0.99 0.95 acc_1 clips Lower the gain." in page
         assert "Mend what the quality of the latest test warns of: clipping." in page
     assert ("tr", {"class": "warning"}) in parsed.tags
-    document = standard_json.loads(documents.dump(json(judged)))
+    document = standard_json.loads(documents.dump(hanger_json(judged)))
     assert document["quality"][0]["name"] == "clipping"
     assert document["quality"][0]["verdict"] == "warning"

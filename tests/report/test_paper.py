@@ -1,114 +1,214 @@
-"""Reports as PDF: pages, fonts, properties, the same bytes for the same content."""
+"""One paper, three renderers: all it says stands in text, page and PDF, in its order."""
 
 from __future__ import annotations
 
-import re
+import ast
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from shm.report.content import HangerReport
-from shm.report.paper import pdf, setting
-from shm.report.paper.hanger import hanger_paper
-from shm.report.paper.setting import WIDTH
-from shm.report.table import Table
-from tests.helpers.painting import paint_blank
+import shm.report
+from shm.report.as_html import as_html
+from shm.report.as_pdf import as_pdf
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_paper
+from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
+from shm.report.diagnosis_report import diagnosis_paper
+from shm.report.hanger_report import hanger_paper
+from shm.report.paper import Paper, Part, Table
+from shm.report.sheet_report import sheet_paper
+from shm.report.trial_report import trial_paper
+from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.pdf_words import Pdf
-from tests.report.diagnoses import UNEXPLAINED
+from tests.report.conftest import START
+from tests.report.diagnoses import CASES, sheet
+from tests.report.outline import Outline
+from tests.report.sheets import make_sheet, warned
+from tests.report.test_trial_page import make_score
+
+pytestmark = pytest.mark.usefixtures("unpainted", "drawn_once")
+RENDERERS = ("as_text", "as_html", "as_pdf")
+WIDE = 100_000
+"""Columns with which no line of a text folds."""
+
+
+def of_hanger(season: HangerReport) -> Paper:
+    return hanger_paper(
+        replace(season, diagnosis=CASES["led"], gap_watch="The gap has stayed below 0.3 %.")
+    )
+
+
+def of_bridge(season: HangerReport) -> Paper:
+    shifts = [
+        HangerShift(number, number - 1, START, 700e3, -34e3 if number == 3 else 0.0, 1.5e3)
+        for number in range(1, 6)
+    ]
+    line = HangerLine(season.hanger, Status.ALERT, START, season.tension_n, "", 1, season.drifts[0])
+    report = BridgeReport("Arch", (line,), bridge_pattern(shifts, range(1, 7)), "", START, "0.1.0")
+    return bridge_paper(replace(report, settings={"seed": "1"}))
+
+
+KINDS: dict[str, Callable[[HangerReport], Paper]] = {
+    "hanger": of_hanger,
+    "bridge": of_bridge,
+    "diagnosis": lambda _: diagnosis_paper(sheet("led")),
+    "sheet": lambda _: sheet_paper(warned(make_sheet(hits=6, dropped={2: "double hit"}))),
+    "trial": lambda _: trial_paper(make_score("plausible")),
+}
 
 
 @pytest.fixture(scope="module")
-def content(season: HangerReport) -> bytes:
-    with pytest.MonkeyPatch.context() as patch:
-        paint_blank(patch)
-        return pdf(season)
+def papers(season: HangerReport) -> dict[str, Paper]:
+    return {kind: make(season) for kind, make in KINDS.items()}
 
 
-@pytest.fixture(scope="module")
-def parsed(content: bytes) -> Pdf:
-    return Pdf.parse(content)
+def unabridged(paper: Paper) -> Paper:
+    """With every row in a terminal, too."""
+    return replace(
+        paper,
+        parts=[
+            replace(part, tables=[replace(table, terminal_rows=None) for table in part.tables])
+            for part in paper.parts
+        ],
+    )
 
 
-@pytest.mark.usefixtures("unpainted")
-def test_the_same_content_gives_the_same_bytes(bare: HangerReport) -> None:
-    first = pdf(bare)
-    assert first == pdf(bare)
-    assert first != pdf(replace(bare, bridge="Another bridge"))
+def texts(paper: Paper, renderer: str) -> Iterator[str]:
+    """Everything that a paper says, in reading order, as far as the renderer promises it."""
+    if renderer != "as_pdf":
+        yield paper.title
+    for number, part in enumerate(paper.parts):
+        yield from _texts_of_part(part, renderer, is_first=number == 0)
+    yield paper.foot
 
 
-def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> None:
-    assert len(parsed.pages) > 2
-    for number, page in enumerate(parsed.pages, 1):
-        told = " ".join(page.split())
-        assert told.startswith("Arch bridge Hanger 3 Made 2026-09-08 10:00 UTC by shm 0.1.0")
-        assert f"Page {number} of" in told
-    total = [body for body in parsed.objects.values() if b"/Form" in body or b" Tj T*" in body]
-    assert any(f"({len(parsed.pages)})".encode() in body for body in total)
+def _texts_of_part(part: Part, renderer: str, is_first: bool) -> Iterator[str]:
+    figures = () if renderer == "as_text" else part.figures()
+    told = (*part.paragraphs, part.full_summary, *part.facts, *part.remarks, *figures, *part.tables)
+    if not any(told):
+        return
+    if not is_first or renderer != "as_text":
+        yield from (part.title, part.status)
+    yield from (*part.paragraphs, part.lead, part.summary)
+    if renderer != "as_text":  # whose summary tells them
+        yield from (text for fact in part.facts for text in fact)
+    yield from part.remarks
+    for figure in figures:
+        yield from (figure.title, figure.caption)
+    for table in part.tables:
+        yield from (table.title, *table.headings)
+        yield from (cell for row in table.rows for cell in row)
+        yield table.note
 
 
-def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, parsed: Pdf) -> None:
-    assert b"/Title (Hanger 3, Arch bridge)" in content
-    assert b"/CreationDate (D:20260908100000Z)" in content
-    assert b"/Lang (en)" in content
-    for heading in (b"In short", b"Figures", b"Numbers", b"Gap diagnosis", b"Origin"):
-        assert b"/Title (" + heading + b")" in content
-    assert "Alert" in parsed.words
+def written(paper: Paper, renderer: str) -> str:
+    if renderer == "as_text":
+        return as_text(unabridged(paper), WIDE)
+    if renderer == "as_pdf":
+        return Pdf.parse(as_pdf(paper)).words
+    outline = Outline()
+    outline.feed(as_html(paper))
+    return " ".join(outline.words)
 
 
-@pytest.mark.usefixtures("unpainted")
-def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(bare: HangerReport) -> None:
-    signs = "α → ± ² · ≤ ✓ ✗ – … ° é Ł ω"  # noqa: RUF001
-    told = Pdf.parse(pdf(replace(bare, bridge=signs)))
-    assert signs in told.words
-    used = {name for name in told.fonts if name.startswith(("F1", "F2"))}
-    assert all(b"FontFile2" in told._referred(told.fonts[name], b"FontDescriptor") for name in used)
+def squeezed(text: str) -> str:
+    """Without blanks, case and the marks of commands: lines fold where a renderer likes."""
+    return "".join(text.split()).replace("`", "").lower()
 
 
-def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
-    season: HangerReport, content: bytes, parsed: Pdf
+def first_missing(paper: Paper, renderer: str, found: str) -> str | None:
+    """The first text of the paper that does not follow those before it.
+
+    A PDF repeats headings and lines over pages, even amid a paragraph: there each word counts.
+    """
+    place = 0
+    for text in texts(paper, renderer):
+        for piece in text.split() if renderer == "as_pdf" else [text]:
+            at = found.find(squeezed(piece), place)
+            if at < 0:
+                return text
+            place = at + len(squeezed(piece))
+    return None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_all_that_a_paper_says_is_rendered_in_its_order(
+    kind: str, renderer: str, papers: dict[str, Paper]
 ) -> None:
-    widths = [int(width) for width in re.findall(rb"/Subtype /Image.*?/Width (\d+)", content, re.S)]
-    assert widths
-    assert min(widths) / (WIDTH / 72) >= 200
-    drawn = [item for part in hanger_paper(season).parts for item in part.illustrations]
-    for number, item in enumerate(drawn, 1):
-        assert f"Figure {number}. {item.caption[:40]}" in parsed.words
+    paper = papers[kind]
+    assert first_missing(paper, renderer, squeezed(written(paper, renderer))) is None
 
 
-@pytest.mark.usefixtures("unpainted")
-def test_a_long_table_goes_on_under_repeated_headings(
-    bare: HangerReport, season: HangerReport
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_a_cell_that_is_lost_or_out_of_order_is_found(
+    renderer: str, papers: dict[str, Paper]
 ) -> None:
-    long = replace(bare, trend=season.trend * 12)
-    pages = Pdf.parse(pdf(long)).pages
-    with_heading = [page for page in pages if "90 % interval, kN" in page and "beam2" in page]
-    assert len([page for page in with_heading if "t004" in page]) >= 2
+    paper = papers["diagnosis"]
+    *parts, last = paper.parts
+    (first, *others) = last.tables
+    lost = replace(first, rows=first.rows[:-1])
+    turned = replace(first, rows=first.rows[::-1])
+    for table in (lost, turned):
+        found = written(
+            replace(paper, parts=[*parts, replace(last, tables=[table, *others])]), renderer
+        )
+        assert first_missing(paper, renderer, squeezed(found)) is not None
 
 
-@pytest.mark.usefixtures("unpainted")
-def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
-    alert = replace(season.alerts[0], message="The tension fell. " * 700)
-    told = Pdf.parse(pdf(replace(bare, alerts=(alert,)))).words
-    assert told.count("fell.") == 700
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_leads_with_its_state_and_a_summary(kind: str, papers: dict[str, Paper]) -> None:
+    paper = papers[kind]
+    assert paper.parts[0].title == "In short"
+    assert paper.parts[0].full_summary
+    assert paper.status
+    first_line = as_text(paper).splitlines()[0]
+    assert first_line == paper.headline
+    assert f"<title>{paper.headline}</title>" in as_html(paper)
 
 
-@pytest.mark.usefixtures("unpainted")
-def test_names_from_outside_are_set_as_they_are(bare: HangerReport) -> None:
-    sly = '<b>&amp;</b> "x" <img src="http://example.org/a.png"/>'
-    told = Pdf.parse(pdf(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
-    assert sly in told.words
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("width", [100, 72])
+def test_a_text_fits_its_terminal(kind: str, width: int, papers: dict[str, Paper]) -> None:
+    lines = as_text(papers[kind], width).splitlines()
+    assert max(map(len, lines)) <= width
 
 
-def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
-    table = Table("t", ("no.", "what was found"), (("12.5 ms", "word " * 80), ("3", "x")))
-    narrow, wide = setting.widths(table, 300.0, 8.0, 6.0)
-    assert narrow < 60
-    assert narrow + wide == pytest.approx(300.0)
-    small = Table("t", ("a", "b"), (("1", "2"),))
-    assert sum(setting.widths(small, 300.0, 8.0, 6.0)) < 60
+def test_a_terminal_says_how_many_rows_it_leaves_out() -> None:
+    rows = tuple((str(number), "x") for number in range(30))
+    long = Table("Long", ("no.", "what"), rows, note="A note.")
+    told = as_text(_paper(long.shortened(5, last=2)))
+    assert "A note. ... and 25 more rows (in HTML and JSON)." in told
+    assert [line.split()[0] for line in told.splitlines() if line.endswith("  x")] == [
+        "0", "1", "2", "28", "29",
+    ]  # fmt: skip
+    assert replace(long, rows=rows[:6]).shortened(5).terminal_rows is None
+    assert "LONG" not in as_text(_paper(long.not_in_terminal()))
+    only = as_text(_paper(replace(long, terminal_rows=(), hidden_note="{} checks good.")))
+    assert "LONG\n30 checks good.\n" in only
 
 
-def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:
-    paper = hanger_paper(replace(season, drifts=(), diagnosis=UNEXPLAINED))
-    (gap,) = [part for part in paper.parts if part.title.startswith("Gap diagnosis")]
-    assert (paper.style, gap.style) == ("steady", "alert")
+def test_a_part_that_has_nothing_is_not_headed() -> None:
+    paper = replace(_paper(Table("t", ("a",), (("1",),))), parts=[
+        Part("In short", summary="All."), Part("Figures"), Part("Numbers", tables=()),
+    ])  # fmt: skip
+    assert "Figures" not in as_text(paper)
+    assert "Figures" not in as_html(paper)
+    assert "Figures" not in Pdf.parse(as_pdf(paper)).words
+
+
+def _paper(table: Table) -> Paper:
+    return Paper("Title", "", "first", [Part("In short", tables=[table])], "The end.")
+
+
+@pytest.mark.parametrize("module", ["paper", *RENDERERS])
+def test_the_model_and_its_renderers_know_no_kind_of_report(module: str) -> None:
+    source = Path(shm.report.__file__).with_name(f"{module}.py").read_text()
+    imported = {
+        node.module
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("shm.report.")
+    }
+    assert imported <= {"shm.report.paper", "shm.report.figures.illustration"}

@@ -8,14 +8,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from shm.errors import UsageError
-from shm.report.content import HangerReport, Interval
-from shm.report.document import json
-from shm.report.page import html
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_summary import in_period, summary
+from shm.report.hanger_tables import numbers, origins
+from shm.report.hanger_tables import period as period_table
+from shm.report.intervals import Interval
 from shm.report.period import Period, period_since
-from shm.report.summary import in_period, summary
-from shm.report.tables import period as period_table
-from shm.report.tables import tables
-from shm.report.text import text
 from tests.report.conftest import START
 
 NOW = datetime(2026, 9, 10, 12, tzinfo=UTC)
@@ -85,9 +86,9 @@ def test_the_table_sets_the_end_beside_the_start(recent: HangerReport) -> None:
 
 def test_every_form_names_the_period(recent: HangerReport) -> None:
     named = "2026-05-31 to 2026-09-10"
-    assert text(recent).splitlines()[0] == f"Hanger 3, Arch bridge, {named}: Alert"
-    assert f"period {named}" in html(recent)
-    assert json(recent)["period"] == {"since": START + timedelta(days=30), "until": NOW}
-    titles = [table.title for table in tables(recent)]
+    assert as_text(hanger_paper(recent)).splitlines()[0] == f"Hanger 3, Arch bridge, {named}: Alert"
+    assert f"period {named}" in as_html(hanger_paper(recent))
+    assert hanger_json(recent)["period"] == {"since": START + timedelta(days=30), "until": NOW}
+    titles = [table.title for table in (*numbers(recent), *origins(recent))]
     assert f"Tests in the period {named}, latest first" in titles
     assert f"Alerts in the period {named}, latest first" in titles

@@ -16,12 +16,12 @@ from matplotlib.lines import Line2D
 
 from shm.report import colours
 from shm.report.colours import PALETTE
-from shm.report.figures import Illustration
-from shm.report.figures.member import drawn as members_drawn
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures import MEMBERS
-from shm.report.sheet.figures import test_figures as report_test_figures
-from shm.report.sheet.spectra import Shown
+from shm.report.contents import TestSheet
+from shm.report.figures.every_figure import OF_SHEET
+from shm.report.figures.every_figure import sheet_figures as report_test_figures
+from shm.report.figures.illustration import Illustration
+from shm.report.figures.illustration import drawn as members_drawn
+from shm.report.figures.sheet_spectra import Shown
 from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
 from tests.report.sheets import (
     ambient,
@@ -75,7 +75,7 @@ def drawn() -> Drawn:
 
 def alone(name: str, sheet: TestSheet) -> Illustration:
     """One figure by itself: all of them take a second."""
-    (item,) = members_drawn([member for member in MEMBERS if member.name == name], Shown.of(sheet))
+    (item,) = members_drawn([member for member in OF_SHEET if member.name == name], Shown.of(sheet))
     return item
 
 

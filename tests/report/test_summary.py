@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.report.content import HangerReport
-from shm.report.summary import Status, advice, status, summary, tension_change
+from shm.report.contents import HangerReport, Status, status
+from shm.report.hanger_summary import advice, summary, tension_change
 from shm.values import Drift, Hanger, Thresholds
 
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from shm.report.content import HangerReport
-from shm.report.table import Table, laid_out
-from shm.report.tables import frequencies, tables
-from shm.report.text import text
+from shm.report.as_text import as_text, laid_out
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_paper
+from shm.report.hanger_tables import frequencies, numbers, origins
+from shm.report.paper import Table
 from shm.values import Mode, PredictedFrequency
 
 WHOLE = [
@@ -23,6 +24,10 @@ WHOLE = [
     "Tests, latest first",
     "Where these numbers come from",
 ]
+
+
+def tables(data: HangerReport) -> tuple[Table, ...]:
+    return (*numbers(data), *origins(data))
 
 
 def test_a_whole_report_has_every_table(season: HangerReport) -> None:
@@ -64,12 +69,12 @@ def test_of_a_pooled_posterior_the_latest_test_is_compared(season: HangerReport)
 
 @pytest.mark.parametrize("name", ["season", "bare"])
 def test_the_text_says_nan_or_none_nowhere(name: str, request: pytest.FixtureRequest) -> None:
-    told = text(request.getfixturevalue(name))
+    told = as_text(hanger_paper(request.getfixturevalue(name)))
     assert not re.search(r"\b(nan|inf|None)\b", told)
 
 
 def test_the_text_begins_with_hanger_and_status(season: HangerReport) -> None:
-    first, rule, paragraph = text(season).splitlines()[:3]
+    first, rule, paragraph = as_text(hanger_paper(season)).splitlines()[:3]
     assert first == "Hanger 3, Arch bridge: Alert"
     assert set(rule) == {"="}
     assert paragraph.startswith("Hanger 3 of Arch bridge carries")
@@ -77,11 +82,11 @@ def test_the_text_begins_with_hanger_and_status(season: HangerReport) -> None:
 
 def test_a_long_history_is_cut_in_the_text_and_says_so(season: HangerReport) -> None:
     long = replace(season, trend=season.trend * 3)
-    assert "... and 18 earlier ones" in text(long)
+    assert "... and 18 earlier ones" in as_text(hanger_paper(long))
 
 
 def test_lineage_and_version_are_named(season: HangerReport) -> None:
-    told = text(season)
+    told = as_text(hanger_paper(season))
     assert "SHA-256 ab12cd34" in told
     assert re.search(r"shm version +0\.1\.0", told)
 
@@ -95,9 +100,11 @@ LONG = Table(
 
 @pytest.mark.parametrize("width", [72, 80, 100])
 def test_a_text_is_as_wide_as_its_terminal(season: HangerReport, width: int) -> None:
-    told = text(season, width)
+    told = as_text(hanger_paper(season), width)
     assert max(map(len, told.splitlines())) <= width
-    assert set(text(season).split()) - set(told.split()) <= {"-" * n for n in range(1, 100)}
+    assert set(as_text(hanger_paper(season)).split()) - set(told.split()) <= {
+        "-" * n for n in range(1, 100)
+    }
 
 
 def test_a_table_folds_its_widest_columns_and_cuts_no_word() -> None:

@@ -8,11 +8,11 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from shm.report.content import HangerReport
-from shm.report.document import json
+from shm.report.as_text import as_text
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.states import StatesOverTime
 from shm.report.temperatures import temperature_documents, temperature_table
-from shm.report.text import text
 from shm.values import FloatArray, TemperatureCoefficient
 
 TENSION = TemperatureCoefficient("tension", -0.0012, 0.0003, 0.004)
@@ -62,12 +62,12 @@ def test_two_tests_tell_no_swing_from_a_change_however_sharp_they_are() -> None:
 
 def test_text_and_document_of_a_report_hold_them(season: HangerReport) -> None:
     data = replace(season, states=states(TENSION))
-    assert "CHANGE WITH THE TEMPERATURE" in text(data)
-    assert "-0.120 ± 0.030 % per K" in text(data)
-    assert json(data)["temperature_coefficients"] == [
+    assert "CHANGE WITH THE TEMPERATURE" in as_text(hanger_paper(data))
+    assert "-0.120 ± 0.030 % per K" in as_text(hanger_paper(data))
+    assert hanger_json(data)["temperature_coefficients"] == [
         {
             "quantity": "tension", "unit": "fraction per K", "mean": -0.0012, "sd": 0.0003,
             "prior_sd": 0.004, "known": True, "why_not_known": "",
         }
     ]  # fmt: skip
-    assert "CHANGE WITH THE TEMPERATURE" not in text(season)
+    assert "CHANGE WITH THE TEMPERATURE" not in as_text(hanger_paper(season))

@@ -12,11 +12,11 @@ import pytest
 
 from shm import documents
 from shm.blind.scoring import trial_score
-from shm.report.figures import Illustration
-from shm.report.trial.document import trial_json
-from shm.report.trial.figures import trial_figures
-from shm.report.trial.page import trial_page
-from shm.report.trial.text import trial_text
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.figures.every_figure import trial_figures
+from shm.report.figures.illustration import Illustration
+from shm.report.trial_report import trial_json, trial_paper
 from shm.values import TrialScore
 from tests.helpers.trial_answers import a_truth, an_answer, oracle, plausible, some_truths
 from tests.report.outline import Outline
@@ -54,7 +54,7 @@ def pages(scores: dict[str, TrialScore]) -> dict[str, Outline]:
     found = {}
     for who, score in scores.items():
         found[who] = Outline()
-        found[who].feed(trial_page(score))
+        found[who].feed(as_html(trial_paper(score)))
     return found
 
 
@@ -89,13 +89,13 @@ def test_pages_nest_fetch_nothing_and_have_sound_headings(
 def test_pages_and_texts_say_nan_nowhere(
     who: str, pages: dict[str, Outline], scores: dict[str, TrialScore]
 ) -> None:
-    for words in (told(pages[who]), trial_text(scores[who])):
+    for words in (told(pages[who]), as_text(trial_paper(scores[who]))):
         assert not re.search(r"\b(nan|inf|None(?! (of|is)))\b", words)
 
 
 @pytest.mark.parametrize("who", WHO)
 def test_texts_fit_a_terminal(who: str, scores: dict[str, TrialScore]) -> None:
-    assert max(map(len, trial_text(scores[who]).splitlines())) <= 100
+    assert max(map(len, as_text(trial_paper(scores[who])).splitlines())) <= 100
 
 
 def test_the_summary_says_what_was_tried_and_what_came_out(pages: dict[str, Outline]) -> None:
@@ -142,7 +142,7 @@ def test_values_close_to_their_bound_show_on_which_side_they_lie(
 ) -> None:
     score = scores["oracle"]
     close = replace(score.marks[0], score=replace(score.marks[0].score, value=0.9499), met=False)
-    text = trial_text(replace(score, marks=(close, *score.marks[1:])))
+    text = as_text(trial_paper(replace(score, marks=(close, *score.marks[1:]))))
     assert "Gaps seen (size above 4): 0.9499 " in text
 
 
@@ -150,7 +150,7 @@ def test_words_from_outside_cannot_inject_markup(scores: dict[str, TrialScore]) 
     sly = "<script>alert(1)</script>"
     score = scores["one case"]
     case = replace(score.first_round[0], failure=sly, right=False, in_group=False)
-    page = trial_page(replace(score, first_round=(case,)))
+    page = as_html(trial_paper(replace(score, first_round=(case,))))
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 

@@ -49,7 +49,7 @@ def test_a_workspace_can_be_made_and_asked_from_the_wheel(unpacked: Path) -> Non
 
 def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     code = (
-        "from shm_cli import thesis, demo; import shm.report.page; from shm import resources\n"
+        "from shm_cli import thesis, demo; import shm.report.as_html; from shm import resources\n"
         "from shm.bridge import load_hanger\n"
         "assert all(path.is_file() for path in thesis.PRINTINGS.values())\n"
         "assert load_hanger(thesis.HANGER_FILE).id == 3\n"
@@ -57,6 +57,6 @@ def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     )
     run(unpacked, code)
     names = {path.name for path in unpacked.rglob("*") if path.is_file()}
-    assert {"hanger.html.j2", "report.css", "calibration.toml", "default.toml", "env.py"} <= names
+    assert {"paper.html.j2", "report.css", "calibration.toml", "default.toml", "env.py"} <= names
     assert "py.typed" in names
     assert not any(name.endswith((".pyc", ".db")) for name in names)

@@ -14,7 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.redescribed import discarded_of, redescribed
-from shm.report.words import counted
+from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed

@@ -28,7 +28,7 @@ from shm.bridge import AppriseHook, Hook, WebhookHook
 from shm.errors import ShmError
 from shm.models import competing_names
 from shm.read import apart
-from shm.report.words import counted
+from shm.report.formatting import counted
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import DeliveryState

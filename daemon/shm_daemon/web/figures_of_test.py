@@ -6,17 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from shm.report.figures.member import Member
+from shm.report.contents import TestSheet
+from shm.report.figures.illustration import Member
+from shm.report.figures.sheet_damping import FIGURE as DAMPING
+from shm.report.figures.sheet_hits import FIGURE as HITS
+from shm.report.figures.sheet_response import FIGURE as RESPONSE
+from shm.report.figures.sheet_shapes import FIGURE as SHAPES
+from shm.report.figures.sheet_shapes import rows_of
+from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.sheet_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Specification
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.figures.damping import FIGURE as DAMPING
-from shm.report.sheet.figures.hits import FIGURE as HITS
-from shm.report.sheet.figures.response import FIGURE as RESPONSE
-from shm.report.sheet.figures.shapes import FIGURE as SHAPES
-from shm.report.sheet.figures.shapes import rows_of
-from shm.report.sheet.figures.stabilisation import FIGURE as STABILISATION
-from shm.report.sheet.figures.time_history import FIGURE as TIME_HISTORY
-from shm.report.sheet.spectra import Shown
 from shm_daemon.web import with_plotly
 
 _ROW_PX, _REST_PX = 118, 90

@@ -15,10 +15,10 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader
 
 import shm
 from shm.errors import ShmError
-from shm.report import words
+from shm.report import formatting
+from shm.report.as_html import ENVIRONMENT as OF_REPORTS
+from shm.report.as_html import environment
 from shm.report.colours import PALETTE
-from shm.report.template import ENVIRONMENT as OF_REPORTS
-from shm.report.template import environment
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
@@ -104,7 +104,7 @@ def _environment() -> Environment:
     made = environment(ChoiceLoader([PackageLoader("shm_daemon.web", "templates"), of_reports]))
     made.globals.update(
         asset=asset,
-        moment=words.moment,
+        moment=formatting.moment,
         navigation=NAVIGATION,
         plotly_address=plotly_address,
         palette=" ".join(f"{name}={colour}" for name, colour in PALETTE.items()),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from shm.report import words
-from shm.report.content import Interval
+from shm.report import formatting
+from shm.report.intervals import Interval
 from shm.store import TestRow, TrendPoint
 from shm.values.force_units import ForceUnit
 from shm_daemon.web.address_of_test import test_page
@@ -40,7 +40,7 @@ class TestLine:
     def time(self) -> str:
         """Its own or, where it tells none, that of its receipt."""
         received = self.point is not None and self.point.taken_at is None
-        return words.moment(self.row.time) + (" (received)" if received else "")
+        return formatting.moment(self.row.time) + (" (received)" if received else "")
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
@@ -50,17 +50,17 @@ class TestLine:
         tension = Interval.of_summary(self.point.tension_n).in_unit(self.unit)
         known = math.isfinite(self.point.temperature_c)
         return (
-            words.temperature(self.point.temperature_c) if known else "not recorded",
-            words.model_class(self.point.model),
-            words.mean(tension),
-            words.span(tension),
+            formatting.temperature(self.point.temperature_c) if known else "not recorded",
+            formatting.model_class(self.point.model),
+            formatting.mean(tension),
+            formatting.span(tension),
         )
 
 
 def headings(view: HangerView) -> tuple[str, ...]:
     """Of the table of the lines."""
     unit = tension_unit(view.trend)
-    return ("test", "time", "temperature", "model", *words.tension_headings(unit))
+    return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
 
 
 def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:

@@ -11,8 +11,7 @@ from typing import Any
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.reporting import hanger_now, hanger_states
-from shm.report.content import HangerReport
-from shm.report.diagnosis.content import DiagnosisSheet
+from shm.report.contents import DiagnosisSheet, HangerReport
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import (
     Baseline,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from shm.report import words
-from shm.report.table import Table
+from shm.report import formatting
+from shm.report.paper import Table
 from shm.store import FormerTest, Lineage, Step
 from shm_daemon.web.view_of_test import TestView
 
@@ -19,7 +19,7 @@ def origin(view: TestView) -> Table:
         "raw file": file.file_name,
         "its SHA-256": file.sha256,
         "its size": _size(file.size_bytes),
-        "received": words.moment(view.recording.received_at),
+        "received": formatting.moment(view.recording.received_at),
         "in the archive": "yes" if view.is_archived else "no: taken out",
         "sidecar": "came with it" if file.sidecar_as else "none",
         "checksum of the input": lineage.input_sha256,
@@ -75,7 +75,7 @@ def superseded(view: TestView) -> Table:
             )
         for each in test.posteriors:
             if each.superseded_at:
-                what = f"posterior, {words.model_class(each.model)}"
+                what = f"posterior, {formatting.model_class(each.model)}"
                 rows.append(_former(what, each.updated_at, each.superseded_at, each.lineage))
     return Table(
         "Superseded results", ("what", "made", "superseded", "with", "settings"), tuple(rows)
@@ -85,8 +85,8 @@ def superseded(view: TestView) -> Table:
 def _former(what: str, made: datetime, ended: datetime, lineage: Lineage) -> tuple[str, ...]:
     return (
         what,
-        words.moment(made),
-        words.moment(ended),
+        formatting.moment(made),
+        formatting.moment(ended),
         f"shm {lineage.version}",
         lineage.settings_sha256[:12],
     )
@@ -100,7 +100,11 @@ def _after(at: datetime, then: datetime | None) -> str:
     seconds = (at - then).total_seconds() if then else 0.0
     if seconds < _AT_ONCE_S:
         return "at once"
-    return f"{words.plain(seconds)} s" if seconds < 3600 else f"{words.plain(seconds / 3600)} h"
+    return (
+        f"{formatting.plain(seconds)} s"
+        if seconds < 3600
+        else f"{formatting.plain(seconds / 3600)} h"
+    )
 
 
 def _version(version: str | None) -> str:

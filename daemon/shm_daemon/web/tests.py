@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field
 
 from shm import modes_document
 from shm.errors import NothingThere
-from shm.report.verdicts import overall
+from shm.report.quality_table import overall
 from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import name_in

@@ -19,11 +19,10 @@ from shm.errors import NothingThere
 from shm.identify import Identification, Poles
 from shm.pipeline.reporting import test_sheet
 from shm.pipeline.terms import identify_lineage
-from shm.report.sheet.content import TestSheet
-from shm.report.sheet.spectra import Shown, Spectrum
-from shm.report.sheet.summary import advice, summary, trust
-from shm.report.sheet.tables import conditions, dropped, hits
-from shm.report.table import Table
+from shm.report.contents import TestSheet
+from shm.report.figures.sheet_spectra import Shown, Spectrum
+from shm.report.paper import Table
+from shm.report.sheet_report import advice, conditions, dropped, hits, summary, trust
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm_daemon.web.figures_of_test import FROM_RECORDS, MEMBERS, TestFigure

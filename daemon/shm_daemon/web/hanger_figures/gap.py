@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from shm.report import words
-from shm.report.diagnosis.content import DiagnosisSheet, claimed
-from shm.report.diagnosis.figures import before_and_after, causes, gap_map
-from shm.report.diagnosis.figures.modes import kept, measured
-from shm.report.diagnosis.phrases import title
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_wording import claimed, title
+from shm.report.figures import gap_before_and_after, gap_causes, gap_map
+from shm.report.figures.gap_map import kept, measured
 from shm.report.figures.specification import stacked
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
@@ -33,7 +33,7 @@ GAP_MAP = HangerFigure(
 
 def _alt_of_places(view: HangerView) -> str:
     places = "; ".join(
-        f"as {title(place.kind)} it would sit at {words.number(place.x_m, '.2f')} m"
+        f"as {title(place.kind)} it would sit at {formatting.number(place.x_m, '.2f')} m"
         for place in gap_map.local(_sheet(view))
     )
     return f"Along the hanger: {places}."
@@ -56,12 +56,12 @@ GAP_PLACES = HangerFigure(
 
 CAUSES = HangerFigure(
     "causes",
-    causes.FIGURE.title,
+    gap_causes.FIGURE.title,
     "gap",
     lambda view: view.sheet is not None and bool(view.sheet.diagnosis.causes),
-    lambda view: causes.specify_on_screen(_sheet(view)),
-    lambda view: causes.caption(_sheet(view), is_on_screen=True),
-    lambda view: causes.FIGURE.alt(_sheet(view)),
+    lambda view: gap_causes.specify_on_screen(_sheet(view)),
+    lambda view: gap_causes.caption(_sheet(view), is_on_screen=True),
+    lambda view: gap_causes.FIGURE.alt(_sheet(view)),
     height_px=430,  # some 20 px, a line of text, for each of 20 effects
 )
 
@@ -77,8 +77,8 @@ BEFORE_AND_AFTER = HangerFigure(
     "How far the gap shrinks",
     "gap",
     _shrinks,
-    lambda view: before_and_after.specify(_sheet(view), is_on_screen=True),
-    lambda view: before_and_after.FIGURE.caption(_sheet(view)),
-    lambda view: before_and_after.FIGURE.alt(_sheet(view)),
+    lambda view: gap_before_and_after.specify(_sheet(view), is_on_screen=True),
+    lambda view: gap_before_and_after.BEFORE_AND_AFTER.caption(_sheet(view)),
+    lambda view: gap_before_and_after.BEFORE_AND_AFTER.alt(_sheet(view)),
     height_px=480,  # judgement: a panel for each plane
 )

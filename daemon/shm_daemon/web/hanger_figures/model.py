@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from shm.report import words
-from shm.report.content import HangerReport
-from shm.report.diagnosis.figures.causes import Bar, probability_bars
-from shm.report.figures.frequencies import FIGURE as OF_REPORT
-from shm.report.figures.frequencies import compared_modes
-from shm.report.figures.pairs import FIGURE as OF_PAIRS
+from shm.report import formatting
+from shm.report.contents import HangerReport
+from shm.report.figures.gap_causes import Bar, probability_bars
+from shm.report.figures.hanger_frequencies import FIGURE as OF_REPORT
+from shm.report.figures.hanger_frequencies import compared_modes
+from shm.report.figures.parameter_pairs import FIGURE as OF_PAIRS
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 
@@ -49,17 +49,17 @@ def _rows(view: HangerView) -> list[tuple[str, float]]:
     if found is None:
         return []
     return [
-        (words.model_class(posterior.model), share)
+        (formatting.model_class(posterior.model), share)
         for posterior, share in zip(found.posteriors, found.probabilities, strict=True)
     ]
 
 
 def _chosen(view: HangerView) -> str:
-    return words.model_class(report_of(view).posterior.model)
+    return formatting.model_class(report_of(view).posterior.model)
 
 
 def _alt_of_models(view: HangerView) -> str:
-    told = [f"{name} {words.probability(share)}" for name, share in _rows(view)]
+    told = [f"{name} {formatting.probability(share)}" for name, share in _rows(view)]
     return f"Probabilities of the model classes: {'; '.join(told)}."
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.report import words
-from shm.report.content import Interval
-from shm.report.figures import stiffness, trend
-from shm.report.figures.over_time import bounds_of, part, places, single_tests, thinned_words
+from shm.report import formatting
+from shm.report.figures import hanger_stiffness, hanger_trend
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
+from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
+from shm.report.intervals import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values import TENSION
@@ -28,13 +28,13 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 """What people did: name, symbol, whether it is filled, colour."""
 
 
-def _course(view: HangerView) -> trend.Course:
+def _course(view: HangerView) -> hanger_trend.Course:
     """All that the figure shows; without the state over time where that is still worked out."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
     found = [] if states is None else [q for q in states.quantities if q.name == TENSION]
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
-    return trend.Course(
+    return hanger_trend.Course(
         times=[point.time for point in view.trend],
         names=[point.test for point in view.trend],
         tensions_n=[Interval.of_summary(point.tension_n) for point in view.trend],
@@ -47,7 +47,7 @@ def _course(view: HangerView) -> trend.Course:
         reference_temperature_c=states.reference_temperature_c if states else math.nan,
         changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
         deeds=[
-            trend.Deed(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
+            hanger_trend.Deed(*_HANDS[event.kind], event.at, f"by {event.who}: {event.why}")
             for kind in _HANDS
             for event in view.events
             if event.kind is kind
@@ -59,7 +59,9 @@ def _course(view: HangerView) -> trend.Course:
 def _remark(view: HangerView) -> str:
     undated = sum(point.taken_at is None for point in view.trend)
     told = (
-        f"{words.counted(undated, 'test')} without a time drawn at the receipt." if undated else "",
+        f"{formatting.counted(undated, 'test')} without a time drawn at the receipt."
+        if undated
+        else "",
         "The state over time is being worked out." if view.states is None else "",
     )
     return " ".join(filter(None, told))
@@ -70,35 +72,37 @@ TREND = HangerFigure(
     "Tension over time",
     "trends",
     lambda view: bool(view.trend),
-    lambda view: trend.specify(_course(view)),
-    lambda view: trend.caption(_course(view)),
-    lambda view: trend.alt(_course(view)),
+    lambda view: hanger_trend.specify(_course(view)),
+    lambda view: hanger_trend.caption(_course(view)),
+    lambda view: hanger_trend.alt(_course(view)),
     height_px=440,  # judgement: the usual, with signs of what people did above it
     shows_states=True,
 )
 
 
-def _courses(view: HangerView) -> list[stiffness.Course]:
+def _courses(view: HangerView) -> list[hanger_stiffness.Course]:
     states, named = view.states, {point.time: point.test for point in view.trend}
     watched = [] if states is None else [q for q in states.quantities if not q.is_tension]
     if states is None or not watched:
         return [_by_tests(view, name) for name in _names(view)]
     tests = [named.get(time, "test") for time in states.times]
     return [
-        stiffness.Course(each.title, states.times, tests, each.read, each.baseline, each.filtered)
+        hanger_stiffness.Course(
+            each.title, states.times, tests, each.read, each.baseline, each.filtered
+        )
         for each in watched
     ]
 
 
 def _names(view: HangerView) -> list[str]:
-    return stiffness.names_of(point.stiffness for point in view.trend)
+    return hanger_stiffness.names_of(point.stiffness for point in view.trend)
 
 
-def _by_tests(view: HangerView, name: str) -> stiffness.Course:
+def _by_tests(view: HangerView, name: str) -> hanger_stiffness.Course:
     base = view.baseline.stiffness.get(name) if view.baseline else None
     found = [point.stiffness.get(name) for point in view.trend]
-    return stiffness.Course(
-        words.quantity(name),
+    return hanger_stiffness.Course(
+        formatting.quantity(name),
         [point.time for point in view.trend],
         [point.test for point in view.trend],
         bounds_of([Interval.of_summary(each) if each else None for each in found]),
@@ -115,13 +119,13 @@ STIFFNESS = HangerFigure(
     "End stiffness over time",
     "trends",
     lambda view: bool(_names(view)),
-    lambda view: stiffness.specify(_courses(view), _reach(view), is_on_screen=True),
-    lambda view: stiffness.caption(
+    lambda view: hanger_stiffness.specify(_courses(view), _reach(view), is_on_screen=True),
+    lambda view: hanger_stiffness.caption(
         _courses(view),
         _reach(view),
         " The state over time is being worked out." if view.states is None else "",
     ),
-    lambda view: stiffness.alt(_courses(view)),
+    lambda view: hanger_stiffness.alt(_courses(view)),
     height_px=520,  # judgement: a low panel for each of up to four springs
     shows_states=True,
 )
@@ -161,7 +165,9 @@ def _over_temperature(view: HangerView) -> Specification:
 def _caption_of_temperature(view: HangerView) -> str:
     known = len(_with_temperature(view))
     without = len(view.trend) - known
-    left = f" {words.counted(without, 'test')} without a temperature left out." if without else ""
+    left = (
+        f" {formatting.counted(without, 'test')} without a temperature left out." if without else ""
+    )
     return (
         "Tension by each test over its temperature, with 90 % intervals. A hanger that stays as it "
         f"is lies along one line; what leaves it has another reason than the weather.{left}"
@@ -177,7 +183,7 @@ def _alt_of_temperature(view: HangerView) -> str:
         f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
     )
     return (
-        f"Tension of {words.counted(len(known), 'test')} between {min(temperatures):.1f} and "
+        f"Tension of {formatting.counted(len(known), 'test')} between {min(temperatures):.1f} and "
         f"{max(temperatures):.1f} °C: {low} to {high} {unit.name}."
     )
 

@@ -18,9 +18,9 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
 from shm.pipeline import utc_now
-from shm.report import words
-from shm.report.bridge.content import hangers_unit
-from shm.report.content import Interval
+from shm.report import formatting
+from shm.report.contents import hangers_unit
+from shm.report.intervals import Interval
 from shm.values.force_units import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
@@ -114,14 +114,14 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
     alerts = sum(each.line.open_alerts for each in bridge.hangers)
     quiet = sum(each.is_quiet for each in bridge.hangers)
     never = sum(each.line.latest is None for each in bridge.hangers)
-    missing = [words.counted(quiet, "hanger") + " long not tested"] if quiet else []
+    missing = [formatting.counted(quiet, "hanger") + " long not tested"] if quiet else []
     missing += [f"{never} without a result"] if never else []
     newest = latest.latest if latest else None
     return [
         (
             "Last test",
             f"{told(now - newest)} ago" if newest else "none yet",
-            f"hanger {latest.hanger.id}, {words.moment(newest)}" if latest else "",
+            f"hanger {latest.hanger.id}, {formatting.moment(newest)}" if latest else "",
         ),
         ("Hangers", str(len(bridge.hangers)), "; ".join(missing) or "all with a result"),
         ("Tests", str(sum(each.tests for each in bridge.hangers)), ""),
@@ -135,9 +135,9 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     tension, latest = line.tension_n, line.latest
     return {
         "id": hanger.id,
-        "name": words.hanger_name(hanger.id, hanger.name),
+        "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": words.with_span(tension.in_unit(unit)) if tension else "no test yet",
+        "tension": formatting.with_span(tension.in_unit(unit)) if tension else "no test yet",
         "nominal": f"{line.of_nominal.mean:.1f}" if line.of_nominal else "",
         "shift": _shift(each),
         "called": line.called,
@@ -154,7 +154,7 @@ def _shift(each: HangerGlance) -> str:
     if each.shift is None:
         return shift_words(each) if each.line.latest else ""
     percent = each.shift.scaled(100)
-    places = min(_MOST_DECIMALS, max(1, words.decimals(percent.width)))
+    places = min(_MOST_DECIMALS, max(1, formatting.decimals(percent.width)))
     mean, low, high = (
         f"{value:+z.{places}f}" for value in (percent.mean, percent.low, percent.high)
     )
@@ -280,7 +280,7 @@ def shift_words(glance: HangerGlance) -> str:
         return "is the baseline"
     if glance.shift is None:
         return "no baseline yet" if glance.line.tension_n else "no test yet"
-    return f"{words.signed_percent(glance.shift)} since the baseline"
+    return f"{formatting.signed_percent(glance.shift)} since the baseline"
 
 
 def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[Triangle, ...]:
@@ -314,11 +314,11 @@ def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMar
 
 
 def _words(glance: HangerGlance) -> str:
-    parts = [words.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
+    parts = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
     if glance.line.latest:
         parts.append(f"last test {glance.line.latest:%Y-%m-%d}")
     if glance.line.open_alerts:
-        parts.append(words.counted(glance.line.open_alerts, "open alert"))
+        parts.append(formatting.counted(glance.line.open_alerts, "open alert"))
     return ", ".join(parts)
 
 

@@ -9,15 +9,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
-from shm.report import tables as report_tables
-from shm.report import words
-from shm.report.content import HangerReport
-from shm.report.diagnosis.page import in_words
-from shm.report.diagnosis.part import how_to_diagnose
-from shm.report.facts import facts
+from shm.report import formatting, hanger_tables
+from shm.report.contents import HangerReport, status
+from shm.report.diagnosis_report import answers, evidence
+from shm.report.hanger_report import facts, gap_part
+from shm.report.hanger_summary import summary
+from shm.report.paper import Table
 from shm.report.states import called_words
-from shm.report.summary import status, summary
-from shm.report.table import Table
 from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
@@ -44,12 +42,12 @@ _EVENTS = {
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
 _TABLES = (
-    report_tables.tension,
-    report_tables.drift,
-    report_tables.frequencies,
-    report_tables.parameters,
-    report_tables.models,
-    report_tables.quality,
+    hanger_tables.tension,
+    hanger_tables.drift,
+    hanger_tables.frequencies,
+    hanger_tables.parameters,
+    hanger_tables.models,
+    hanger_tables.quality,
 )
 
 
@@ -71,7 +69,7 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
     view = HangerView(site.workspace, site.store, one, workshop_of(request))
     rows = lines_before(view, _LATEST_TESTS + 1)
     common: dict[str, Any] = {
-        "name": words.hanger_name(one.id, one.name),
+        "name": formatting.hanger_name(one.id, one.name),
         "hanger": one,
         "beside": _beside(site.workspace, one),
         "tests": rows[:_LATEST_TESTS],
@@ -99,7 +97,7 @@ def all_tests(
     return page(
         request,
         "hanger_tests.html.j2",
-        name=words.hanger_name(one.id, one.name),
+        name=formatting.hanger_name(one.id, one.name),
         hanger=one,
         tests=rows[:_TESTS_A_PAGE],
         test_headings=headings(view),
@@ -110,7 +108,6 @@ def all_tests(
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     found = status(report)
-    *_, origin = report_tables.tables(report)
     return {
         "status_word": found.value,
         "style": found.name.lower(),
@@ -119,12 +116,12 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "is_called": report.is_called,
         "charts": {part: _charts(view, part) for part in ("trends", "model", "gap")},
         "tables": _tables(view, report),
-        "alerts": report_tables.alerts(report),
+        "alerts": hanger_tables.alerts(report),
         "events": _events(view),
-        "gap_watch": report.gap_watch,
-        "diagnosis": in_words(view.sheet) if view.sheet else None,
-        "how_to_diagnose": how_to_diagnose(report),
-        "origin": origin,
+        "gap": gap_part(report),
+        "answers": answers(view.sheet) if view.sheet else (),
+        "evidence": evidence(view.sheet) if view.sheet else (),
+        "origin": hanger_tables.origins(report)[-1],
     }
 
 
@@ -155,8 +152,8 @@ def _events(view: HangerView) -> Table:
     return Table(
         "What was set, adopted and called, latest first",
         ("time", "what", "by", "why"),
-        tuple((words.moment(at), *rest) for at, *rest in rows[:_LATEST_EVENTS]),
-        note=words.some(min(len(rows), _LATEST_EVENTS), len(rows), "events").strip(),
+        tuple((formatting.moment(at), *rest) for at, *rest in rows[:_LATEST_EVENTS]),
+        note=formatting.some(min(len(rows), _LATEST_EVENTS), len(rows), "events").strip(),
     )
 
 

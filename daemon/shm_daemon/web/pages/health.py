@@ -18,8 +18,8 @@ import shm
 from shm.documents import parse_time
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm.report import words
-from shm.report.table import Table
+from shm.report import formatting
+from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told
@@ -212,7 +212,7 @@ def _ago(seconds: float) -> str:
 
 
 def _since(oldest: datetime | None) -> str:
-    return f"the oldest since {words.moment(oldest)}" if oldest else "nothing stored waits"
+    return f"the oldest since {formatting.moment(oldest)}" if oldest else "nothing stored waits"
 
 
 def _stages(counts: dict[str, int]) -> Table:

@@ -9,15 +9,15 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
-from shm.report import words
-from shm.report.content import Interval
-from shm.report.sheet import tables
-from shm.report.sheet.figures.response import point_name
-from shm.report.sheet.spectra import shown_points
-from shm.report.sheet.summary import HEADLINES, name
-from shm.report.table import Table
-from shm.report.verdicts import overall
-from shm.values import ResponsePoint, Verdict
+from shm.report import formatting, sheet_report
+from shm.report.colours import VERDICT_STYLES
+from shm.report.figures.sheet_response import point_name
+from shm.report.figures.sheet_spectra import shown_points
+from shm.report.intervals import Interval
+from shm.report.paper import Table, filled
+from shm.report.quality_table import overall
+from shm.report.sheet_report import HEADLINES, name
+from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address_of_test import test_json, test_page
@@ -31,12 +31,6 @@ from shm_daemon.web.working_out import RETRY_AFTER
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
 Response = Annotated[int | None, Query(ge=0, le=MOST_RESPONSES)]
-_STYLES: dict[Verdict, str] = {
-    "good": "steady",
-    "warning": "watch",
-    "refused": "alert",
-    "unknown": "first",
-}
 _NOT_STORED = ("exponential window on the responses", "records")
 """Conditions that only the raw file tells."""
 
@@ -61,13 +55,15 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         title=name(sheet),
         hanger=hanger_id,
         verdict=HEADLINES[verdict],
-        style=_STYLES[verdict],
+        style=VERDICT_STYLES[verdict],
         summary=view.summary,
         facts=_facts(view),
         missing=view.missing,
         before=before and (before, test_page(hanger_id, before)),
         after=after and (after, test_page(hanger_id, after)),
-        results=_filled(tables.modes(sheet), tables.quality(sheet), tables.set_aside(sheet)),
+        results=filled(
+            sheet_report.modes(sheet), sheet_report.quality(sheet), sheet_report.set_aside(sheet)
+        ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],
         chosen=chosen,
@@ -75,8 +71,8 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         document=test_json(hanger_id, view.stored.test.id),
         hits=_hit_tables(view),
         at_work=AT_WORK,
-        details=_filled(tables.notes(sheet), *_dropped(view), _conditions(view)),
-        lineage=_filled(origin(view), steps(view), superseded(view)),
+        details=filled(sheet_report.notes(sheet), *_dropped(view), _conditions(view)),
+        lineage=filled(origin(view), steps(view), superseded(view)),
     )
 
 
@@ -90,11 +86,7 @@ def _hits(request: Request, view: TestView) -> HTMLResponse:
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
     whole = None if view.missing else view.workshop.kept(view.order)
-    return _filled(whole.hits) if whole else None
-
-
-def _filled(*found: Table) -> tuple[Table, ...]:
-    return tuple(table for table in found if table.rows)
+    return filled(whole.hits) if whole else None
 
 
 def _dropped(view: TestView) -> tuple[Table, ...]:
@@ -105,7 +97,7 @@ def _dropped(view: TestView) -> tuple[Table, ...]:
 def _conditions(view: TestView) -> Table:
     if view.worked:
         return view.worked.conditions
-    found = tables.conditions(view.as_stored)
+    found = sheet_report.conditions(view.as_stored)
     return replace(found, rows=tuple(row for row in found.rows if row[0] not in _NOT_STORED))
 
 
@@ -134,16 +126,20 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
     planes = {mode.plane for mode in sheet.modes}
     aside = len(sheet.identification.set_aside)
     return (
-        ("Modes", str(len(sheet.modes)), f"in {words.counted(len(planes), 'plane')}"),
+        ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         _tension(view),
         ("Temperature", _temperature(test.temperature_c), "of the test"),
-        ("Tested", words.moment(test.time), f"received {words.moment(view.recording.received_at)}"),
+        (
+            "Tested",
+            formatting.moment(test.time),
+            f"received {formatting.moment(view.recording.received_at)}",
+        ),
         ("Set aside", str(aside), "resonances not of the hanger"),
     )
 
 
 def _temperature(celsius: float) -> str:
-    return words.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
+    return formatting.number(celsius, ".1f") + " °C" if celsius == celsius else "not recorded"
 
 
 def _tension(view: TestView) -> tuple[str, str, str]:
@@ -154,6 +150,6 @@ def _tension(view: TestView) -> tuple[str, str, str]:
     tension_n = Interval.of_samples(posterior.tension_n)
     unit = force_unit(tension_n.mean)
     tension = tension_n.in_unit(unit)
-    span = f"90 % interval {words.span(tension)} {unit.name}"
-    beside = f"{span}, {words.model_class(posterior.model)}"
-    return "Tension by this test", f"{words.mean(tension)} {unit.name}", beside
+    span = f"90 % interval {formatting.span(tension)} {unit.name}"
+    beside = f"{span}, {formatting.model_class(posterior.model)}"
+    return "Tension by this test", f"{formatting.mean(tension)} {unit.name}", beside

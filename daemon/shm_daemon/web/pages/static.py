@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
-from shm.report.template import ENVIRONMENT
+from shm.report.as_html import ENVIRONMENT
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import STATIC, asset
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from shm.report import words
+from shm.report import formatting
 from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.frame import page
@@ -21,7 +21,8 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
         request,
         "upload.html.j2",
         hangers=[
-            (each.id, words.hanger_name(each.id, each.name)) for each in workspace.bridge.hangers
+            (each.id, formatting.hanger_name(each.id, each.name))
+            for each in workspace.bridge.hangers
         ],
         is_daemon_up=seen_s is not None and seen_s <= patience_s(workspace),
         max_mb=workspace.settings.max_file_bytes / 1e6,

@@ -1,0 +1,348 @@
+"""The report of a whole bridge: the state of all hangers, what moved, what explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from shm.documents import averaged_document, drift_document
+from shm.report import formatting
+from shm.report.contents import BridgeReport, Course, HangerLine, Status, hangers_unit
+from shm.report.intervals import Interval
+from shm.report.origin import lineage, settings
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
+from shm.report.period import period_json
+from shm.report.shifts import _day, pattern_tables, shift_cells
+from shm.values import Drift
+from shm.values.force_units import ForceUnit
+from shm.values.stated_tension import stated
+from shm.watch.neighbours import BridgePattern
+
+if TYPE_CHECKING:
+    from shm.report.figures.illustration import Illustration
+
+
+def bridge_paper(data: BridgeReport) -> Paper:
+    """Summary, figures along the bridge, numbers."""
+    return Paper(
+        title=data.bridge,
+        period=str(data.period) if data.period else "",
+        status=data.worst.value if data.worst else "",
+        style=data.worst.name.lower() if data.worst else "first",
+        parts=(
+            Part("In short", summary=summary(data), facts=facts(data)),
+            Part("Along the bridge", figures=lambda: _figures(data)),
+            Part("Numbers", tables=tables(data)),
+        ),
+        generated_at=data.generated_at,
+        version=data.version,
+        closing=f"{CREDIBLE}; times are UTC.",
+    )
+
+
+def _figures(data: BridgeReport) -> Sequence[Illustration]:
+    from shm.report.figures.every_figure import bridge_figures
+
+    return bridge_figures(data)
+
+
+def facts(data: BridgeReport) -> tuple[Fact, ...]:
+    """What, value, what stands beside it."""
+    tested = [line for line in data.hangers if line.latest is not None]
+    alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
+    opened = sum(line.open_alerts for line in data.hangers)
+    latest = max((line.latest for line in tested if line.latest), default=None)
+    oldest = min((line.latest for line in tested if line.latest), default=None)
+    return (
+        ("Hangers", str(len(data.hangers)), f"{len(tested)} of them tested"),
+        ("In alert", str(len(alert)), named(alert) if alert else "no hanger"),
+        ("To watch", str(len(watch)), named(watch) if watch else "no hanger"),
+        ("Open alerts", str(opened), "nobody took note of them yet" if opened else "none waits"),
+        (
+            "Latest test",
+            f"{latest:%Y-%m-%d}" if latest else "none",
+            f"oldest of the latest {formatting.moment(oldest)[:10]}" if oldest else "no test yet",
+        ),
+    )
+
+
+def summary(data: BridgeReport) -> str:
+    """One paragraph in plain words."""
+    told = data.pattern.sentence if data.pattern else data.why_no_pattern
+    remarks = data.pattern.remarks if data.pattern else ()
+    sentences = (
+        f"{_counts(data.hangers)}.", _extremes(data), _in_period(data), told, *remarks,
+        *advice(data),
+    )  # fmt: skip
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def advice(data: BridgeReport) -> tuple[str, ...]:
+    """What to do next, most urgent first; never empty."""
+    alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
+    opened = [line for line in data.hangers if line.open_alerts]
+    found = []
+    if alert:
+        found.append(f"Repeat the test of {named(alert)} within days, and inspect what stays.")
+    if watch:
+        found.append(f"Test {named(watch)} again soon.")
+    if opened:
+        found.append(f"Take note of the open alerts of {named(opened)} (shm alerts ack).")
+    if wide := [line for line in data.hangers if line.is_hardly_known]:
+        found.append(
+            f"Find more modes of {named(wide)}: the interval of the tension is wider than half the "
+            "tension itself, and what percentage of it a shift is, is as little known."
+        )
+    if untested := [line for line in data.hangers if line.status is None]:
+        found.append(f"Test {named(untested)}, of which nothing is known.")
+    return tuple(found) or ("Nothing needs doing before the next planned tests.",)
+
+
+def of_status(lines: Sequence[HangerLine], status: Status | None) -> list[HangerLine]:
+    return [line for line in lines if line.status is status]
+
+
+def named(lines: Sequence[HangerLine]) -> str:
+    """`hanger 3`, `hangers 3, 4 and 7`."""
+    numbers = formatting.listed([str(line.hanger.id) for line in lines])
+    return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
+
+
+def _counts(lines: Sequence[HangerLine]) -> str:
+    told = []
+    for status in Status:
+        found = of_status(lines, status)
+        if found:
+            which = f" ({formatting.listed([str(line.hanger.id) for line in found])})"
+            shown = which if status in (Status.ALERT, Status.WATCH) else ""
+            told.append(f"{status.value}: {formatting.counted(len(found), 'hanger')}{shown}")
+    missing = of_status(lines, None)
+    told += [f"without a test: {formatting.counted(len(missing), 'hanger')}"] if missing else []
+    return "; ".join(told)
+
+
+def _extremes(data: BridgeReport) -> str:
+    """Who carries most and least of the nominal tension."""
+    shares = [(line, share) for line in data.hangers if (share := line.of_nominal) is not None]
+    if len(shares) < 2:
+        return ""
+    by_share = sorted(shares, key=lambda each: each[1].mean)
+    least, most = by_share[0], by_share[-1]
+    return (
+        f"Of its nominal tension hanger {most[0].hanger.id} carries most, {_percent(most[1])}, and "
+        f"hanger {least[0].hanger.id} least, {_percent(least[1])}."
+    )
+
+
+def _percent(share: Interval) -> str:
+    return f"{formatting.mean(share)} % (90 % interval {formatting.span(share)} %)"
+
+
+def _in_period(data: BridgeReport) -> str:
+    if data.period is None:
+        return ""
+    courses = [(line, line.course) for line in data.hangers if line.course]
+    tested = [line for line, course in courses if course.tests]
+    alerts = sum(course.alerts for _, course in courses)
+    tests = formatting.counted(sum(course.tests for _, course in courses), "test")
+    told = (
+        f"In the period {data.period}: {tests} of {formatting.counted(len(tested), 'hanger')}, "
+        f"{formatting.counted(alerts, 'alert')}"
+    )
+    return f"{told}{_most_moved(data)}."
+
+
+def _most_moved(data: BridgeReport) -> str:
+    """The hanger whose tension moved most from the period's first test of it to the last."""
+    moved = [
+        (line, line.course.change)
+        for line in data.hangers
+        if line.course and line.course.change is not None
+    ]
+    if not moved:
+        return "; no hanger was tested twice in it"
+    line, change = max(moved, key=lambda each: abs(each[1].mean))
+    return (
+        f"; the tension of hanger {line.hanger.id} moved most in it, by "
+        f"{formatting.signed_percent(change)}"
+    )
+
+
+_BESIDE = {"repeatability": "repeatability", "above": "above limit", "slack": "slack"}
+"""What stands beside a tension where it is known, with its heading."""
+
+
+def tables(data: BridgeReport) -> tuple[Table, ...]:
+    """All tables that this report can fill."""
+    return filled(
+        _hangers(data),
+        _since_baseline(data),
+        _courses(data),
+        *(pattern_tables(data.pattern) if data.pattern else ()),
+        _tests(data),
+        _origin(data),
+        settings(data.settings),
+    )
+
+
+def _hangers(data: BridgeReport) -> Table:
+    unit = hangers_unit(data.hangers)
+    beside = {name: [_said(line, name, unit) for line in data.hangers] for name in _BESIDE}
+    shown = {name: cells for name, cells in beside.items() if any(cells)}
+    cells = list(zip(*shown.values(), strict=True)) or [()] * len(data.hangers)
+    return Table(
+        "Hangers",
+        (
+            "hanger", "state", f"tension, {unit.name} (90 %)", *(_BESIDE[name] for name in shown),
+            "% of nominal (90 %)", "open alerts", "latest test",
+        ),
+        tuple(_hanger(*each, unit) for each in zip(data.hangers, cells, strict=True)),
+        note="With absolute 90 % intervals. Repeatability: the standard deviation between tests of "
+        "one state. Alert: beyond a threshold. Watch: a change was called, or a "
+        "shift beyond a threshold is likelier than not. More: shm report --hanger N.",
+    )  # fmt: skip
+
+
+def _said(line: HangerLine, name: str, unit: ForceUnit) -> str:
+    """One of `_BESIDE` of a hanger; empty where it is not known."""
+    return str(getattr(stated(line.averaged, unit), name)) if line.averaged else ""
+
+
+def _hanger(line: HangerLine, beside: tuple[str, ...], unit: ForceUnit) -> tuple[str, ...]:
+    name = f"{line.hanger.id} {line.hanger.name}".strip()
+    opened = str(line.open_alerts or "none")
+    if line.tension_n is None or line.status is None:
+        unknown = ["not known"] * (2 + len(beside))
+        return (name, "no test", *unknown, opened, "none")
+    share = line.of_nominal
+    return (
+        name,
+        line.status.value,
+        formatting.with_span(line.tension_n.in_unit(unit)),
+        *(text or "not known" for text in beside),
+        formatting.with_span(share) if share else "no nominal",
+        opened,
+        _day(line.latest),
+    )
+
+
+def _since_baseline(data: BridgeReport) -> Table:
+    return Table(
+        "Since the baseline",
+        (
+            "hanger",
+            "shift of the tension",
+            "90 % interval",
+            "probability beyond threshold",
+            "called",
+        ),
+        tuple(
+            (str(line.hanger.id), *_shifted(line.drift), line.called or "nothing")
+            for line in data.hangers
+            if line.drift
+        ),
+        note="Shift of the tension at the latest test, if there is any, the swing with the "
+        "temperature taken out; how probable it is that it lies beyond the hanger's threshold; "
+        "what was called since. Hangers that have nothing but their baseline are left out.",
+    )
+
+
+def _shifted(drift: Drift) -> Fact:
+    _, size, span, threshold, probability = shift_cells(drift)
+    return (size, span, f"{probability} ({threshold})")
+
+
+def _courses(data: BridgeReport) -> Table:
+    """What lay in the period; empty where the report has none."""
+    return Table(
+        f"In the period {data.period}",
+        ("hanger", "tests", "alerts", "change of the tension, % (90 %)"),
+        tuple(
+            _course(line, line.course)
+            for line in data.hangers
+            if line.course and (line.course.tests or line.course.alerts)
+        ),
+        note="Change from the first test of the period to the last, by these two alone, taken as "
+        "independent; the swing with the temperature is in it. Hangers without a test in the "
+        "period are left out.",
+    )
+
+
+def _course(line: HangerLine, course: Course) -> tuple[str, ...]:
+    change = course.change
+    return (
+        str(line.hanger.id),
+        str(course.tests or "none"),
+        str(course.alerts or "none"),
+        formatting.with_span(change.scaled(100), signed=True) if change else "fewer than two tests",
+    )
+
+
+def _tests(data: BridgeReport) -> Table:
+    return Table(
+        "Tests that these tensions come from",
+        ("hanger", "latest test", "taken", "model class"),
+        tuple(
+            (
+                str(line.hanger.id),
+                line.test,
+                formatting.moment(line.latest),
+                formatting.model_class(line.model),
+            )
+            for line in data.hangers
+            if line.test
+        ),
+        note="Their files and checksums: shm report --hanger N.",
+    )
+
+
+def _origin(data: BridgeReport) -> Table:
+    facts = {
+        **lineage(data.lineage),
+        "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
+    }
+    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
+
+
+REPORT_SCHEMA = "shm.bridge_report/1"
+PATTERN_SCHEMA = "shm.bridge_pattern/1"
+
+
+def pattern_json(pattern: BridgePattern) -> dict[str, Any]:
+    """What `shm drift bridge --json` prints."""
+    return {"schema": PATTERN_SCHEMA, **asdict(pattern)}
+
+
+def bridge_json(data: BridgeReport) -> dict[str, Any]:
+    """A document for `shm.documents.dump`."""
+    return {
+        "schema": REPORT_SCHEMA,
+        "bridge": data.bridge,
+        "summary": summary(data),
+        "advice": list(advice(data)),
+        "period": period_json(data.period),
+        "hangers": [
+            {
+                "hanger": line.hanger.id,
+                "name": line.hanger.name,
+                "status": line.status.name.lower() if line.status else None,
+                "latest": line.latest,
+                "tension_n": asdict(line.tension_n) if line.tension_n else None,
+                "averaged": averaged_document(line.averaged) if line.averaged else None,
+                "drift": drift_document(line.drift) if line.drift else None,
+                "test": line.test or None,
+                "model": line.model or None,
+                "called": line.called,
+                "open_alerts": line.open_alerts,
+                "in_period": asdict(line.course) if line.course else None,
+            }
+            for line in data.hangers
+        ],
+        "pattern": pattern_json(data.pattern) if data.pattern else None,
+        "why_no_pattern": data.why_no_pattern,
+        "lineage": dict(data.lineage),
+        "settings": dict(data.settings),
+        "version": data.version,
+        "generated_at": data.generated_at,
+    }

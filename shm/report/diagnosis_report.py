@@ -1,0 +1,374 @@
+"""The report of a gap diagnosis: a paper of its own, or a part of a hanger's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from shm.diagnosis_document import diagnosis_document
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_summary import (
+    consequences,
+    contender,
+    facts,
+    name,
+    promise,
+    ranked_measurements,
+    slope,
+    summary,
+    verdict,
+)
+from shm.report.diagnosis_wording import (
+    AFTER,
+    Answer,
+    answer,
+    claimed,
+    claims,
+    is_set_aside,
+    label,
+    quantity,
+    size,
+    tension_of,
+    tension_unit,
+    title,
+)
+from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+from shm.values.force_units import ForceUnit
+
+if TYPE_CHECKING:
+    from shm.report.figures.illustration import Illustration
+
+_STYLES = {
+    Answer.EXPLAINED: "first",
+    Answer.ALIKE: "first",
+    Answer.NO_GAP: "steady",
+    Answer.UNEXPLAINED: "alert",
+    Answer.UNDECIDED: "watch",
+}
+
+
+def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
+    """The answer, figures, the answer in numbers, what it rests on."""
+    part = diagnosis_part(sheet, "In short")
+    return Paper(
+        title=name(sheet),
+        bridge=sheet.bridge,
+        status=part.status,
+        style=part.style,
+        parts=(
+            replace(part, figures=tuple, tables=(), status=""),
+            Part("Figures", figures=part.figures),
+            Part("The answer in numbers", tables=answers(sheet)),
+            Part("What it rests on", tables=evidence(sheet)),
+        ),
+        closing=f"From {_origin(sheet)}. {CREDIBLE}; places count from the deck end.",
+    )
+
+
+def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
+    """The whole of it: the answer with what follows, remarks on the data, figures, tables."""
+    found = answer(sheet.diagnosis)
+    return Part(
+        title,
+        paragraphs,
+        lead=verdict(sheet.diagnosis),
+        summary=consequences(sheet.diagnosis),
+        facts=facts(sheet),
+        remarks=sheet.diagnosis.remarks,
+        figures=lambda: _figures(sheet),
+        tables=(*answers(sheet), *evidence(sheet)),
+        status=found.value,
+        style=_STYLES[found],
+    )
+
+
+def _figures(sheet: DiagnosisSheet) -> Sequence[Illustration]:
+    from shm.report.figures.every_figure import diagnosis_figures
+
+    return diagnosis_figures(sheet)
+
+
+def _origin(sheet: DiagnosisSheet) -> str:
+    diagnosis = sheet.diagnosis
+    tests = formatting.counted(len(diagnosis.tests), "test")
+    seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""
+    named = f"{tests} ({', '.join(diagnosis.tests)})"
+    return f"{named}, baseline {diagnosis.baseline}, seed {diagnosis.seed}{seconds}"
+
+
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_WORST = 16
+_ROWS_SHOWN = 10
+"""Of a table in a terminal."""
+
+
+def answers(sheet: DiagnosisSheet) -> tuple[Table, ...]:
+    """What the diagnosis found, in reading order."""
+    return _made(sheet, (causes, sizes, shrinkage, tension, next_measurements))
+
+
+def evidence(sheet: DiagnosisSheet) -> tuple[Table, ...]:
+    """Where the gap lies and what these data cannot show."""
+    return _made(sheet, (where, trends, places, invisible))
+
+
+def _made(
+    sheet: DiagnosisSheet, makers: tuple[Callable[[DiagnosisSheet], Table], ...]
+) -> tuple[Table, ...]:
+    made = filled(*(make(sheet) for make in makers))
+    # What is always said last, such as `no gap`, stays in a terminal.
+    return tuple(table.shortened(_ROWS_SHOWN, last=2 if table.marks else 0) for table in made)
+
+
+def causes(sheet: DiagnosisSheet) -> Table:
+    diagnosis = sheet.diagnosis
+    rows = [_cause_row(cause) for claim in claims(diagnosis) for cause in claim.causes]
+    rest = (
+        ("no gap", diagnosis.no_gap_probability),
+        ("something not in the catalogue", diagnosis.unexplained_probability),
+    )
+    rows += [(what, formatting.probability(share), *("",) * 5) for what, share in rest]
+    return Table(
+        "Causes, likeliest first",
+        (
+            "cause",
+            "probability",
+            "alike",
+            "log Bayes factor",
+            "gain of fit",
+            "Occam's factor",
+            "how",
+        ),
+        tuple(rows),
+        note=_cause_note(diagnosis),
+        marks=_marks(diagnosis),
+    )
+
+
+def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The rows that the answer claims."""
+    claim = claimed(diagnosis)
+    rows = [
+        "claimed" if claim and cause in claim.causes else "left"
+        for each in claims(diagnosis)
+        for cause in each.causes
+    ]
+    found = answer(diagnosis)
+    rest = (found is Answer.NO_GAP, found is Answer.UNEXPLAINED)
+    return (*rows, *("claimed" if is_it else "left" for is_it in rest))
+
+
+def _cause_row(cause: Cause) -> tuple[str, ...]:
+    return (
+        label(cause),
+        formatting.probability(cause.probability),
+        "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
+        formatting.number(cause.log_bayes_factor, "+z.1f"),
+        formatting.number(cause.log_fit, "+z.1f"),
+        formatting.number(cause.log_occam, "+z.1f"),
+        cause.method,
+    )
+
+
+def _cause_note(diagnosis: Diagnosis) -> str:
+    left_out = ", ".join(title(effect) for effect in diagnosis.left_out)
+    return (
+        f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
+        "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
+        "by the same letter cannot be told apart with these data. How far each was taken: screened "
+        "by a linear fit, or fitted in full with a normal or a sampled posterior."
+        + (f" Taken out of the catalogue: {left_out}." if left_out else "")
+    )
+
+
+def sizes(sheet: DiagnosisSheet) -> Table:
+    """The parameters of the causes that are worth a thought."""
+    return Table(
+        "Sizes of the likeliest causes",
+        ("cause", "parameter", "size (90 % interval)"),
+        tuple(
+            (label(cause), quantity(estimate.name), str(size(estimate)))
+            for claim in claims(sheet.diagnosis)
+            if claim.probability >= 0.05
+            for cause in claim.causes
+            if cause.probability >= 0.01
+            for estimate in cause.parameters
+        ),
+        note="Places count from the deck end. Sizes of logarithmic parameters are the medians.",
+    )
+
+
+def shrinkage(sheet: DiagnosisSheet) -> Table:
+    found = sheet.diagnosis.shrinkage
+    rows = (
+        ("fitted", found.rms_before_percent, found.rms_after_percent),
+        ("held out of the fit", found.held_out_before_percent, found.held_out_after_percent),
+    )
+    return Table(
+        "How far the gap shrinks",
+        ("frequencies", "before, % rms", "after, % rms"),
+        tuple(
+            (what, formatting.plain(before), formatting.plain(after))
+            for what, before, after in rows
+            if math.isfinite(before)
+        ),
+    )
+
+
+def tension(sheet: DiagnosisSheet) -> Table:
+    diagnosis, nominal = sheet.diagnosis, sheet.hanger.nominal_tension_n
+    unit = tension_unit(diagnosis)
+    rows = (
+        (f"before: the baseline {diagnosis.baseline}", diagnosis.tension_before_n),
+        (f"after: {AFTER}", diagnosis.tension_after_n),
+    )
+    return Table(
+        "Tension before and after",
+        (
+            "tension",
+            *(f"{what}, {unit.name}" for what in ("mean", "sd", "90 % interval")),
+            "% of nominal (90 %)",
+        ),
+        tuple(
+            _tension_row(what, each, nominal, unit)
+            for what, each in rows
+            if math.isfinite(each.mean)
+        ),
+    )
+
+
+def _tension_row(
+    what: str, estimate: TensionEstimate, nominal_n: float, unit: ForceUnit
+) -> tuple[str, ...]:
+    interval, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
+    return (
+        what,
+        f"{interval.mean:.{places}f}",
+        formatting.number(unit.of(estimate.sd), f".{places}f"),
+        f"{interval.low:.{places}f} to {interval.high:.{places}f}"
+        if math.isfinite(estimate.q05)
+        else "not known",
+        _of_nominal(estimate, nominal_n),
+    )
+
+
+def _of_nominal(estimate: TensionEstimate, nominal_n: float) -> str:
+    """In percent with its interval, which comes from the tension alone: nominal is given."""
+    if not nominal_n > 0:
+        return "no nominal"
+    share = tension_of(estimate).scaled(100 / nominal_n)
+    return formatting.with_span(share) if math.isfinite(share.width) else f"{share.mean:.1f}"
+
+
+def next_measurements(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What would tell, best first",
+        ("measurement", "tells", "from", "expected log Bayes factor"),
+        tuple(
+            (
+                each.what,
+                *(contender(name) for name in each.separates),
+                promise(each),
+            )
+            for each in ranked_measurements(sheet.diagnosis)
+        ),
+        note="A log Bayes factor of 3 is odds of 20 to 1, of 5 odds of 150 to 1.",
+    )
+
+
+def where(sheet: DiagnosisSheet) -> Table:
+    """The frequencies set aside, then the residuals with the largest shares of the misfit."""
+    diagnosis = sheet.diagnosis
+    residuals = sorted(
+        diagnosis.where,
+        key=lambda r: (not is_set_aside(diagnosis, r), math.isnan(r.share), -r.share),
+    )
+    left = len(residuals) - _WORST
+    return Table(
+        "Where the gap lies, largest share first",
+        ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %"),
+        tuple(
+            _residual_row(residual, is_set_aside(diagnosis, residual))
+            for residual in residuals[:_WORST]
+        ),
+        note=(
+            "Off: measured over predicted frequency, less 1; z: the same in standard deviations."
+            + (f" {left} more residuals are in the JSON document." if left > 0 else "")
+        ),
+    )
+
+
+def _residual_row(residual: Residual, is_aside: bool) -> tuple[str, ...]:
+    return (
+        f"{residual.plane} {residual.order}",
+        residual.test,
+        formatting.number(residual.measured_hz, ".3f"),
+        formatting.number(residual.predicted_hz, ".3f"),
+        formatting.number(residual.residual_percent, "+z.2f"),
+        formatting.number(residual.z, "+z.1f"),
+        "set aside" if is_aside else _share(residual.share),
+        formatting.number(residual.after_percent, "+z.2f", ""),
+    )
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %" if math.isfinite(value) else "not known"
+
+
+def trends(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What the gap goes with",
+        ("condition", "change over its range, %", "90 % interval, %", "share of the misfit"),
+        tuple(_trend_row(trend) for trend in sheet.diagnosis.trends),
+    )
+
+
+def _trend_row(trend: Trend) -> tuple[str, ...]:
+    interval = slope(trend)
+    bounds = f"{interval.low:+z.2f} to {interval.high:+z.2f}"
+    return (
+        trend.condition,
+        formatting.number(trend.slope_percent, "+z.2f"),
+        bounds if math.isfinite(interval.width) else "not known",
+        _share(trend.share),
+    )
+
+
+def places(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "Where along the hanger a local cause would sit",
+        ("were it", "at, m", "90 % interval, m", "share of the misfit explained"),
+        tuple(_place_row(place) for place in sheet.diagnosis.places),
+        note="Places count from the deck end.",
+    )
+
+
+def _place_row(place: GapPlace) -> tuple[str, ...]:
+    bounds = f"{place.low_m:.2f} to {place.high_m:.2f}"
+    return (
+        title(place.kind),
+        formatting.number(place.x_m, ".2f"),
+        bounds if math.isfinite(place.low_m + place.high_m) else "not known",
+        _share(place.share),
+    )
+
+
+def invisible(sheet: DiagnosisSheet) -> Table:
+    return Table(
+        "What these data cannot show",
+        ("effect", "why"),
+        tuple((title(effect), why) for effect, why in sheet.diagnosis.invisible),
+    )
+
+
+def diagnosis_json(sheet: DiagnosisSheet) -> dict[str, Any]:
+    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    return {
+        **diagnosis_document(sheet.diagnosis),
+        "answer": answer(sheet.diagnosis).name.lower(),
+        "summary": summary(sheet),
+    }

@@ -1,0 +1,360 @@
+"""A gap diagnosis in words: what it claims, its effects as names and clauses, their sizes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from shm.report import formatting
+from shm.report.intervals import Interval
+from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
+from shm.values.diagnosis import joined
+from shm.values.force_units import ForceUnit, force_unit
+
+_LIKELIER_THAN_NOT = 0.5
+
+
+class Answer(Enum):
+    """What a diagnosis says, in two or three words."""
+
+    EXPLAINED = "Explained"
+    ALIKE = "Explained, causes alike"
+    NO_GAP = "No gap"
+    UNEXPLAINED = "Not explained"
+    UNDECIDED = "Undecided"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One cause, or the causes that these data cannot tell apart, likeliest first."""
+
+    causes: tuple[Cause, ...]
+
+    @property
+    def probability(self) -> float:
+        return sum(cause.probability for cause in self.causes)
+
+    @property
+    def leading(self) -> Cause:
+        return self.causes[0]
+
+
+def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
+    """The causes, those of a group together, likeliest first."""
+    together: dict[str, list[Cause]] = {}
+    for cause in sorted(diagnosis.causes, key=lambda cause: -cause.probability):
+        key = cause.effect if cause.group is None else f"group {cause.group}"
+        together.setdefault(key, []).append(cause)
+    found = [Claim(tuple(causes)) for causes in together.values()]
+    return tuple(sorted(found, key=lambda claim: -claim.probability))
+
+
+def claimed(diagnosis: Diagnosis) -> Claim | None:
+    """The likeliest claim; None where no gap or something unknown is likelier than each."""
+    leading = diagnosis.leading
+    return next((claim for claim in claims(diagnosis) if claim.leading is leading), None)
+
+
+def answer(diagnosis: Diagnosis) -> Answer:
+    """What the diagnosis says; undecided where nothing is likelier than not."""
+    claim = claimed(diagnosis)
+    if claim is not None:
+        sure, said = claim.probability, Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
+    elif diagnosis.leads == "no gap":
+        sure, said = diagnosis.no_gap_probability, Answer.NO_GAP
+    else:
+        sure, said = diagnosis.unexplained_probability, Answer.UNEXPLAINED
+    return said if sure >= _LIKELIER_THAN_NOT else Answer.UNDECIDED
+
+
+def is_set_aside(diagnosis: Diagnosis, residual: Residual) -> bool:
+    """Whether a frequency was taken for a gross error."""
+    named = [(each.plane, each.order, each.test) for each in diagnosis.outliers]
+    return (residual.plane, residual.order, residual.test) in named
+
+
+_PLACES = {
+    "everywhere": "",
+    "deck end": "at the deck end",
+    "arch end": "at the arch end",
+    "both ends": "at both ends",
+    "all sensors": "of all sensors",
+    "all tests": "in all tests",
+    "transverse": "in the transverse plane",
+    "longitudinal": "in the longitudinal plane",
+    "both planes alike": "in both planes alike",
+}
+_MOST_PLACES = 2
+_PLACE_STARTS = {"sensor": "of the", "test": "in"}
+
+PHRASES: dict[str, Callable[[Sizes], str]] = {
+    "rotational_end_flexibility": lambda s: f"ends that turn against springs of {s.springs('k')}",
+    "translational_end_flexibility": lambda s: (
+        f"ends that give way sideways against springs of {s.springs('kt')}"
+    ),
+    "effective_length": lambda s: (
+        f"an effective length {s['length_change_m'].directed('longer', 'shorter')} than described"
+    ),
+    "bending_stiffness": lambda s: (
+        f"a bending stiffness {s['stiffness_change'].directed('higher', 'lower')} than described"
+    ),
+    "distributed_mass": lambda s: (
+        f"a mass per length {s['mass_change'].directed('higher', 'lower')} than described"
+    ),
+    "point_mass": lambda s: f"a point mass of {s['mass_kg']} at {s['x_m']}",
+    "section_loss": lambda s: (
+        f"a loss of {s['loss']} of the section around {s['x_m']}, over {s['extent_m']}"
+    ),
+    "stiff_end_zones": lambda s: (
+        f"end zones of {s['zone_m']} with a bending stiffness of {s['stiffness_ratio']}"
+    ),
+    "shear_and_rotary_inertia": lambda s: f"shear and rotary inertia, {s['share']} of Timoshenko",
+    "sag": lambda s: f"sag with Irvine's lambda squared of {s['sag_parameter']}",
+    "intermediate_support": lambda s: (
+        f"an intermediate support of {s['stiffness_n_m']} at {s['x_m']}"
+    ),
+    "support_motion": lambda s: (
+        f"a support that moves as a mass of {s['support_mass_kg']} with a frequency of its own of "
+        f"{s['support_frequency_hz']}"
+    ),
+    "temperature_tension": lambda s: (
+        "a tension that changes with the temperature, by "
+        f"{s['tension_per_kelvin_n_k'].directed('(rising)', '(falling)')}"
+    ),
+    "geometric_hardening": lambda s: (
+        f"a tension that grows with the level of motion, by {s['hardening']} at the reference level"
+    ),
+    "joint_softening": lambda s: (
+        "joints that soften as the hanger moves more, with "
+        f"{s['log10_k_at_reference_level']} at the reference level"
+    ),
+    "sensor_mass": lambda s: f"the mass of the sensors, {s['mass_kg']} each",
+    "sensor_misalignment": lambda s: f"a sensor direction turned by {s['angle_deg']}",
+    "skewed_principal_axes": lambda s: (
+        f"ends that turn about one axis only, {s['angle_deg']} from the transverse plane, against "
+        f"{s['log10_k']}"
+    ),
+    "timebase": lambda s: (
+        f"a clock by which frequencies read {s['clock_error'].directed('too high', 'too low')}"
+    ),
+}
+
+
+def title(effect: str) -> str:
+    """`point_mass + sag` as `point mass + sag`."""
+    return formatting.quantity(effect)
+
+
+def label(cause: Cause) -> str:
+    """`rotational end flexibility (both ends)`, for tables and figures."""
+    parts = zip(cause.effects, cause.places, strict=True)
+    return joined(effect_label(effect, at) for effect, at in parts)
+
+
+def phrase(cause: Cause) -> str:
+    """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
+    clauses = [
+        _clause(effect, at, own_estimates(cause, number))
+        for number, (effect, at) in enumerate(zip(cause.effects, cause.places, strict=True))
+    ]
+    return " together with ".join(clauses) + _also(cause)
+
+
+def _also(cause: Cause) -> str:
+    """Where else it may act as well."""
+    if not cause.also_at:
+        return ""
+    places = [
+        " and ".join(_place(part) or "everywhere" for part in cause.each_at(at))
+        for at in cause.also_at[:_MOST_PLACES]
+    ]
+    return f" (about as likely: {formatting.listed(places)})"
+
+
+def _clause(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
+    """What the effect is, how large, where; the bare name where its size is not known."""
+    where = _place(at)
+    try:
+        told = PHRASES[effect](Sizes(estimates))
+    except KeyError:
+        told = title(effect)
+    return f"{told} {where}".rstrip()
+
+
+def _place(at: str) -> str:
+    """`deck end, transverse` as `at the deck end in the transverse plane`."""
+    return " ".join(filter(None, (_place_part(part) for part in at.split(", "))))
+
+
+def _place_part(part: str) -> str:
+    start = _PLACE_STARTS.get(part.partition(" ")[0])
+    return _PLACES.get(part, f"{start} {part}" if start else part)
+
+
+def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
+    """The estimates of effect `number` of the cause.
+
+    In a pair a name that both have carries its effect before a dot.
+    """
+    prefixed = {e.name: e.name.partition(".")[0] for e in cause.parameters if "." in e.name}
+    own = cause.effects[number]
+    return tuple(e for e in cause.parameters if prefixed.get(e.name, own) == own)
+
+
+_LOGARITHM = "log10_"
+_SPRING_PLANES = {1: "transverse", 2: "longitudinal", 3: "transverse", 4: "longitudinal"}
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
+_LOPSIDED = 3.0
+_UNIT_ENDINGS = ("_n_m", "_n_k", "_kg", "_deg", "_hz", "_m")
+_SCALED_UNITS = ("N", "N m/rad", "N/m", "N/K")
+_FACTORS = {"fraction": (100.0, "%"), "lambda^2": (1.0, "")}
+"""Units of the catalogue that read better otherwise: a factor and the unit it gives."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """A quantity with its 90 % interval in `unit`; logarithmic ones go by significant digits."""
+
+    interval: Interval
+    unit: str
+    logarithmic: bool = False
+
+    def __str__(self) -> str:
+        return self.told(self.interval)
+
+    @property
+    def sure_sign(self) -> int:
+        """1 or -1 where the whole interval has that sign, else 0."""
+        if self.interval.low > 0:
+            return 1
+        return -1 if self.interval.high < 0 else 0
+
+    def directed(self, up: str, down: str) -> str:
+        """`0.12 m (0.10 to 0.14) longer`; signed numbers where either direction is possible."""
+        if self.sure_sign > 0:
+            return f"{self} {up}"
+        if self.sure_sign < 0:
+            turned = Interval(-self.interval.mean, -self.interval.high, -self.interval.low)
+            return f"{self.told(turned)} {down}"
+        return f"{self.told(self.interval, '+')} {up}"
+
+    def told(self, interval: Interval, sign: str = "") -> str:
+        """An interval in this size's unit and digits."""
+        mean, low, high = _texts(interval, sign, self.logarithmic)
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{mean}{unit} ({low} to {high})" if low and high else f"{mean}{unit}"
+
+
+def size(estimate: EffectEstimate) -> Size:
+    """An estimate in the unit and prefix that suit it; logarithms as what they are of."""
+    interval = Interval(estimate.mean, estimate.q05, estimate.q95)
+    if logarithmic := estimate.name.startswith(_LOGARITHM):
+        interval = Interval(
+            *(10.0**value for value in (interval.mean, interval.low, interval.high))
+        )
+    scale, unit = _FACTORS.get(estimate.unit, (1.0, estimate.unit))
+    if unit in _SCALED_UNITS:
+        divisor, prefix = _prefix(interval.mean)
+        scale, unit = 1 / divisor, prefix + unit
+    return Size(interval.scaled(scale), unit, logarithmic)
+
+
+def _prefix(value: float) -> tuple[float, str]:
+    return next((pair for pair in _PREFIXES if abs(value) >= pair[0]), (1.0, ""))
+
+
+def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, str]:
+    """Mean and bounds with digits that the width deserves; empty bounds where they are unknown."""
+    half = interval.width / 2
+    if logarithmic or _lopsided(interval) or not (math.isfinite(half) and half > 0):
+        mean, low, high = (_significant(v, sign) for v in _three(interval))
+        return (mean, low, high) if half > 0 else (mean, "", "")
+    places = min(math.ceil(-math.log10(half / 2.95)), _most_places(interval.mean))
+    mean, low, high = (f"{round(v, places):{sign}.{max(0, places)}f}" for v in _three(interval))
+    return mean, low, high
+
+
+def _lopsided(interval: Interval) -> bool:
+    """Whether both bounds have one sign and lie so far apart that each needs its own digits."""
+    near, far = sorted((abs(interval.low), abs(interval.high)))
+    return interval.low * interval.high > 0 and far > _LOPSIDED * near
+
+
+def _most_places(mean: float) -> int:
+    """Decimals beyond which nobody measures: four significant digits."""
+    return 3 - math.floor(math.log10(abs(mean))) if mean else 6
+
+
+def _three(interval: Interval) -> tuple[float, float, float]:
+    return interval.mean, interval.low, interval.high
+
+
+def _significant(value: float, sign: str) -> str:
+    """Two significant digits, never as a power of ten."""
+    if not math.isfinite(value):
+        return "of unknown size" if math.isnan(value) else "unbounded"
+    if value == 0:
+        return "0"
+    places = 1 - math.floor(math.log10(abs(value)))
+    return f"{round(value, places):{sign}.{max(0, places)}f}"
+
+
+def quantity(name: str) -> str:
+    """`mass_kg` as `mass`, `log10_k1` as `k1`, `x_m` as `place`: its unit stands with its size."""
+    plain = base_name(name).removeprefix(_LOGARITHM)
+    ending = next((each for each in _UNIT_ENDINGS if plain.endswith(each)), "")
+    plain = plain.removesuffix(ending)
+    return "place" if plain == "x" else plain.replace("_", " ")
+
+
+def base_name(name: str) -> str:
+    """A parameter's name in the catalogue; in a pair it may carry its effect before a dot."""
+    return name.rpartition(".")[2]
+
+
+class Sizes:
+    """The sizes of one effect by the catalogue's names of its parameters."""
+
+    def __init__(self, estimates: Sequence[EffectEstimate]):
+        self._sizes: Mapping[str, Size] = {base_name(e.name): size(e) for e in estimates}
+
+    def __getitem__(self, name: str) -> Size:
+        return self._sizes[name]
+
+    def springs(self, letter: str) -> str:
+        """The end springs log10_`letter`1 to 4, with their planes where there are several."""
+        found = {
+            plane: self._sizes[name]
+            for number, plane in _SPRING_PLANES.items()
+            if (name := f"{_LOGARITHM}{letter}{number}") in self._sizes
+        }
+        if not found:
+            raise KeyError(letter)
+        if len(found) == 1:
+            return str(next(iter(found.values())))
+        return " and ".join(f"{size} {plane}" for plane, size in found.items())
+
+
+AFTER = "weighed over all that may be"
+"""What the tension after the diagnosis stands for: no gap, every cause and the unknown count by
+their probabilities."""
+
+
+def tension_unit(diagnosis: Diagnosis) -> ForceUnit:
+    """One unit for both tensions, so that they can be compared at a glance."""
+    return force_unit(diagnosis.tension_before_n.mean, diagnosis.tension_after_n.mean)
+
+
+def tension_of(estimate: TensionEstimate) -> Interval:
+    """Mean and 90 % interval in N."""
+    return Interval(estimate.mean, estimate.q05, estimate.q95)
+
+
+def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
+    """`702 kN (90 % interval 690 to 714 kN)`; the mean alone where nothing else is known."""
+    tension_n = tension_of(estimate)
+    if math.isnan(tension_n.width):
+        return formatting.rounded_tension(estimate.mean, unit)
+    return formatting.tension(tension_n, unit)

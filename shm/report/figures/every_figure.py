@@ -1,0 +1,77 @@
+"""Every figure of every report. A new one: a file with a `FIGURE`, and a line here."""
+
+from __future__ import annotations
+
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, TestSheet
+from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
+from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
+from shm.report.figures.gap_causes import FIGURE as CAUSES
+from shm.report.figures.gap_map import FIGURE as GAP_MAP
+from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
+from shm.report.figures.hanger_response import FIGURE as RESPONSE_OF_LATEST
+from shm.report.figures.hanger_states import FIGURE as STATES
+from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
+from shm.report.figures.hanger_tension import FIGURE as TENSION
+from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.illustration import Illustration, Member, drawn
+from shm.report.figures.sheet_damping import FIGURE as DAMPING
+from shm.report.figures.sheet_hits import FIGURE as HITS
+from shm.report.figures.sheet_quality import FIGURE as QUALITY
+from shm.report.figures.sheet_response import FIGURE as RESPONSE
+from shm.report.figures.sheet_shapes import FIGURE as SHAPES
+from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.sheet_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
+from shm.report.figures.trial_errors import (
+    COVERAGE,
+    HELD_OUT,
+    LOG_SCORE,
+    RELIABILITY,
+    TENSION_ERRORS,
+)
+from shm.values import TrialScore
+
+OF_HANGER: tuple[Member[HangerReport], ...] = (
+    TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
+)  # fmt: skip
+# The quality stands on a page as a table of words, which can be searched and read aloud.
+_ON_A_SHEET: tuple[Member[Shown], ...] = (
+    TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES, DAMPING
+)  # fmt: skip
+OF_SHEET = (QUALITY, *_ON_A_SHEET)
+OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
+OF_TRIAL: tuple[Member[TrialScore], ...] = (
+    DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
+)  # fmt: skip
+
+
+def hanger_figures(data: HangerReport) -> tuple[Illustration, ...]:
+    """Those that the report of a hanger has the data for, in reading order."""
+    return drawn(OF_HANGER, data)
+
+
+def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
+    """Those of a bridge: what moved, where it was compared, and what each hanger carries."""
+    shifts = drawn((SHIFTS,), data.pattern) if data.pattern else ()
+    return (*shifts, *drawn((TENSIONS,), data))
+
+
+def sheet_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+    """All of one hammer test."""
+    return drawn(OF_SHEET, Shown.of(sheet))
+
+
+def sheet_page_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+    """Those of them that are no table."""
+    return drawn(_ON_A_SHEET, Shown.of(sheet))
+
+
+def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
+    """Those of a gap diagnosis."""
+    return drawn(OF_DIAGNOSIS, sheet)
+
+
+def trial_figures(score: TrialScore) -> tuple[Illustration, ...]:
+    """Those of a blind trial."""
+    return drawn(OF_TRIAL, score)

@@ -1,0 +1,222 @@
+"""What the gap diagnosis changes: the frequencies and the tension, before and after."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from shm.report import colours, formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_wording import (
+    AFTER,
+    claimed,
+    label,
+    tension_of,
+    tension_unit,
+    tension_words,
+)
+from shm.report.figures import style
+from shm.report.figures.gap_map import by_plane, kept, orders, planes
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import PLANE_HUES, Axis, Points, Specification, Symbol, limits
+from shm.values import Plane, Residual, TensionEstimate
+from shm.values.force_units import ForceUnit
+
+
+@dataclass(frozen=True)
+class _Series:
+    """One of the residuals of a mode; an empty colour is that of the plane."""
+
+    field: str
+    label: str
+    symbol: Symbol
+    filled: bool
+    colour: str
+    offset: float
+
+
+_SERIES = (
+    _Series("residual_percent", "baseline", "circle", False, "quiet", -0.2),
+    _Series("after_percent", "with the cause", "circle", True, "", 0.0),
+    _Series("held_out_after_percent", "with the cause, held out", "diamond", True, "green", 0.2),
+)
+
+
+def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification | None:
+    residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
+    if not residuals or claimed(sheet.diagnosis) is None:
+        return None
+    made = {
+        plane: [
+            points
+            for series in _SERIES
+            if (points := _points([r for r in residuals if r.plane == plane], plane, series))
+        ]
+        for plane in planes(residuals)
+    }
+    label = "gap (%)" if is_on_screen else "measured / predicted - 1 (%)"
+    ends = [end for marks in made.values() for each in marks for end in (each.low, each.high)]
+    rows = by_plane(made, residuals, Axis(label=label, range=limits(*ends)), is_on_screen)
+    return Specification(rows=rows, height_inches=3.0, legend_columns=3)
+
+
+def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Points | None:
+    """The mean over the tests with a line from the least to the largest."""
+    there = [
+        (order, values)
+        for order in orders(residuals, plane)
+        if len(values := _values(residuals, order, series.field))
+    ]
+    if not there:
+        return None
+    return Points(
+        x=[order + series.offset for order, _ in there],
+        y=[float(np.mean(values)) for _, values in there],
+        low=[min(values) for _, values in there], high=[max(values) for _, values in there],
+        caps=False, symbol=series.symbol, filled=series.filled, name=series.label,
+        colour=series.colour or PLANE_HUES[plane],
+        hover=f"{plane}, {series.label}: %{{y:.2f}} %",
+    )  # fmt: skip
+
+
+def _values(residuals: Sequence[Residual], order: int, field: str) -> list[float]:
+    found = [getattr(r, field) for r in residuals if r.order == order]
+    return [value for value in found if math.isfinite(value)]
+
+
+def _caption_of_before_and_after(sheet: DiagnosisSheet) -> str:
+    claim = claimed(sheet.diagnosis)
+    assert claim is not None
+    held_out = any(math.isfinite(r.held_out_after_percent) for r in sheet.diagnosis.where)
+    diamonds = (
+        " Diamonds: the same where the mode or its test was held out of the fit; a gap that "
+        "shrinks only where it was fitted has not shrunk."
+        if held_out
+        else " Nothing was held out of the fit."
+    )
+    return (
+        f"Open: the gap of each mode by the baseline {sheet.diagnosis.baseline}. Filled: with "
+        f"{label(claim.leading)}.{diamonds} Marks are means over the tests, lines go from the "
+        "least to the largest."
+    )
+
+
+def _alt_of_before_and_after(sheet: DiagnosisSheet) -> str:
+    found = kept(sheet)
+    told = [
+        f"{plane} from {_rms(found, plane, 'residual_percent')} to "
+        f"{_rms(found, plane, 'after_percent')}"
+        for plane in planes(found)
+    ]
+    return f"Root mean square of the gap by mode before and after: {'; '.join(told)}."
+
+
+def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
+    values = [getattr(r, field) for r in residuals if r.plane == plane]
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "unknown"
+    return f"{formatting.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
+
+
+BEFORE_AND_AFTER = Member(
+    "before_and_after",
+    "The gap before and after by mode",
+    specify,
+    _caption_of_before_and_after,
+    _alt_of_before_and_after,
+)
+
+
+_NEAR = 1.0
+"""How far the nominal tension may lie to be in view, in widths of what is drawn."""
+
+
+def _draw_gap_tension(sheet: DiagnosisSheet) -> Figure | None:
+    rows = _rows(sheet)
+    if not rows:
+        return None
+    figure = style.new_figure(0.42 * len(rows) + 0.95)
+    axes = figure.subplots()
+    unit = tension_unit(sheet.diagnosis)
+    style.dress(axes, f"tension ({unit.name})", "")
+    for row, (_, estimate, colour) in enumerate(rows):
+        _interval(axes, row, estimate, unit, colour)
+    axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])
+    axes.tick_params(axis="y", length=0)
+    axes.grid(False, axis="y")
+    axes.set_ylim(len(rows) - 0.5, -0.75)
+    axes.margins(x=0.12)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    _nominal(axes, unit.of(sheet.hanger.nominal_tension_n))
+    return figure
+
+
+def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
+    diagnosis = sheet.diagnosis
+    rows = [
+        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, colours.QUIET),
+        (AFTER, diagnosis.tension_after_n, colours.BLUE),
+    ]
+    return [row for row in rows if math.isfinite(row[1].mean)]
+
+
+def _interval(
+    axes: Axes, row: int, estimate: TensionEstimate, unit: ForceUnit, colour: str
+) -> None:
+    interval = tension_of(estimate).in_unit(unit)
+    if math.isfinite(interval.width):
+        axes.plot(
+            [interval.low, interval.high], [row, row], color=colour, linewidth=7, alpha=0.35,
+            solid_capstyle="butt",
+        )  # fmt: skip
+    axes.plot([interval.mean], [row], marker="o", markersize=6, color=colour)
+    axes.annotate(
+        tension_words(estimate, unit),
+        (interval.mean, row),
+        xytext=(0, 9),
+        textcoords="offset points",
+        ha="center",
+        fontsize=style.TINY + 0.5,
+        color=colours.INK,
+    )
+
+
+def _nominal(axes: Axes, nominal: float) -> None:
+    """The nominal tension as a line, where it lies near."""
+    low, high = axes.get_xlim()
+    reach = _NEAR * (high - low)
+    if not low - reach <= nominal <= high + reach:
+        return
+    axes.axvline(nominal, color=colours.INK, linestyle=":", linewidth=1.2, label="nominal")
+    margin = 0.08 * (high - low)
+    axes.set_xlim(min(low, nominal - margin), max(high, nominal + margin))
+    style.legend_above(axes)
+
+
+def _caption_of_gap_tension(sheet: DiagnosisSheet) -> str:
+    return (
+        f"Tension by the baseline alone and {AFTER}: mean and 90 % interval. Where the two bars do "
+        "not overlap, the gap moves the tension by more than the baseline admits. The interval "
+        "holds what the scatter of manufacture leaves open."
+    )
+
+
+def _alt_of_gap_tension(sheet: DiagnosisSheet) -> str:
+    unit = tension_unit(sheet.diagnosis)
+    told = [f"{what} {tension_words(estimate, unit)}" for what, estimate, _ in _rows(sheet)]
+    return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
+
+
+GAP_TENSION = Member(
+    "gap_tension",
+    "Tension before and after",
+    _draw_gap_tension,
+    _caption_of_gap_tension,
+    _alt_of_gap_tension,
+)

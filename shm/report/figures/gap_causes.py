@@ -1,0 +1,191 @@
+"""How probable each cause is, beside no gap and something that is not in the catalogue."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shm.report import formatting
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_wording import Claim, claims, label
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import (
+    Axis,
+    Bars,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Side,
+    Specification,
+    stacked,
+)
+from shm.values import Cause, Diagnosis
+
+_MOST, _MOST_ON_SCREEN = 10, 8
+_ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
+_LEAST_SHOWN = 0.0005
+_LABEL, _LABEL_ON_SCREEN = 40, 30
+"""Longest line of a label, in letters: a phone shows the bars too."""
+_BRACKET_TEXT = 0.42
+"""Room for the words beside a bracket and the column of Bayes factors."""
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One row of the figure; `claim` is the group that it belongs to, None for a lone one."""
+
+    label: str
+    probability: float
+    colour: str
+    beside: str = ""
+    claim: Claim | None = None
+
+
+def specify(sheet: DiagnosisSheet) -> Specification | None:
+    """With the Bayes factors, and brackets around causes that the data cannot tell apart."""
+    bars = _bars(sheet.diagnosis)
+    if not any(bar.probability > 0 for bar in bars):
+        return None
+    brackets, outermost = _brackets(bars)
+    right = max(1.3, outermost + _BRACKET_TEXT)
+    beside = [(-0.85, "log Bayes factor"), *enumerate(bar.beside for bar in bars)]
+    column = _notes([right] * len(beside), [row for row, _ in beside], [told for _, told in beside])
+    return probability_bars(bars, _LABEL, (-1.2, right), [*brackets, column])
+
+
+def specify_on_screen(sheet: DiagnosisSheet) -> Specification:
+    """Where those alike share a letter, and fewer are shown."""
+    pairs = [(claim, cause) for claim in claims(sheet.diagnosis) for cause in claim.causes]
+    bars = [
+        Bar(label(cause) + _letter(cause.group), cause.probability, "blue")
+        for _, cause in pairs[:_MOST_ON_SCREEN]
+    ]
+    return probability_bars([*bars, *_others(sheet.diagnosis)], _LABEL_ON_SCREEN)
+
+
+def _letter(group: int | None) -> str:
+    return "" if group is None else f" [{_LETTERS[group % len(_LETTERS)]}]"
+
+
+def probability_bars(
+    bars: Sequence[Bar], longest: int = _LABEL_ON_SCREEN,
+    ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[Mark] = (),
+) -> Specification:  # fmt: skip
+    """Bars one below the other, their labels in lines of at most so many letters.
+
+    `ends` are the upper end of the one axis and the right one of the other.
+    """
+    labels = [textwrap.fill(bar.label, longest) for bar in bars]
+    is_tall = any(label.count("\n") > 1 for label in labels)
+    drawn = [
+        Bars(
+            x=[row], y=[bar.probability], lying=True, width=0.62, colour=bar.colour,
+            labels=[formatting.probability(bar.probability)],
+            texts=[f"{bar.label}: {formatting.probability(bar.probability)}"],
+        )
+        for row, bar in enumerate(bars)
+    ]  # fmt: skip
+    panel = Panel(
+        y=Axis(
+            range=(len(bars) - 0.45, ends[0]), ticks=range(len(bars)), tick_labels=labels,
+            grid=False,
+        ),
+        x=Axis(label="probability", range=(0, ends[1]), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
+        marks=[*drawn, *marks],
+    )  # fmt: skip
+    return stacked([panel], (_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
+
+
+def _bars(diagnosis: Diagnosis) -> list[Bar]:
+    return [
+        *(
+            Bar(
+                label(cause),
+                cause.probability,
+                "blue",
+                formatting.number(cause.log_bayes_factor, "+z.1f"),
+                claim if len(claim.causes) > 1 else None,
+            )
+            for claim, cause in _shown(diagnosis)
+        ),
+        *_others(diagnosis),
+    ]
+
+
+def _others(diagnosis: Diagnosis) -> tuple[Bar, Bar]:
+    rest = Bar("something not in the catalogue", diagnosis.unexplained_probability, "orange")
+    return rest, Bar("no gap", diagnosis.no_gap_probability, "green")
+
+
+def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
+    """Causes of any probability to speak of, at least three where there are so many."""
+    all_causes = [(claim, cause) for claim in claims(diagnosis) for cause in claim.causes]
+    probable = [pair for pair in all_causes if pair[1].probability >= _LEAST_SHOWN]
+    return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
+
+
+def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
+    """A bracket around causes that the data cannot tell apart, with what they have together.
+
+    And the place of the outermost bracket.
+    """
+    outermost = 0.0
+    marks: list[Mark] = []
+    found: dict[int, tuple[Claim, list[int]]] = {}
+    for row, bar in enumerate(bars):
+        if bar.claim is not None:
+            found.setdefault(id(bar.claim), (bar.claim, []))[1].append(row)
+    for claim, rows in found.values():
+        x = max(bars[row].probability for row in rows) + 0.13
+        top, bottom = rows[0] - 0.3, rows[-1] + 0.3
+        sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
+        told = f"not told apart:\n{formatting.probability(claim.probability)} together"
+        marks += [
+            Line(x=sides, y=heights, colour="purple", width=1.4),
+            _notes([x + 0.01], [(top + bottom) / 2], [told], "purple", "right"),
+        ]
+        outermost = max(outermost, x)
+    return marks, outermost
+
+
+def _notes(
+    x: Sequence[float], y: Sequence[float], told: Sequence[str], colour: str = "quiet",
+    side: Side = "left",
+) -> Points:  # fmt: skip
+    """Words alone."""
+    return Points(x=x, y=y, size=0, labels=told, label_side=side, colour=colour)
+
+
+def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
+    diagnosis = sheet.diagnosis
+    shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
+    left = len(diagnosis.causes) - shown
+    more = f" {formatting.counted(left, 'less probable cause')} {_are(left)} not drawn."
+    alike = (
+        "Causes with the same letter cannot be told apart with these data"
+        if is_on_screen
+        else "A bracket holds causes that these data cannot tell apart"
+    )
+    groups = f" {alike}; what counts is their sum." if diagnosis.groups else ""
+    return (
+        "Probability of each cause, of something that the catalogue does not hold, and of no gap; "
+        f"all add to 1.{groups}{more if left > 0 else ''}"
+    )
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _alt(sheet: DiagnosisSheet) -> str:
+    bars = [
+        f"{bar.label} {formatting.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)
+    ]
+    return f"{verdict(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
+
+
+FIGURE = Member("causes", "What causes the gap", specify, caption, _alt)

@@ -1,0 +1,123 @@
+"""Predicted over measured frequency of every mode, both planes (as thesis figure 5.18)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.contents import HangerReport
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    PLANE_SYMBOLS,
+    Axis,
+    Bars,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Span,
+    Specification,
+    limits,
+    stacked,
+)
+from shm.report.hanger_summary import residuals_percent
+from shm.report.intervals import NORMAL_90, Interval
+from shm.values import PLANES, Mode, Plane, PredictedFrequency
+
+_BESIDE = {"transverse": -0.12, "longitudinal": 0.12}
+
+
+def specify(data: HangerReport) -> Specification | None:
+    compared = compared_modes(data)
+    if not compared:
+        return None
+    half = NORMAL_90 * _sigma(data).mean
+    known = [mode for mode in data.latest.modes if math.isfinite(mode.frequency_sd_hz)]
+    points = [p for plane in PLANES if (p := _points(plane, compared))]
+    marks: list[Mark] = [
+        Span(low=1 - half, high=1 + half, axis="y", opacity=0.07, name="model error"),
+        Rule(at=1.0),
+        *([_measurement(known)] if known else []),
+        *points,
+    ]
+    highest = max(mode.order for mode in compared)
+    ends = [end for each in points for end in (each.low, each.high)]
+    step = 1 if highest <= 16 else 2
+    panel = Panel(
+        y=Axis(
+            label="predicted / measured frequency",
+            range=limits([1 - half, 1 + half], *ends),
+        ),
+        marks=marks,
+        x=Axis(
+            label="mode number in its plane", range=(0.5, highest + 0.5), grid=False,
+            ticks=range(1, highest + 1, step),
+        ),
+    )  # fmt: skip
+    return stacked([panel], 3.4)
+
+
+def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
+    """Those that were predicted and measured."""
+    return [mode for mode in data.predicted if math.isfinite(mode.measured_hz)]
+
+
+def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> Points | None:
+    modes = [mode for mode in compared if mode.plane == plane]
+    if not modes:
+        return None
+    measured = np.array([mode.measured_hz for mode in modes])
+    ratio = np.array([mode.mean_hz for mode in modes]) / measured
+    half = NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured
+    return Points(
+        x=[mode.order + _BESIDE[plane] for mode in modes], y=ratio, low=ratio - half,
+        high=ratio + half, symbol=PLANE_SYMBOLS[plane], colour=PLANE_HUES[plane], size=5,
+        name=plane,
+        texts=[
+            f"{plane} {mode.order}: predicted {mode.mean_hz:.3f} ± {mode.sd_hz:.3f} Hz, measured "
+            f"{mode.measured_hz:.3f} Hz"
+            for mode in modes
+        ],
+    )  # fmt: skip
+
+
+def _measurement(known: Sequence[Mode]) -> Bars:
+    """The measurement's own 90 % interval around 1, where its standard deviation is known."""
+    half = np.array([NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known])
+    return Bars(
+        x=[mode.order + _BESIDE[mode.plane] for mode in known], y=2 * half, base=1 - half,
+        width=0.2, opacity=0.25, name="measurement, 90 %",
+    )  # fmt: skip
+
+
+def _sigma(data: HangerReport) -> Interval:
+    return Interval.of_samples(data.posterior.parameter("sigma"))
+
+
+def _model_error(data: HangerReport) -> str:
+    return "sigma " + formatting.with_interval(_sigma(data).scaled(100), "%")
+
+
+def _caption(data: HangerReport) -> str:
+    return (
+        f"Frequencies predicted by {formatting.model_class(data.posterior.model)} after updating, "
+        "over the measured ones of the latest test. Bars: 90 % interval that the uncertainty of "
+        "the parameters leaves; dark boxes: that of the measurement, where known; light band: "
+        f"model error ({_model_error(data)}). A mode outside the band is one that the model does "
+        "not explain."
+    )
+
+
+def _alt(data: HangerReport) -> str:
+    residuals = residuals_percent(data.predicted)
+    return (
+        f"Ratio of predicted to measured frequency of {len(residuals)} modes, between "
+        f"{1 + min(residuals) / 100:.4f} and {1 + max(residuals) / 100:.4f}."
+    )
+
+
+FIGURE = Member("frequencies", "Predicted over measured frequencies", specify, _caption, _alt)

@@ -1,0 +1,185 @@
+"""States over time: what each test says, what is known of tension and springs, what was called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from shm.report.contents import HangerReport
+from shm.report.figures import time_axes
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import (
+    Axis,
+    Band,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Specification,
+    Symbol,
+    limits,
+    stacked,
+)
+from shm.report.states import QuantityOverTime, StatesOverTime
+from shm.values import BoolArray
+from shm.values.force_units import force_unit
+from shm.watch.history import Band as Bounds
+
+_TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
+_REST_INCHES = 0.9
+_LEAST_TESTS = 2
+"""One test alone has no course: its numbers stand elsewhere."""
+
+
+def specify(data: StatesOverTime) -> Specification | None:
+    if not data.times or not data.quantities:
+        return None
+    panels = [_panel(data, quantity) for quantity in data.quantities]
+    if np.any(np.isfinite(data.temperatures_c)):
+        panels.append(_temperature(data))
+    panels[-1] = replace(panels[-1], x=time_axes.time_axis(data.times))
+    return stacked(panels, sum(panel.height for panel in panels) + _REST_INCHES, 5)
+
+
+def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
+    scale, unit = _scale(quantity)
+    whole = np.arange(len(data.times))
+    read = time_axes.part(quantity.read, whole, scale)
+    filtered = time_axes.part(quantity.filtered, whole, scale)
+    smoothed = time_axes.part(quantity.smoothed, whole, scale)
+    levels = scale * np.array([quantity.lower_threshold, quantity.upper_threshold])
+    baseline = scale * quantity.baseline
+    # Lone readings and wide bands may lie beyond.
+    bounds = [time_axes.inner(each) for each in (filtered.low, filtered.high)]
+    seen = time_axes.inner(read.middle[~data.outlier])
+    low, high = limits(filtered.middle, smoothed.middle, *bounds, seen, levels, [baseline])
+    is_first = quantity is data.quantities[0]
+    changes = time_axes.changes(data.changes, data.times, is_first)
+    high += time_axes.LABEL_ROOM * (high - low) * (len(changes) if is_first else 0)
+    times: Any = data.times
+    look: dict[str, Any] = {"x": times, "colour": "blue"}
+    marks: list[Mark] = [
+        *changes,
+        Band(low=filtered.low, high=filtered.high, opacity=0.22, name="90 % band", **look),
+        *_readings(data, read, low, high),
+        Line(y=filtered.middle, width=1.5, name="filtered", **look),
+        Line(x=times, y=smoothed.middle, colour="orange", width=1.4, dash="dash", name="smoothed"),
+        time_axes.level(baseline, "baseline", "green", "dash"),
+        *(
+            time_axes.level(each, "threshold", "red", "dashdot")
+            for each in levels[np.isfinite(levels)].tolist()
+        ),
+    ]
+    is_tension = quantity.is_tension
+    label = f"tension ({unit})" if is_tension else f"log10 of\n{unit}"
+    return Panel(
+        y=Axis(label=label, range=(low, high)), marks=marks,
+        title="" if is_tension else quantity.title, title_side="left",
+        height=_TENSION_INCHES if is_tension else _STIFFNESS_INCHES,
+    )  # fmt: skip
+
+
+def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
+    """What turns its values into those of its axis, and their unit: that of a tension fits it."""
+    if not quantity.is_tension:
+        return 1.0, quantity.unit
+    unit = force_unit(quantity.baseline, *quantity.filtered.middle.tolist())
+    return 1 / unit.newtons, unit.name
+
+
+def _readings(data: StatesOverTime, read: Bounds, low: float, high: float) -> list[Mark]:
+    """Single tests, hollow where taken as outliers, triangles at the edge beyond which they lie."""
+    found: list[Mark] = []
+    known = np.isfinite(read.middle)
+    for chosen, filled, name in (
+        (known & ~data.outlier, True, "test by itself"),
+        (known & data.outlier, False, "taken as outlier"),
+    ):
+        if places := np.flatnonzero(chosen).tolist():
+            part = time_axes.part(read, np.array(places))
+            found.append(
+                Points(
+                    x=[data.times[place] for place in places], y=part.middle, low=part.low,
+                    high=part.high, filled=filled, size=2.8 if filled else 4.2, colour="quiet",
+                    opacity=0.7, caps=False, name=name,
+                )
+            )  # fmt: skip
+    beyond: tuple[tuple[BoolArray, float, Symbol], ...] = (
+        (read.middle > high, high, "triangle"),
+        (read.middle < low, low, "triangle down"),
+    )
+    for chosen, edge, symbol in beyond:
+        if places := np.flatnonzero(chosen).tolist():
+            found.append(
+                Points(
+                    x=[data.times[place] for place in places], y=[edge] * len(places), size=5,
+                    symbol=symbol, filled=False, clipped=False, colour="quiet",
+                    name="test out of view",
+                )
+            )  # fmt: skip
+    return found
+
+
+def _temperature(data: StatesOverTime) -> Panel:
+    known = np.flatnonzero(np.isfinite(data.temperatures_c)).tolist()
+    times = [data.times[place] for place in known]
+    curve = Line(
+        x=times, y=data.temperatures_c[known], colour="quiet", width=0.8, dots=True
+    )  # fmt: skip
+    marks: list[Mark] = [curve]
+    if np.isfinite(data.reference_temperature_c):
+        marks.append(Rule(at=data.reference_temperature_c, colour="green", dash="dash"))
+    return Panel(y=Axis(label="temp.\n(°C)"), marks=marks, height=_TEMPERATURE_INCHES)
+
+
+def _caption(data: StatesOverTime) -> str:
+    at = (
+        f", at {data.reference_temperature_c:.1f} °C"
+        if np.isfinite(data.reference_temperature_c)
+        else ""
+    )
+    return (
+        f"Tension and stiffness over time{at}: the swing with the temperature is taken out. Dots: "
+        "what each test says by itself with its own 90 % interval, hollow where it was taken as an "
+        "outlier, triangles where it lies out of view. Solid: the state from the tests up to each, "
+        "with its 90 % band; dashed orange: from all tests. Dashed green: baseline; dash-dotted: "
+        "thresholds. Upright spans: when a called change began, with 90 % probability. At the "
+        "bottom: temperature of the tests."
+    )
+
+
+def _alt(data: StatesOverTime) -> str:
+    last = [_last(quantity) for quantity in data.quantities]
+    called = [f"{change.words}, begun by {change.began_by:%Y-%m-%d}" for change in data.changes]
+    return (
+        f"States over {len(data.times)} tests, at last: {'; '.join(last)}. "
+        f"Changes called: {'; '.join(called) or 'none'}."
+    )
+
+
+def _last(quantity: QuantityOverTime) -> str:
+    band = quantity.filtered
+    scale, name = _scale(quantity)
+    unit = f" {name}" if quantity.is_tension else ""
+    low, middle, high = (float(part[-1]) * scale for part in (band.low, band.middle, band.high))
+    return (
+        f"{quantity.title} {middle:.4g}{unit} (90 % interval {low:.4g} to {high:.4g}{unit}), "
+        f"baseline {quantity.baseline * scale:.4g}{unit}"
+    )
+
+
+def _specify_course(data: StatesOverTime) -> Specification | None:
+    return specify(data) if len(data.times) >= _LEAST_TESTS else None
+
+
+STATES = Member("drift", "States over time", specify, _caption, _alt)
+FIGURE = Member[HangerReport](
+    STATES.name,
+    STATES.title,
+    lambda data: _specify_course(data.states.within(data.period)),
+    lambda data: _caption(data.states.within(data.period)),
+    lambda data: _alt(data.states.within(data.period)),
+)

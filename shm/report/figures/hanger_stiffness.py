@@ -1,0 +1,153 @@
+"""End stiffness over time, of each plane or, where frequencies tell the ends apart, of each end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.contents import HangerReport
+from shm.report.figures import time_axes
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Axis, Mark, Panel, Specification, limits, stacked
+from shm.values import FloatArray
+from shm.watch import end_stiffness
+from shm.watch.history import Band as Bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One stiffness over time, log10 of N m/rad, or of N/m a node for a solid class.
+
+    `baseline` is NaN where there is none; `state` is what all tests up to each say together.
+    """
+
+    title: str
+    times: Sequence[datetime]
+    tests: Sequence[str]
+    alone: Bounds
+    baseline: float
+    state: Bounds | None = None
+
+
+def specify(
+    courses: Sequence[Course], reach_decades: float, is_on_screen: bool = False
+) -> Specification | None:
+    """Side by side on paper, one below the other on a screen, which may be narrow."""
+    if not courses:
+        return None
+    panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
+    if is_on_screen:
+        return stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
+    label = Axis(label="log10 of stiffness in N m/rad")
+    ends = [end for panel in panels for end in panel.y.range or ()]
+    shared = [
+        replace(each, y=Axis(range=(min(ends), max(ends))), shares_y=place > 0)
+        for place, each in enumerate(panels)
+    ]
+    shared[0] = replace(shared[0], y=replace(shared[0].y, label=label.label))
+    return Specification(rows=[shared], height_inches=3.0)
+
+
+def _panel(course: Course, reach: float, is_on_screen: bool) -> Panel:
+    alone = course.alone
+    chosen = time_axes.places(alone.middle, alone.low, alone.high)
+    when = [course.times[place] for place in chosen.tolist()]
+    shown, names = time_axes.part(alone, chosen), [course.tests[i] for i in chosen.tolist()]
+    state = None if course.state is None else time_axes.part(course.state, chosen)
+    marks: list[Mark] = [
+        *(
+            time_axes.band(when, shown, "purple")
+            if state is None
+            else time_axes.band(when, state, "purple", "state, 90 % band")
+        ),
+        time_axes.single_tests(when, shown, names, "purple" if state is None else "quiet"),
+    ]
+    levels = ((0.0, "baseline", "green"), (reach, "threshold", "red"), (-reach, "threshold", "red"))
+    if not math.isnan(course.baseline):
+        marks += [
+            time_axes.level(
+                course.baseline + shift, name, hue, "dash" if shift == 0 else "dashdot"
+            )
+            for shift, name, hue in levels
+        ]  # fmt: skip
+    # The baseline with its thresholds, and what is near them of tests and state.
+    bounds = course.alone if course.state is None else course.state
+    seen: list[FloatArray] = [time_axes.inner(each) for each in (bounds.low, bounds.high)]
+    seen += [time_axes.inner(alone.middle), course.baseline + np.array([-reach, reach])]
+    return Panel(
+        y=Axis(label="log10 of stiffness", range=limits(*seen)), marks=marks,
+        x=time_axes.time_axis(course.times), title=course.title, title_side="left",
+    )  # fmt: skip
+
+
+def caption(courses: Sequence[Course], reach_decades: float, remark: str = "") -> str:
+    what = (
+        "Stiffness of the ends, log10 of N m/rad (of N/m per node for a solid class), by each test "
+        "and as a state from all tests up to each, with 90 % intervals; the ends stand apart where "
+        "the frequencies tell them apart."
+        if any(course.state for course in courses)
+        else "Rotational stiffness of the ends by each test, log10 of N m/rad, "
+        "2/(1/k_deck + 1/k_arch) in each plane, because frequencies alone cannot tell the ends "
+        "apart: mean and 90 % credible band."
+    )
+    levels = (
+        f" Dashed: baseline; dash-dotted: thresholds, {reach_decades:.3g} decades either side."
+        if any(math.isfinite(course.baseline) for course in courses)
+        else ""
+    )
+    fewer = time_axes.thinned_words(max((len(course.times) for course in courses), default=0))
+    return (
+        f"{what}{levels} A wide band means that the measured modes hardly feel the stiffness."
+        f"{fewer}{remark}"
+    )
+
+
+def alt(courses: Sequence[Course]) -> str:
+    told = "; ".join(_last(course) for course in courses)
+    return f"End stiffness over time, log10; at last: {told}."
+
+
+def _last(course: Course) -> str:
+    bounds = course.alone if course.state is None else course.state
+    low, middle, high = (float(each[-1]) for each in (bounds.low, bounds.middle, bounds.high))
+    if math.isnan(middle):
+        return f"{course.title} not known"
+    return f"{course.title} {middle:.2f} ({low:.2f} to {high:.2f})"
+
+
+def _courses(data: HangerReport) -> list[Course]:
+    rows = time_axes.dated(data)
+    base = end_stiffness(data.baseline, data.hanger) if data.baseline else {}
+    return [
+        Course(
+            formatting.quantity(name),
+            [row.time for row in rows],
+            [row.row.test for row in rows],
+            time_axes.bounds_of([row.row.stiffness.get(name) for row in rows]),
+            float(base[name].mean()) if name in base else math.nan,
+        )
+        for name in names_of(row.row.stiffness for row in rows)
+    ]
+
+
+def names_of(rows: Iterable[Mapping[str, object]]) -> list[str]:
+    """`transverse_end_stiffness` first."""
+    return sorted({name for row in rows for name in row})[::-1]
+
+
+def _reach(data: HangerReport) -> float:
+    return data.hanger.thresholds.stiffness_shift_decades
+
+
+FIGURE = Member[HangerReport](
+    "stiffness",
+    "Trend of the end stiffness",
+    lambda data: specify(_courses(data), _reach(data)),
+    lambda data: caption(_courses(data), _reach(data)),
+    lambda data: alt(_courses(data)),
+)

@@ -1,0 +1,245 @@
+"""Tension over time: single tests, the state over time with its band, levels and events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.contents import HangerReport
+from shm.report.figures import time_axes
+from shm.report.figures.illustration import Member
+from shm.report.figures.specification import (
+    Axis,
+    Mark,
+    Panel,
+    Points,
+    Specification,
+    Symbol,
+    limits,
+    stacked,
+)
+from shm.report.intervals import Interval
+from shm.report.states import CalledChange, QuantityOverTime
+from shm.values import FloatArray
+from shm.values.force_units import ForceUnit, force_unit
+from shm.watch.history import Band as Bounds
+
+_AT_FOOT = 0.03
+
+
+@dataclass(frozen=True)
+class Deed:
+    """What somebody did, and why: it stands at the foot of the figure."""
+
+    kind: str
+    symbol: Symbol
+    filled: bool
+    colour: str
+    at: datetime
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The tension of a hanger over time: n tests in N, and what is known beside them.
+
+    `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
+    are those that were called, None where that is not known. `remark` ends the caption.
+    """
+
+    times: Sequence[datetime]
+    names: Sequence[str]
+    tensions_n: Sequence[Interval]
+    nominal_n: float
+    baseline_n: float | None
+    reach: float
+    alerts: Mapping[int, str]
+    state: QuantityOverTime | None = None
+    state_times: Sequence[datetime] = ()
+    reference_temperature_c: float = math.nan
+    changes: Sequence[CalledChange] | None = None
+    deeds: Sequence[Deed] = ()
+    remark: str = ""
+    bounds_n: Bounds = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bounds_n", time_axes.bounds_of(self.tensions_n))
+
+    @property
+    def unit(self) -> ForceUnit:
+        """The one unit of the figure."""
+        return force_unit(*(each.mean for each in self.tensions_n))
+
+
+def specify(course: Course) -> Specification | None:
+    if not course.times:
+        return None
+    scale, bounds = 1 / course.unit.newtons, course.bounds_n
+    chosen = time_axes.places(bounds.middle, bounds.low, bounds.high, always=course.alerts)
+    shown, when = time_axes.part(bounds, chosen, scale), _picked(course.times, chosen.tolist())
+    names = [course.names[place] for place in chosen.tolist()]
+    marks = [
+        *(_state(course, scale) or time_axes.band(when, shown, "blue")),
+        time_axes.single_tests(when, shown, names, "quiet" if course.state else "blue"),
+        *_levels(course, scale),
+        *_alerts(course, scale),
+        *_deeds(course),
+        *time_axes.changes(course.changes or (), course.times),
+    ]
+    axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
+    return stacked([Panel(y=axis, marks=marks, x=time_axes.time_axis(course.times))], 3.4, 5)
+
+
+def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
+    return [times[place] for place in chosen]
+
+
+def _state(course: Course, scale: float) -> list[Mark]:
+    if course.state is None:
+        return []
+    band = course.state.filtered
+    chosen = time_axes.places(band.middle, band.low, band.high)
+    when = _picked(course.state_times, chosen.tolist())
+    return time_axes.band(when, time_axes.part(band, chosen, scale), "blue", "state, 90 % band")
+
+
+def _levels(course: Course, scale: float) -> list[Mark]:
+    levels: list[Mark] = [time_axes.level(scale * course.nominal_n, "nominal", "ink", "dot")]
+    if course.baseline_n is not None:
+        mean = scale * course.baseline_n
+        levels.append(time_axes.level(mean, "baseline", "green", "dash"))
+        levels += [
+            time_axes.level(mean * (1 + shift), "threshold", "red", "dashdot")
+            for shift in (course.reach, -course.reach)
+        ]
+    return levels
+
+
+def _alerts(course: Course, scale: float) -> list[Mark]:
+    """A triangle at each test that raised an alert."""
+    if not course.alerts:
+        return []
+    raised = list(course.alerts)
+    return [
+        Points(
+            x=_picked(course.times, raised), y=scale * course.bounds_n.middle[raised],
+            symbol="triangle down", filled=False, size=10, colour="red", name="alert",
+            texts=list(course.alerts.values()),
+        )
+    ]  # fmt: skip
+
+
+def _deeds(course: Course) -> list[Mark]:
+    """What people did, by kind."""
+    kinds = {deed.kind: deed for deed in course.deeds}
+    return [
+        Points(
+            x=[deed.at for deed in course.deeds if deed.kind == kind],
+            y=[_AT_FOOT for deed in course.deeds if deed.kind == kind], in_shares=True,
+            symbol=like.symbol, filled=like.filled, size=7, colour=like.colour, name=kind,
+            texts=[f"{kind} {deed.why}" for deed in course.deeds if deed.kind == kind],
+        )
+        for kind, like in kinds.items()
+    ]  # fmt: skip
+
+
+def _range(course: Course, scale: float) -> tuple[float, float]:
+    """Tests, state, baseline, thresholds and a nominal tension near them; lone intervals may lie
+    beyond."""
+    seen: list[FloatArray] = [course.bounds_n.middle]
+    if course.baseline_n is not None:
+        seen.append(course.baseline_n * np.array([1 - course.reach, 1 + course.reach]))
+    bounds = course.bounds_n if course.state is None else course.state.filtered
+    seen += [time_axes.inner(bounds.low), time_axes.inner(bounds.high)]
+    low, high = limits(*seen)
+    if 2 * low - high < course.nominal_n < 2 * high - low:
+        low, high = limits(*seen, [course.nominal_n])
+    written = time_axes.LABEL_ROOM * len(course.changes or ())
+    return scale * low, scale * (high + written * (high - low))
+
+
+def caption(course: Course) -> str:
+    parts = (_tests(course), _lines(course), _marks(course), course.remark)
+    return " ".join(part for part in parts if part)
+
+
+def _tests(course: Course) -> str:
+    if course.state is None:
+        return "Tension by each test: mean and 90 % credible band."
+    at = (
+        f" at {course.reference_temperature_c:.1f} °C, the swing with the temperature taken out"
+        if math.isfinite(course.reference_temperature_c)
+        else ""
+    )
+    return (
+        "Dots: the tension by each test alone, as it was that day, with its 90 % interval. Line "
+        f"and band: the state from all tests up to each{at}, with its 90 % credible band."
+    )
+
+
+def _lines(course: Course) -> str:
+    if course.baseline_n is None:
+        return "Dotted: nominal."
+    return (
+        f"Dotted: nominal; dashed: baseline; dash-dotted: thresholds, {100 * course.reach:.3g} % "
+        "either side of the baseline."
+    )
+
+
+def _marks(course: Course) -> str:
+    told = [
+        "triangles: alerts" if course.alerts else "",
+        "upright spans: when a called change began, with 90 % probability"
+        if course.changes
+        else "",
+        "at the foot: what was set or adopted" if course.deeds else "",
+    ]
+    found = "; ".join(filter(None, told))
+    fewer = time_axes.thinned_words(len(course.times))
+    return ((found[:1].upper() + found[1:] + "." if found else "") + fewer).strip()
+
+
+def alt(course: Course) -> str:
+    first, last = (
+        f"{formatting.tension(course.tensions_n[place], course.unit)} on "
+        f"{course.times[place]:%Y-%m-%d}"
+        for place in (0, -1)
+    )
+    called = (
+        f" Changes called: {'; '.join(change.words for change in course.changes) or 'none'}."
+        if course.changes is not None
+        else ""
+    )
+    count = formatting.counted(len(course.times), "test")
+    return f"Tension over {count}, {first} at first, {last} at last.{called}"
+
+
+def _course(data: HangerReport) -> Course:
+    rows = time_axes.dated(data)
+    alerted = {alert.test: alert.message for alert in data.alerts}
+    undated = len(data.trend) - len(rows)
+    left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
+    return Course(
+        times=[row.time for row in rows],
+        names=[row.row.test for row in rows],
+        tensions_n=[row.row.tension_n for row in rows],
+        nominal_n=data.hanger.nominal_tension_n,
+        baseline_n=float(data.baseline.tension_n.mean()) if data.baseline else None,
+        reach=data.hanger.thresholds.tension_shift_fraction,
+        alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
+        remark=left,
+    )
+
+
+FIGURE = Member[HangerReport](
+    "trend",
+    "Trend of the tension",
+    lambda data: specify(_course(data)),
+    lambda data: caption(_course(data)),
+    lambda data: alt(_course(data)),
+)

@@ -1,0 +1,159 @@
+"""What is drawn over time: bands, single tests with their intervals, levels, fewer points."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from shm.report.contents import HangerReport, TrendRow
+from shm.report.figures.specification import (
+    Axis,
+    Band,
+    Dash,
+    Line,
+    Mark,
+    Points,
+    Rule,
+    Span,
+    Values,
+    envelope_places,
+)
+from shm.report.intervals import Interval
+from shm.report.states import CalledChange
+from shm.values import FloatArray, IntArray
+from shm.watch.history import Band as Bounds
+
+TIME = "time of the test (UTC)"
+MOST_POINTS = 1_000
+"""Of which a figure is thinned: a hanger with a test a day for three years is drawn whole."""
+_BINS = MOST_POINTS // 6
+_MARGIN = 0.04
+_LEAST_MARGIN = timedelta(days=1)
+_REACH = 3.0
+_THINNEST = 0.004
+"""Width of the span of a change, as a share of the axis."""
+LABEL_ROOM = 0.08
+"""Above a figure for each line of what is written over changes, as a share of its height."""
+
+
+@dataclass(frozen=True)
+class Dated:
+    """A row of the trend whose time is known."""
+
+    time: datetime
+    row: TrendRow
+
+
+def dated(data: HangerReport) -> list[Dated]:
+    """The rows with a time, oldest first."""
+    rows = [Dated(row.time, row) for row in data.trend if row.time is not None]
+    return sorted(rows, key=lambda row: row.time)
+
+
+def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
+    """Indices (m,) of what to draw of curves (n,): of each bin the extremes of every curve.
+
+    The first, the last and those of `always` stay whatever they are.
+    """
+    count = len(curves[0])
+    if count <= MOST_POINTS:
+        return np.arange(count)
+    chosen = [envelope_places(curve, _BINS) for curve in curves]
+    kept = np.array(sorted({0, count - 1, *always}), dtype=np.int64)
+    return np.unique(np.concatenate([*chosen, kept]))
+
+
+def thinned_words(count: int) -> str:
+    """What a caption says, after a space, of a figure of so many tests that shows only some."""
+    if count <= MOST_POINTS:
+        return ""
+    return f" Of {count} tests those are drawn that keep every extreme; enlarging brings no more."
+
+
+def bounds_of(intervals: Sequence[Interval | None]) -> Bounds:
+    """Means with their 90 % intervals, NaN where there is none."""
+    rows = [(each.low, each.mean, each.high) if each else (np.nan,) * 3 for each in intervals]
+    return Bounds(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
+
+
+def part(bounds: Bounds, chosen: IntArray, scale: float = 1.0) -> Bounds:
+    """Those of some tests, times `scale`."""
+    low, middle, high = bounds.low[chosen], bounds.middle[chosen], bounds.high[chosen]
+    return Bounds(scale * low, scale * middle, scale * high)
+
+
+def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "") -> list[Mark]:
+    """A band and, under a name, its middle line."""
+    marks: list[Mark] = [
+        Band(x=times, low=bounds.low, high=bounds.high, colour=colour, opacity=0.2)
+    ]
+    if name:
+        marks.append(
+            Line(
+                x=times, y=bounds.middle, colour=colour, width=1.5, name=name, hover="%{text}",
+                texts=spans(bounds),
+            )
+        )  # fmt: skip
+    return marks
+
+
+def spans(bounds: Bounds) -> list[str]:
+    """`702.3 (90 %: 690.1 to 714.5)` of each."""
+    rows = zip(bounds.low, bounds.middle, bounds.high, strict=True)
+    return [f"{middle:.4g} (90 %: {low:.4g} to {high:.4g})" for low, middle, high in rows]
+
+
+def single_tests(
+    x: Values, bounds: Bounds, names: Sequence[str], colour: str,
+    name: str = "test by itself", size: float = 3.6,
+) -> Points:  # fmt: skip
+    """Single tests as marks with their 90 % intervals."""
+    told = zip(names, spans(bounds), strict=True)
+    return Points(
+        x=x, y=bounds.middle, low=bounds.low, high=bounds.high, caps=False, colour=colour,
+        size=size, name=name, texts=[f"{test}: {span}" for test, span in told],
+    )  # fmt: skip
+
+
+def level(value: float, name: str, colour: str, dash: Dash) -> Rule:
+    return Rule(at=value, name=name, colour=colour, dash=dash, width=1.1, hover="%{y:.4g}")
+
+
+def changes(
+    called: Sequence[CalledChange], times: Sequence[datetime], with_words: bool = True
+) -> list[Span]:
+    """When each called change began, the words of later ones a line lower."""
+    first, last = min(times), max(times)
+    thin, middle = _THINNEST * (last - first), first + (last - first) / 2
+    return [
+        Span(
+            low=min(change.began_after, change.began_by - thin), high=change.began_by,
+            colour="purple", opacity=0.25, name="change began", label_line=line,
+            label=change.words if with_words else "",
+            label_side="left" if change.began_by < middle else "right",
+        )
+        for line, change in enumerate(sorted(called, key=lambda each: each.began_by))
+    ]  # fmt: skip
+
+
+def time_axis(times: Sequence[datetime], label: str = TIME) -> Axis:
+    """All tests with a little room, at least a day either side."""
+    first, last = min(times), max(times)
+    margin = max(_MARGIN * (last - first), _LEAST_MARGIN)
+    return Axis(label=label, scale="date", range=(first - margin, last + margin))
+
+
+def inner(values: FloatArray) -> FloatArray:
+    """The known ones, those far from the rest drawn near, as of a test that hardly sees a thing.
+
+    For the limits of an axis: (n,) of any unit to (m,), m <= n.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return known
+    lower, middle, upper = np.quantile(known, [0.1, 0.5, 0.9])
+    reach = _REACH * max(upper - middle, middle - lower)
+    return np.asarray(np.clip(known, middle - reach, middle + reach))

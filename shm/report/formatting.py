@@ -1,0 +1,193 @@
+"""Numbers in words: units, intervals, signs, times; what is unknown is said, never printed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+
+from shm.report.intervals import Interval
+from shm.values.diagnosis import joined
+from shm.values.force_units import ForceUnit
+
+_LONGEST_NAME = 24
+_ROTATIONAL_SPRINGS = {
+    "k1": "transverse, deck end",
+    "k2": "longitudinal, deck end",
+    "k3": "transverse, arch end",
+    "k4": "longitudinal, arch end",
+}
+_FACE_SPRINGS = {
+    "k1": "large edges, deck end",
+    "k2": "small edges, deck end",
+    "k3": "small edges, arch end",
+    "k4": "large edges, arch end",
+    "krx": "across the bridge, deck end",
+    "kry": "along the bridge, deck end",
+    "klx": "across the bridge, arch end",
+    "kly": "along the bridge, arch end",
+}
+_MEANINGS = {
+    "theta_F": "tension over nominal tension",
+    "theta_L": "effective over given length",
+    "sigma": "model error, as a fraction of a frequency",
+    "section": "area as made over the description's, less 1",
+    "density": "density as made over the description's, less 1",
+    "length": "length as made over the description's, less 1",
+    "modulus": "elastic modulus as made over the description's, less 1",
+}
+
+
+def decimals(width: float) -> int:
+    """Decimals that show two significant digits of half an interval's `width`."""
+    if not (math.isfinite(width) and width > 0):
+        return 1
+    return min(6, max(0, 1 - math.floor(math.log10(width / 2))))
+
+
+def with_interval(interval: Interval, unit: str) -> str:
+    """`655 kN (90 % interval 640 to 671 kN)`."""
+    places, space = decimals(interval.width), unit and f" {unit}"
+    return (
+        f"{interval.mean:z.{places}f}{space} (90 % interval "
+        f"{interval.low:z.{places}f} to {interval.high:z.{places}f}{space})"
+    )
+
+
+def tension(tension_n: Interval, unit: ForceUnit) -> str:
+    """`655 kN (90 % interval 640 to 671 kN)` of a tension in N."""
+    return with_interval(tension_n.in_unit(unit), unit.name)
+
+
+def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
+    """`711 kN` of a tension in N that stands without an interval: to three digits at least."""
+    return f"{plain(unit.of(tension_n))} {unit.name}"
+
+
+def tension_headings(unit: ForceUnit) -> tuple[str, str]:
+    """Of the columns that `mean` and `span` of tensions stand in."""
+    return f"tension, {unit.name}", f"90 % interval, {unit.name}"
+
+
+def span(interval: Interval, signed: bool = False) -> str:
+    """`640 to 671`, for a table whose heading names the unit."""
+    places, sign = decimals(interval.width), "+" if signed else ""
+    return f"{interval.low:{sign}z.{places}f} to {interval.high:{sign}z.{places}f}"
+
+
+def mean(interval: Interval, signed: bool = False) -> str:
+    """The mean with the decimals that its interval deserves."""
+    return f"{interval.mean:{'+' if signed else ''}z.{decimals(interval.width)}f}"
+
+
+def with_span(interval: Interval, signed: bool = False) -> str:
+    """`650 (640 to 671)`, for a table whose heading names unit and interval."""
+    return f"{mean(interval, signed)} ({span(interval, signed)})"
+
+
+def signed_percent(fraction: Interval) -> str:
+    """`-8.0 % (90 % interval -9.9 to -6.1 %)`."""
+    percent = fraction.scaled(100)
+    return f"{mean(percent, signed=True)} % (90 % interval {span(percent, signed=True)} %)"
+
+
+def number(value: float, form: str, absent: str = "not known") -> str:
+    """`value` in format `form`; the words `absent` where it is NaN."""
+    return format(value, form) if math.isfinite(value) else absent
+
+
+def plain(value: float, digits: int = 3, absent: str = "not known") -> str:
+    """`value` with so many significant digits, never as a power of ten: `0.00021`, `1872`."""
+    if not math.isfinite(value):
+        return absent
+    rounded = float(f"{value:.{digits}g}")
+    if abs(rounded) >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return np.format_float_positional(rounded, trim="-")
+
+
+def probability(value: float) -> str:
+    """Three decimals, with no certainty pretended."""
+    if not math.isfinite(value):
+        return "not known"
+    if value > 0.999:
+        return "> 0.999"
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def told_probability(value: float) -> str:
+    """The same in a sentence: `above 0.999`, `0.966`."""
+    return probability(value).replace("> ", "above ").replace("< ", "below ")
+
+
+def temperature(celsius: float) -> str:
+    return number(celsius, ".1f") + " °C" if math.isfinite(celsius) else "temperature not recorded"
+
+
+def moment(time: datetime | None) -> str:
+    """`2026-05-01 10:00 UTC`."""
+    return f"{time.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if time else "time not recorded"
+
+
+def hanger_name(hanger_id: int, name: str) -> str:
+    return f"Hanger {hanger_id} ({name})" if name else f"Hanger {hanger_id}"
+
+
+def quantity(name: str) -> str:
+    """`transverse_end_stiffness` as `transverse end stiffness`."""
+    return name.replace("_", " ")
+
+
+def meaning(name: str, model: str) -> str:
+    """What a parameter is, with its unit: beams have rotational springs, solids springs a node.
+
+    A parameter of an adopted effect has the name that the catalogue gives it, with its unit.
+    """
+    spring = name.removeprefix("log10_")
+    if model.startswith("beam") and spring in _ROTATIONAL_SPRINGS:
+        return f"log10 of end stiffness {spring} ({_ROTATIONAL_SPRINGS[spring]}) in N m/rad"
+    if spring in _FACE_SPRINGS:
+        return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"
+    return _MEANINGS.get(name, name.replace("log10_", "log10 of ").replace("_", " "))
+
+
+def model_class(name: str) -> str:
+    """`beam1 + point mass (deck end)` of an adopted class's name, whose ranges are left out."""
+    baseline, *effects = name.split("+")
+    return joined([baseline, *(_adopted(effect.partition(":")[0]) for effect in effects)])
+
+
+def _adopted(effect: str) -> str:
+    what, _, where = (part.replace("_", " ") for part in effect.partition("@"))
+    return what if where in ("", "everywhere") else f"{what} ({where.replace('.', ', ')})"
+
+
+def place(name: str, plane: str | None, x_m: float) -> str:
+    """`acc_1, transverse, 2.52 m` of a sensor, as far as it is known."""
+    known = (_shortened(name), plane or "", f"{x_m:.2f} m" if math.isfinite(x_m) else "")
+    return ", ".join(word for word in known if word)
+
+
+def _shortened(name: str) -> str:
+    """Both ends of a long name, since serial numbers stand last."""
+    half = _LONGEST_NAME // 2
+    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half + 1 :]}"
+
+
+def some(shown: int, there: int, what: str) -> str:
+    """` 4 of 16 measured points are drawn.`; nothing where all are."""
+    return f" {shown} of {there} {what} are drawn." if shown < there else ""
+
+
+def counted(count: int, what: str) -> str:
+    """`1 hit`, `5 hits`, `no hit`."""
+    if count == 0:
+        return f"no {what}"
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def listed(items: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

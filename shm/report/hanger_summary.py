@@ -1,0 +1,393 @@
+"""The paragraph that an engineer reads first: tension, what changed, which model, what next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.contents import HangerReport, Status, status
+from shm.report.diagnosis_summary import next_step, verdict
+from shm.report.diagnosis_wording import AFTER, tension_of
+from shm.report.intervals import Interval
+from shm.report.shifts import shift_cells, threshold_cell
+from shm.report.states import CalledChange
+from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
+from shm.values.stated_tension import stated
+
+_CONVERGED_R_HAT = 1.1
+_WORTH_DIAGNOSING_PERCENT = 0.5
+_MOST_NAMED = 3
+
+
+def summary(data: HangerReport) -> str:
+    """One paragraph in plain words."""
+    sentences = (
+        redescribed(data),
+        discarded(data),
+        *data.averaged.caveats,
+        _tension(data),
+        *_repeats_and_limits(data),
+        _against_nominal(data),
+        _against_baseline(data),
+        _change(data),
+        in_period(data),
+        _over_the_bridge(data),
+        _model(data),
+        _gap(data),
+        *advice(data),
+    )
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def advice(data: HangerReport) -> tuple[str, ...]:
+    """What to do next, most urgent first; never empty."""
+    made = (_urgent, _quality, _sampling, _width, _diagnose, _thermometer)
+    found = tuple(told for make in made if (told := make(data)))
+    return found or ("Nothing needs doing before the next planned test.",)
+
+
+def tension_change(data: HangerReport) -> Interval | None:
+    """Relative change of the tension since the baseline; None where there is no earlier test.
+
+    As the watch found it; else of two independent estimates, standard deviations in squares.
+    """
+    then, now = data.baseline_tension_n, data.tension_n
+    if then is None:
+        return None
+    for drift in data.drifts:
+        if drift.quantity == TENSION and math.isfinite(drift.shift_mean + drift.shift_sd):
+            return Interval.normal(drift.shift_mean, drift.shift_sd)
+    return now.since(then)
+
+
+def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
+    """Predicted over measured frequency less one of each measured mode, in percent.
+
+    The interval is that of prediction and measurement together; of the prediction alone where the
+    measurement came without a standard deviation.
+    """
+    sds_hz = {(mode.plane, mode.order): mode.frequency_sd_hz for mode in data.latest.modes}
+    return [
+        (each, _misfit(each, sds_hz.get((each.plane, each.order), math.nan)))
+        for each in data.predicted
+        if math.isfinite(each.measured_hz)
+    ]
+
+
+def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
+    sd_hz = math.hypot(each.sd_hz, measured_sd_hz if math.isfinite(measured_sd_hz) else 0.0)
+    off = Interval.normal(each.mean_hz - each.measured_hz, sd_hz)
+    return off.scaled(100 / each.measured_hz)
+
+
+def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
+    """Predicted over measured frequency less one, in percent, of the modes that were measured."""
+    return [
+        100 * (mode.mean_hz / mode.measured_hz - 1)
+        for mode in predicted
+        if math.isfinite(mode.measured_hz)
+    ]
+
+
+def _tension(data: HangerReport) -> str:
+    name = formatting.hanger_name(data.hanger.id, data.hanger.name)
+    tension = formatting.tension(data.tension_n, data.tension_unit)
+    when = formatting.moment(data.latest.time)
+    return (
+        f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
+        f"({when}, {formatting.temperature(data.latest.temperature_c)})."
+    )
+
+
+def _repeats_and_limits(data: HangerReport) -> tuple[str, ...]:
+    """How well a test repeats it, and the probabilities that the owner's limits ask for."""
+    return stated(data.averaged, data.tension_unit).sentences[1:]
+
+
+def _against_nominal(data: HangerReport) -> str:
+    nominal = data.hanger.nominal_tension_n
+    if not nominal > 0:
+        return "It has no nominal tension to compare with."
+    shift = data.tension_n.scaled(1 / nominal)
+    fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
+    given = formatting.rounded_tension(nominal, data.tension_unit)
+    return f"Against the nominal {given} that is {formatting.signed_percent(fraction)}."
+
+
+def _against_baseline(data: HangerReport) -> str:
+    then, change = data.baseline_tension_n, tension_change(data)
+    if then is None or change is None or data.baseline is None:
+        return "There is no earlier test to compare with: this one is the baseline."
+    tension = formatting.tension(then, data.tension_unit)
+    tests = told_tests(data.baseline.tests)
+    found = (
+        f"Against the baseline, {tests} with {tension}, it is {formatting.signed_percent(change)}"
+    )
+    return f"{found}{'' if is_found(data) else ', if it has moved at all'}."
+
+
+def is_found(data: HangerReport) -> bool:
+    """Whether a shift is found, not one that is told in case there is one."""
+    level = data.hanger.thresholds.alert_probability
+    return data.is_called or not data.drifts or any(e.probability >= level for e in data.drifts)
+
+
+def told_tests(tests: tuple[str, ...]) -> str:
+    """`test t001`, `5 tests`."""
+    return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
+
+
+def _change(data: HangerReport) -> str:
+    if not data.drifts:
+        return ""
+    level = data.hanger.thresholds.alert_probability
+    shifted = [drift for drift in data.drifts if drift.probability >= level]
+    if shifted:
+        return " ".join(_shift(drift) for drift in shifted)
+    top = max(data.drifts, key=lambda drift: drift.probability)
+    return (
+        f"No quantity has surely moved beyond its threshold: the likeliest is "
+        f"{formatting.quantity(top.quantity)}, with probability "
+        f"{formatting.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
+        f"{_unseen(data)}"
+    )
+
+
+def _unseen(data: HangerReport) -> str:
+    """What keeps a shift of the tension from being seen, or from being trusted in percent."""
+    change, threshold = tension_change(data), data.hanger.thresholds.tension_shift_fraction
+    if change is not None and change.width / 2 > threshold:
+        return (
+            f" These tests could hardly show it if the tension had moved by {100 * threshold:.3g} "
+            "%: that it has not was held probable before them."
+        )
+    if data.tension_n.is_wide:
+        return " The tension itself is hardly known, and so is what percentage of it a shift is."
+    return ""
+
+
+def _over_the_bridge(data: HangerReport) -> str:
+    return f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else ""
+
+
+def _shift(drift: Drift) -> str:
+    verb = "risen" if drift.shift_mean > 0 else "fallen"
+    _, shift, span, threshold, _ = shift_cells(drift)
+    size = "" if drift.quantity == TENSION else f" to {shift} what it was (90 % interval {span})"
+    return (
+        f"The {formatting.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
+        f"beyond its threshold of {threshold} is {formatting.told_probability(drift.probability)}."
+    )
+
+
+def in_period(data: HangerReport) -> str:
+    """What lay in the period of the report, and what changed in it against its start."""
+    if data.period is None:
+        return ""
+    tests = formatting.counted(len(data.trend), "test")
+    raised = formatting.counted(len(data.alerts), "alert")
+    called = formatting.listed(
+        [each.words for each in _called_in(data)] or ["no change was called"]
+    )
+    return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
+
+
+def _called_in(data: HangerReport) -> tuple[CalledChange, ...]:
+    return data.states.within(data.period).changes
+
+
+def _course(data: HangerReport) -> str:
+    if len(data.trend) < 2:
+        return "with one test in it nothing in it can be compared"
+    first, last = data.trend[0], data.trend[-1]
+    change = formatting.signed_percent(last.tension_n.since(first.tension_n))
+    return f"from its first test ({first.test}) to its last the tension moved by {change}"
+
+
+def _model(data: HangerReport) -> str:
+    misfits = misfits_percent(data)
+    if not misfits:
+        return f"{_chosen(data)}."
+    worst, off = max(misfits, key=lambda each: abs(each[1].mean))
+    count = "one measured mode" if len(misfits) == 1 else f"{len(misfits)} measured modes"
+    return (
+        f"{_chosen(data)}; over {count} it misses the frequencies by "
+        f"{formatting.plain(_rms_percent(data), 2)} % (rms), at most {worst.plane} {worst.order} "
+        f"by {formatting.mean(off, signed=True)} % (90 % interval "
+        f"{formatting.span(off, signed=True)} %)."
+    )
+
+
+def _rms_percent(data: HangerReport) -> float:
+    """Root mean square of the misfits; NaN where no mode was measured."""
+    residuals = residuals_percent(data.predicted)
+    return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
+
+
+def _gap(data: HangerReport) -> str:
+    """What the model does not explain, and why as far as that was diagnosed."""
+    if data.diagnosis is None:
+        return _outside(data)
+    told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data, data.diagnosis)]
+    return " ".join([part for part in told if part] + [data.gap_watch] * bool(data.gap_watch))
+
+
+def _outside(data: HangerReport) -> str:
+    """The modes that the model class misses by more than the uncertainty of both explains."""
+    misfits = misfits_percent(data)
+    outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
+    if not misfits:
+        return ""
+    if len(outside) > _by_chance(len(misfits)):
+        return f"{_outliers(outside)}: these the model does not explain, and why was not diagnosed."
+    chance = f"{_outliers(outside)}, as chance alone would have it" if outside else ""
+    start = chance or "Each lies within its interval"
+    if _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+        return f"{start}, but the intervals are so wide that they may hide what is not explained."
+    return f"{start}: nothing that was measured is clearly left unexplained."
+
+
+def _outliers(modes: Sequence[PredictedFrequency]) -> str:
+    """`Transverse 2 and longitudinal 4 lie outside the 90 % interval`, `5 modes lie ...`."""
+    told = formatting.listed([f"{each.plane} {each.order}" for each in modes])
+    named = f"{told[0].upper()}{told[1:]}"
+    who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
+    return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
+
+
+def _by_chance(modes: int) -> float:
+    """How many of so many may well lie outside their 90 % intervals: two standard deviations."""
+    return 0.1 * modes + 2 * math.sqrt(0.09 * modes)
+
+
+def _diagnosed_on(diagnosis: Diagnosis) -> str:
+    return (
+        f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
+        f"{told_tests(diagnosis.tests)}."
+    )
+
+
+def _allowing(data: HangerReport, diagnosis: Diagnosis) -> str:
+    """The tension that the diagnosis arrives at."""
+    estimate = diagnosis.tension_after_n
+    if math.isnan(estimate.mean):
+        return ""
+    tension = formatting.tension(tension_of(estimate), data.tension_unit)
+    return f"{AFTER.capitalize()}, the tension is {tension}."
+
+
+def _chosen(data: HangerReport) -> str:
+    model = formatting.model_class(data.posterior.model)
+    if data.selection is None or len(data.selection.posteriors) < 2:
+        return f"The model class is {model}"
+    names = [formatting.model_class(posterior.model) for posterior in data.selection.posteriors]
+    if model not in names:
+        return f"The model class is {model}"
+    share = data.selection.probabilities[names.index(model)]
+    best = "the most probable" if names[0] == model else f"not the most probable ({names[0]} is)"
+    return (
+        f"The model class is {model}, {best} of {', '.join(names)} "
+        f"(probability {formatting.told_probability(share)})"
+    )
+
+
+def _urgent(data: HangerReport) -> str:
+    match status(data):
+        case Status.ALERT:
+            return (
+                "Repeat the hammer test within days; if the shift stays, inspect both ends of "
+                "the hanger and test its neighbours."
+            )
+        case Status.WATCH if data.is_called:
+            return (
+                "A change was called, though none is surely beyond its threshold: look after what "
+                "may have moved, and set a new baseline once it is explained (shm drift "
+                "rebaseline)."
+            )
+        case Status.WATCH:
+            return "Test this hanger again soon: a shift is likelier than not."
+        case Status.FIRST:
+            return "Repeat the test at another temperature to make the baseline firm."
+        case Status.STEADY:
+            return ""
+
+
+def _quality(data: HangerReport) -> str:
+    doubted = [check.name for check in data.quality if check.verdict in ("warning", "refused")]
+    if not doubted:
+        return ""
+    return f"Mend what the quality of the latest test warns of: {formatting.listed(doubted)}."
+
+
+def _sampling(data: HangerReport) -> str:
+    if not data.posterior.r_hat > _CONVERGED_R_HAT:
+        return ""
+    return (
+        f"The sampling has not settled (R-hat {data.posterior.r_hat:.2f}): raise the number of "
+        f"samples before relying on the interval."
+    )
+
+
+def _width(data: HangerReport) -> str:
+    half = data.tension_n.width / 2 / data.tension_n.mean
+    threshold_fraction = data.hanger.thresholds.tension_shift_fraction
+    if half <= threshold_fraction:
+        return ""
+    return (
+        f"The interval (half width {100 * half:.1f} %) is wider than the threshold of "
+        f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
+        f"to see smaller shifts."
+    )
+
+
+def _diagnose(data: HangerReport) -> str:
+    """The next step against the gap between model and measurement."""
+    if data.diagnosis is not None:
+        return next_step(data.diagnosis)
+    if not _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+        return ""
+    return (
+        "Learn what the model does not explain, and what that does to the tension "
+        f"(shm gap diagnose --hanger {data.hanger.id})."
+    )
+
+
+def _thermometer(data: HangerReport) -> str:
+    if math.isfinite(data.latest.temperature_c):
+        return ""
+    return "Record the temperature with the next test: it moves the tension."
+
+
+_MOST_CHANGES = 3
+
+
+def redescribed(data: HangerReport) -> str:
+    """That the description has changed since the baseline, and what to do; empty where not."""
+    if not data.redescribed:
+        return ""
+    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
+    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
+    number = data.hanger.id
+    return (
+        f"The description of hanger {number} has changed since its baseline: {named}. "
+        f"{_anew(number)} "
+        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
+    )
+
+
+def discarded(data: HangerReport) -> str:
+    """That tests of the baseline count no more, and what to do; empty where all do."""
+    if not data.discarded:
+        return ""
+    names, number = ", ".join(data.discarded), data.hanger.id
+    return (
+        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
+        f"change stands on what counts no more. {_anew(number)}"
+    )
+
+
+def _anew(number: int) -> str:
+    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."

@@ -1,0 +1,346 @@
+"""The tables of a report, as headings and rows of texts: one source for terminal and HTML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from shm.report import formatting
+from shm.report.contents import HangerReport, TrendRow, of_nominal
+from shm.report.hanger_summary import misfits_percent, tension_change, told_tests
+from shm.report.intervals import Interval
+from shm.report.origin import added_mass, lineage, settings
+from shm.report.paper import Table, filled
+from shm.report.quality_table import quality_table
+from shm.report.shifts import factor, shift_cells, shift_table
+from shm.report.temperatures import temperature_table
+from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
+from shm.values.force_units import ForceUnit, force_unit
+
+
+def numbers(data: HangerReport) -> tuple[Table, ...]:
+    """What was found, as far as there is any of it."""
+    return filled(*(make(data) for make in _NUMBERS))
+
+
+def origins(data: HangerReport) -> tuple[Table, ...]:
+    """What it was found from."""
+    return filled(origin(data), settings(data.settings))
+
+
+def tension(data: HangerReport) -> Table:
+    unit = data.tension_unit
+    rows = [_tension_row("now", data.tension_n, data.hanger, unit)]
+    if data.baseline_tension_n is not None:
+        rows.append(_tension_row("baseline", data.baseline_tension_n, data.hanger, unit))
+    if (fraction := tension_change(data)) is not None:
+        change = fraction.scaled(100)
+        rows.append(
+            (
+                "change since baseline", f"{formatting.mean(change, True)} %",
+                f"{formatting.span(change, True)} %", "",
+            )
+        )  # fmt: skip
+    nominal_n = data.hanger.nominal_tension_n
+    if nominal_n > 0:
+        nominal = f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"
+        rows.append(("nominal (as designed)", nominal, "given, no interval", "100 %"))
+    return Table(
+        "Tension", ("tension", "mean", "90 % interval", "of nominal (90 % interval)"), tuple(rows)
+    )
+
+
+def _tension_row(
+    label: str, tension_n: Interval, hanger: Hanger, unit: ForceUnit
+) -> tuple[str, ...]:
+    tension, share = tension_n.in_unit(unit), of_nominal(tension_n, hanger)
+    return (
+        label,
+        f"{formatting.mean(tension)} {unit.name}",
+        f"{formatting.span(tension)} {unit.name}",
+        f"{formatting.with_span(share)} %" if share else "no nominal",
+    )
+
+
+def drift(data: HangerReport) -> Table:
+    return Table(
+        "Shift since the baseline",
+        ("quantity", "shift", "90 % interval", "threshold", "probability beyond it"),
+        tuple(shift_cells(row) for row in data.drifts),
+        note="If there is a shift at all: tension in percent, stiffness as how many times what it "
+        f"was, the swing with the temperature taken out. {data.drift_watch}".strip(),
+    )
+
+
+def temperatures(data: HangerReport) -> Table:
+    return temperature_table(data.states)
+
+
+_BESIDE = 2
+_ROWS_SHOWN = 12
+_EARLIER = "... and {} earlier ones (in HTML and JSON)"
+_IRREGULAR = (
+    " Not followed: the mode is well off the bar that the others follow, as if the hanger sagged "
+    "or had lost section; no tension is inferred from it. For the cause: shm gap diagnose."
+)
+
+
+def neighbours(data: HangerReport) -> Table:
+    """The hanger and two to either side; empty where nothing is called."""
+    title, pattern = "The hangers beside it", data.neighbours
+    rows = pattern.rows if pattern else ()
+    place = next((row.place for row in rows if row.hanger == data.hanger.id), None)
+    if pattern is None or place is None:
+        return Table(title, (), ())
+    near = tuple(row for row in rows if abs(row.place - place) <= _BESIDE)
+    made = shift_table(replace(pattern, rows=near, not_compared=()))
+    told = " ".join((pattern.sentence, *pattern.remarks))
+    note = f"{told} The whole bridge: shm report --bridge."
+    return replace(made, title=title, note=note, terminal_column=())
+
+
+def frequencies(data: HangerReport) -> Table:
+    measured = {(mode.plane, mode.order): mode for mode in data.latest.modes}
+    misfits = {(mode.plane, mode.order): off for mode, off in misfits_percent(data)}
+    return Table(
+        "Frequencies",
+        (
+            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % interval, Hz",
+            "off, % (90 % interval)",
+        ),
+        (
+            *(_irregular_row(mode) for mode in _irregular(data)),
+            *(
+                _frequency_row(
+                    mode,
+                    measured.get((mode.plane, mode.order)),
+                    misfits.get((mode.plane, mode.order)),
+                )
+                for mode in data.predicted
+            ),
+        ),
+        note="Predicted by the posterior of the model class, with what its parameters leave open. "
+        "sd: standard deviation of the measurement. Off: predicted over measured, less one, with "
+        "the interval of both; where the sd is not known, with that of the prediction."
+        + (_IRREGULAR if _irregular(data) else ""),
+    )  # fmt: skip
+
+
+def _irregular(data: HangerReport) -> list[Mode]:
+    """Irregular modes of the latest test that the posterior does not follow."""
+    predicted = {(mode.plane, mode.order) for mode in data.predicted}
+    return [m for m in data.latest.modes if m.irregular and (m.plane, m.order) not in predicted]
+
+
+def _irregular_row(mode: Mode) -> tuple[str, ...]:
+    measured = f"{mode.frequency_hz:.3f}", formatting.number(mode.frequency_sd_hz, ".4f")
+    return (mode.plane, str(mode.order), *measured, "not followed", "", "")
+
+
+def _frequency_row(
+    predicted: PredictedFrequency, measured: Mode | None, off: Interval | None
+) -> tuple[str, ...]:
+    interval = Interval.normal(predicted.mean_hz, predicted.sd_hz)
+    sd = measured.frequency_sd_hz if measured else math.nan
+    return (
+        predicted.plane,
+        str(predicted.order),
+        formatting.number(predicted.measured_hz, ".3f", "not measured"),
+        formatting.number(sd, ".4f"),
+        f"{interval.mean:.3f}",
+        f"{interval.low:.3f} to {interval.high:.3f}",
+        formatting.with_span(off, signed=True) if off else "not measured",
+    )
+
+
+def quality(data: HangerReport) -> Table:
+    return quality_table(data.quality, "Quality of the latest test")
+
+
+def parameters(data: HangerReport) -> Table:
+    posterior = data.posterior
+    return Table(
+        f"Parameters of the model class {formatting.model_class(posterior.model)}",
+        ("name", "meaning", "mean", "90 % interval", "most probable"),
+        tuple(_parameter_row(posterior, name) for name in posterior.names),
+        note="Ratios and fractions have no unit; of the most probable set the interval is that of "
+        "its row.",
+    )
+
+
+def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
+    interval = Interval.of_samples(posterior.parameter(name))
+    best = posterior.most_probable[posterior.names.index(name)]
+    return (
+        name,
+        formatting.meaning(name, posterior.model),
+        formatting.mean(interval),
+        formatting.span(interval),
+        f"{best:.{formatting.decimals(interval.width)}f}",
+    )
+
+
+def models(data: HangerReport) -> Table:
+    chosen = data.selection
+    pairs = list(zip(chosen.posteriors, chosen.probabilities, strict=True)) if chosen else []
+    unit = force_unit(*(float(posterior.tension_n.mean()) for posterior, _ in pairs))
+    return Table(
+        "Model classes",
+        ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
+        tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
+        note=f"Compared on {told_tests(pairs[0][0].tests)}, all classes held equally probable "
+        "before. Evidence in natural logarithms, with the standard deviation of its sampling."
+        if pairs
+        else "",
+    )
+
+
+def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str, ...]:
+    tension = Interval.of_samples(posterior.tension_n).in_unit(unit)
+    return (
+        formatting.model_class(posterior.model),
+        formatting.probability(share),
+        f"{posterior.log_evidence:.2f}",
+        formatting.number(posterior.log_evidence_sd, ".2f"),
+        formatting.mean(tension),
+        formatting.span(tension),
+    )
+
+
+def period(data: HangerReport) -> Table:
+    """The period's last test beside its first; empty where there is no period, or one test."""
+    if data.period is None or len(data.trend) < 2:
+        return Table("The period", (), ())
+    first, last = data.trend[0], data.trend[-1]
+    return Table(
+        f"In the period {data.period}",
+        ("what", "at its first test", "at its last test", "change (90 % interval)"),
+        (
+            ("test", first.test, last.test, formatting.counted(len(data.trend), "test")),
+            (
+                "time", formatting.moment(first.time), formatting.moment(last.time),
+                _days(first, last),
+            ),
+            (
+                "temperature", formatting.temperature(first.temperature_c),
+                formatting.temperature(last.temperature_c), _kelvins(first, last),
+            ),
+            _tension_course(first.tension_n, last.tension_n),
+            *(
+                _stiffness_course(name, first.stiffness[name], last.stiffness[name])
+                for name in last.stiffness
+                if name in first.stiffness
+            ),
+        ),
+        note="By these two tests alone, taken as independent of one another; the swing with the "
+        "temperature is in the change. The intervals of stiffness are of log10.",
+    )  # fmt: skip
+
+
+def _days(first: TrendRow, last: TrendRow) -> str:
+    if first.time is None or last.time is None:
+        return "not known"
+    return formatting.counted((last.time - first.time).days, "day")
+
+
+def _kelvins(first: TrendRow, last: TrendRow) -> str:
+    kelvins = formatting.number(last.temperature_c - first.temperature_c, "+z.1f")
+    return f"{kelvins} K" if kelvins != "not known" else kelvins
+
+
+def _tension_course(first: Interval, last: Interval) -> tuple[str, ...]:
+    change = last.since(first).scaled(100)
+    unit = force_unit(first.mean, last.mean)
+    both = (f"{formatting.with_span(each.in_unit(unit))} {unit.name}" for each in (first, last))
+    return ("tension", *both, f"{formatting.with_span(change, signed=True)} %")
+
+
+def _stiffness_course(name: str, first: Interval, last: Interval) -> tuple[str, ...]:
+    change = last.less(first)
+    mean, low, high = (factor(each) for each in (change.mean, change.low, change.high))
+    return (
+        f"{formatting.quantity(name)}, log10 of N m/rad",
+        formatting.with_span(first),
+        formatting.with_span(last),
+        f"{mean} times ({low} to {high} times)",
+    )
+
+
+def history(data: HangerReport) -> Table:
+    within = f" in the period {data.period}" if data.period else ""
+    unit = force_unit(*(row.tension_n.mean for row in data.trend))
+    return Table(
+        f"Tests{within}, latest first",
+        ("time", "test", "temperature", "model", *formatting.tension_headings(unit)),
+        tuple(_history_row(row, unit) for row in reversed(data.trend)),
+        hidden_note=_EARLIER,
+    ).shortened(_ROWS_SHOWN)
+
+
+def _history_row(row: TrendRow, unit: ForceUnit) -> tuple[str, ...]:
+    tension = row.tension_n.in_unit(unit)
+    return (
+        formatting.moment(row.time),
+        row.test,
+        formatting.number(row.temperature_c, ".1f", "not recorded")
+        + (" °C" if math.isfinite(row.temperature_c) else ""),
+        formatting.model_class(row.model),
+        formatting.mean(tension),
+        formatting.span(tension),
+    )
+
+
+def alerts(data: HangerReport) -> Table:
+    within = f" in the period {data.period}" if data.period else ""
+    return Table(
+        f"Alerts{within}, latest first",
+        ("time", "test", "message", "acknowledged"),
+        tuple(_alert_row(row, data.acknowledged) for row in reversed(data.alerts)),
+        hidden_note=_EARLIER,
+    ).shortened(_ROWS_SHOWN)
+
+
+def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
+    return (formatting.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
+
+
+_NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
+    tension,
+    period,
+    drift,
+    alerts,
+    neighbours,
+    temperatures,
+    frequencies,
+    quality,
+    models,
+    parameters,
+    history,
+)
+
+
+def origin(data: HangerReport) -> Table:
+    posterior, test = data.posterior, data.latest
+    facts = {
+        "test": f"{test.id}, {formatting.moment(test.time)}",
+        "temperature": formatting.temperature(test.temperature_c),
+        "hit level over reference level": formatting.plain(test.amplitude, absent="not recorded"),
+        "added mass": added_mass(test),
+        "modes identified": f"{len(test.modes)}",
+        "model class": formatting.model_class(posterior.model),
+        "tests in this posterior": ", ".join(posterior.tests),
+        "posterior samples": f"{len(posterior.samples)} (effective "
+        f"{formatting.number(posterior.effective_sample_size, '.0f')})",
+        "R-hat (1 is settled)": formatting.number(posterior.r_hat, ".3f"),
+        "model evaluations": f"{posterior.evaluations}",
+        "random seed": f"{posterior.seed}",
+        "computing time": _seconds(posterior.seconds),
+        **lineage(data.lineage),
+        "report made": f"{formatting.moment(data.generated_at)} by shm version {data.version}",
+    }
+    return Table("Where these numbers come from", ("what", "value"), tuple(facts.items()))
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:.1f} s" if math.isfinite(seconds) else "not known"

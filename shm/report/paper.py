@@ -1,0 +1,136 @@
+"""One document for every kind of report: `as_text`, `as_html` and `as_pdf` render it alike.
+
+A kind of report is a function that builds a `Paper`; the renderers know none of the kinds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from shm.report import formatting
+
+if TYPE_CHECKING:
+    from shm.report.figures.illustration import Illustration
+
+Fact = tuple[str, str, str]
+"""What, value, what stands beside it."""
+CREDIBLE = "Intervals are central 90 % credible intervals"
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table; every cell is a text with its unit in the cell or in the heading.
+
+    `marks` names a style for each row; empty: none has one. A terminal shows the rows whose
+    indices are in `terminal_rows`, all where it is None; `hidden_note` says in place of `{}` how
+    many more there are, and a table without either is left out there. `terminal_column`, a
+    heading and a cell for each row, stands after the first column in a terminal, which has no
+    figures.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    marks: tuple[str, ...] = ()
+    terminal_rows: tuple[int, ...] | None = None
+    hidden_note: str = "... and {} more rows (in HTML and JSON)."
+    terminal_column: tuple[str, ...] = ()
+
+    def shortened(self, most: int, last: int = 0) -> Table:
+        """With so many rows in a terminal, of which so many are the last; one more may stay."""
+        count = len(self.rows)
+        if count <= most + 1:
+            return self
+        return replace(self, terminal_rows=(*range(most - last), *range(count - last, count)))
+
+    def not_in_terminal(self) -> Table:
+        """Left out in a terminal."""
+        return replace(self, terminal_rows=(), hidden_note="")
+
+
+def filled(*tables: Table) -> tuple[Table, ...]:
+    """Those that have rows."""
+    return tuple(table for table in tables if table.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A headed part; what it has stands in the order of its fields.
+
+    `lead` begins the summary and is stressed. `figures` are drawn where a renderer asks for them:
+    a terminal does not, and loads nothing that draws. `status` and `style` are those of an answer
+    of its own, as the paper's are of the whole; without a `style` it has the paper's.
+    """
+
+    title: str
+    paragraphs: Sequence[str] = ()
+    lead: str = ""
+    summary: str = ""
+    facts: Sequence[Fact] = ()
+    remarks: Sequence[str] = ()
+    figures: Callable[[], Sequence[Illustration]] = tuple
+    tables: Sequence[Table] = ()
+    status: str = ""
+    style: str = ""
+    remarks_title: str = "What to mind about these data"
+
+    @property
+    def headline(self) -> str:
+        """`Gap diagnosis: Explained`."""
+        return ": ".join(word for word in (self.title, self.status) if word)
+
+    @property
+    def full_summary(self) -> str:
+        """The summary with its lead."""
+        return " ".join(word for word in (self.lead, self.summary) if word)
+
+
+@dataclass(frozen=True, eq=False)
+class Paper:
+    """One document: `status` is the state in a word, `style` its name among the page's styles.
+
+    The first part says all in short. `bridge` and `period` are empty where the title says them or
+    there is none; `generated_at` is None and `version` empty where nobody says. `closing` ends it:
+    what holds throughout.
+    """
+
+    title: str
+    status: str
+    style: str
+    parts: Sequence[Part]
+    closing: str
+    bridge: str = ""
+    period: str = ""
+    generated_at: datetime | None = None
+    version: str = ""
+
+    @property
+    def above(self) -> str:
+        """`Arch bridge, period 2026-03-01 to 2026-05-25`: what stands above the title."""
+        period = f"period {self.period}" if self.period else ""
+        return ", ".join(word for word in (self.bridge, period) if word)
+
+    @property
+    def name(self) -> str:
+        """`Hanger 3, Arch bridge`: for a list of files, and the properties of one."""
+        return ", ".join(word for word in (self.title, self.bridge, self.period) if word)
+
+    @property
+    def headline(self) -> str:
+        """`Hanger 3, Arch bridge: Alert`."""
+        return ": ".join(word for word in (self.name, self.status) if word)
+
+    @property
+    def made(self) -> str:
+        """`Made 2026-05-01 10:00 UTC by shm 0.1.0`; empty where nobody says."""
+        when = f"Made {formatting.moment(self.generated_at)}" if self.generated_at else ""
+        return f"{when} by shm {self.version}" if when and self.version else when
+
+    @property
+    def foot(self) -> str:
+        """The last line: when it was made, by which version, what holds throughout."""
+        return f"{self.made}. {self.closing}" if self.made else self.closing

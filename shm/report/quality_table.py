@@ -1,0 +1,56 @@
+"""The quality checks of a test: a verdict by word and symbol, what the whole deserves, a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from shm.report import formatting
+from shm.report.paper import Table
+from shm.values import QualityCheck, Verdict
+
+SYMBOLS: dict[Verdict, str] = {"good": "✓", "warning": "!", "refused": "✗", "unknown": "?"}
+_GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
+
+
+def verdict_label(verdict: Verdict) -> str:
+    """`✓ good`."""
+    return f"{SYMBOLS[verdict]} {verdict}"
+
+
+def overall(checks: Sequence[QualityCheck]) -> Verdict:
+    """The gravest of the verdicts; one good check outweighs any number that say nothing."""
+    given = {check.verdict for check in checks}
+    if given <= {"unknown"}:
+        return "unknown"
+    return next(verdict for verdict in _GRAVEST if verdict in given - {"unknown"})
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A figure with its unit as one reads it, `not known` where it is NaN."""
+    known = math.isfinite(value)
+    return f"{formatting.plain(value)} {unit}".rstrip() if known else formatting.plain(value)
+
+
+def quality_table(checks: Sequence[QualityCheck], title: str = "Quality") -> Table:
+    """Each check in its order: verdict by symbol and word, figure beside limit, what to do."""
+    return Table(
+        title,
+        ("check", "verdict", "figure", "limit", "what was found", "what to do"),
+        tuple(_check_row(check) for check in checks),
+        marks=tuple(check.verdict for check in checks),
+        note="Figures without a unit are counts or ratios. Limits are given: they have no interval."
+        if checks
+        else "",
+    )
+
+
+def _check_row(check: QualityCheck) -> tuple[str, ...]:
+    return (
+        check.name,
+        verdict_label(check.verdict),
+        with_unit(check.value, check.unit),
+        with_unit(check.limit, check.unit),
+        check.found,
+        check.remedy or "nothing",
+    )

@@ -1,0 +1,126 @@
+"""Reports as PDF: pages, fonts, properties, the same bytes for the same content."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from shm.report.as_pdf import WIDTH, as_pdf, widths
+from shm.report.contents import HangerReport
+from shm.report.hanger_report import hanger_paper
+from shm.report.paper import Paper, Part, Table
+from tests.helpers.painting import paint_blank
+from tests.helpers.pdf_words import Pdf
+from tests.report.diagnoses import UNEXPLAINED
+
+
+@pytest.fixture(scope="module")
+def content(season: HangerReport) -> bytes:
+    with pytest.MonkeyPatch.context() as patch:
+        paint_blank(patch)
+        return as_pdf(hanger_paper(season))
+
+
+@pytest.fixture(scope="module")
+def parsed(content: bytes) -> Pdf:
+    return Pdf.parse(content)
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_the_same_content_gives_the_same_bytes(bare: HangerReport) -> None:
+    first = as_pdf(hanger_paper(bare))
+    assert first == as_pdf(hanger_paper(bare))
+    assert first != as_pdf(hanger_paper(replace(bare, bridge="Another bridge")))
+
+
+def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> None:
+    assert len(parsed.pages) > 2
+    for number, page in enumerate(parsed.pages, 1):
+        told = " ".join(page.split())
+        assert told.startswith("Arch bridge Hanger 3 Made 2026-09-08 10:00 UTC by shm 0.1.0")
+        assert f"Page {number} of" in told
+    total = [body for body in parsed.objects.values() if b"/Form" in body or b" Tj T*" in body]
+    assert any(f"({len(parsed.pages)})".encode() in body for body in total)
+
+
+def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, parsed: Pdf) -> None:
+    assert b"/Title (Hanger 3, Arch bridge)" in content
+    assert b"/CreationDate (D:20260908100000Z)" in content
+    assert b"/Lang (en)" in content
+    for heading in (b"In short", b"Figures", b"Numbers", b"Gap diagnosis", b"Origin"):
+        assert b"/Title (" + heading + b")" in content
+    assert "Alert" in parsed.words
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_its_words_are_set_in_embedded_fonts_that_hold_every_sign(bare: HangerReport) -> None:
+    signs = "α → ± ² · ≤ ✓ ✗ – … ° é Ł ω"  # noqa: RUF001
+    told = Pdf.parse(as_pdf(hanger_paper(replace(bare, bridge=signs))))
+    assert signs in told.words
+    used = {name for name in told.fonts if name.startswith(("F1", "F2"))}
+    assert all(b"FontFile2" in told._referred(told.fonts[name], b"FontDescriptor") for name in used)
+
+
+def test_figures_are_as_fine_as_print_needs_and_have_numbered_captions(
+    season: HangerReport, content: bytes, parsed: Pdf
+) -> None:
+    widths = [int(width) for width in re.findall(rb"/Subtype /Image.*?/Width (\d+)", content, re.S)]
+    assert widths
+    assert min(widths) / (WIDTH / 72) >= 200
+    drawn = [item for part in hanger_paper(season).parts for item in part.figures()]
+    for number, item in enumerate(drawn, 1):
+        assert f"Figure {number}. {item.caption[:40]}" in parsed.words
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_long_table_goes_on_under_repeated_headings(
+    bare: HangerReport, season: HangerReport
+) -> None:
+    long = replace(bare, trend=season.trend * 12)
+    pages = Pdf.parse(as_pdf(hanger_paper(long))).pages
+    with_heading = [page for page in pages if "90 % interval, kN" in page and "beam2" in page]
+    assert len([page for page in with_heading if "t004" in page]) >= 2
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_cell_longer_than_a_page_is_set(bare: HangerReport, season: HangerReport) -> None:
+    alert = replace(season.alerts[0], message="The tension fell. " * 700)
+    told = Pdf.parse(as_pdf(hanger_paper(replace(bare, alerts=(alert,))))).words
+    assert told.count("fell.") == 700
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_names_from_outside_are_set_as_they_are(bare: HangerReport) -> None:
+    sly = '<b>&amp;</b> "x" <img src="http://example.org/a.png"/>'
+    told = Pdf.parse(
+        as_pdf(hanger_paper(replace(bare, bridge=sly, hanger=replace(bare.hanger, name=sly))))
+    )
+    assert sly in told.words
+
+
+def test_narrow_columns_keep_one_line_and_wide_ones_share_the_rest() -> None:
+    table = Table("t", ("no.", "what was found"), (("12.5 ms", "word " * 80), ("3", "x")))
+    narrow, wide = widths(table, 300.0, 8.0, 6.0)
+    assert narrow < 60
+    assert narrow + wide == pytest.approx(300.0)
+    small = Table("t", ("a", "b"), (("1", "2"),))
+    assert sum(widths(small, 300.0, 8.0, 6.0)) < 60
+
+
+@pytest.mark.parametrize("cell", ["3", "word " * 80, "x" * 400])
+@pytest.mark.parametrize("marks", [(), ("warning",)])
+def test_a_table_of_one_column_is_set(cell: str, marks: tuple[str, ...]) -> None:
+    table = Table("Alone", ("what",), ((cell,),), marks=marks)
+    (only,) = widths(table, 300.0, 8.0, 6.0)
+    assert 0 < only <= 300
+    paper = Paper("One column", "", "first", [Part("In short", tables=[table])], "That is all.")
+    told = Pdf.parse(as_pdf(paper)).words
+    assert "".join(cell.split()) in "".join(told.split())
+
+
+def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:
+    paper = hanger_paper(replace(season, drifts=(), diagnosis=UNEXPLAINED))
+    (gap,) = [part for part in paper.parts if part.title == "Gap diagnosis"]
+    assert (paper.style, gap.style) == ("steady", "alert")
