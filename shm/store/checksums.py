@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache, lru_cache
@@ -253,3 +253,17 @@ def note_damage(error: DamagedRow) -> None:
 @lru_cache(1000)
 def _log_once(message: str) -> None:
     log.error("%s", message)
+
+
+def of_readable(
+    ask: Callable[[Collection[int]], Mapping[int, _T]], damaged: dict[int, DamagedRow]
+) -> Mapping[int, _T]:
+    """What `ask` says of all hangers but those with a damaged row, which are put into `damaged`."""
+    while True:
+        try:
+            return ask(damaged)
+        except DamagedRow as error:
+            if error.hanger is None or error.hanger in damaged:
+                raise
+            note_damage(error)
+            damaged[error.hanger] = error
