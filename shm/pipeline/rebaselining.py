@@ -43,7 +43,7 @@ def rebaseline(
     worked through; BadInput where the class in force cannot describe the tests; StoreBusy where
     another baseline came in meanwhile.
     """
-    before = store.baseline(hanger.id)
+    before = store.watch.baseline(hanger.id)
     if before is None:
         raise NothingThere(
             f"hanger {hanger.id} has no baseline yet, and so none to replace.",
@@ -60,12 +60,12 @@ def rebaseline(
         hint=before.posterior,
     )
     record = (order.who, order.why, order.since)
-    return store.rebaseline(before, posterior, chosen, record, lineage, at)
+    return store.watch.rebaseline(before, posterior, chosen, record, lineage, at)
 
 
 def _since(store: Store, hanger: Hanger, since: datetime) -> tuple[StoredTest, ...]:
     """Tests of then and later that have been watched: those on their way are later ones."""
-    tests = store.tests(hanger.id)
+    tests = store.tests.list_all(hanger.id)
     found = [test for test in tests if test.time >= since and test.stage is Stage.WATCHED]
     if not found:
         latest = f"its latest is of {tests[-1].time:%Y-%m-%d}" if tests else "it has none at all"

@@ -105,7 +105,7 @@ def copy_archive(
 def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> Retention:
     """The raw files here of recordings that were received before a time and may go."""
     folders = _folders(store)
-    everything = store.recordings()
+    everything = store.recordings.list_all()
     old = [each for each in everything if each.received_at < before and archive.holds(each.file)]
     kept: Counter[str] = Counter()
     found: dict[int, str] = {}
@@ -138,10 +138,10 @@ def remove(store: Store, archive: Archive, removals: Iterable[Removal], at: date
     """
     freed = 0
     for removal in removals:
-        ended = store.recording(removal.recording.id).stage in _ENDED
+        ended = store.recordings.get(removal.recording.id).stage in _ENDED
         if not ended or _copy(archive, removal.recording, [removal.copy_folder]) is None:
             continue
-        store.note_removed(removal.recording, removal.copy_folder, at)
+        store.upkeep.note_removed(removal.recording, removal.copy_folder, at)
         for name in removal.names:
             path = archive.folder / name
             freed += _size(path)
@@ -182,7 +182,7 @@ def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tupl
     folders = _folders(store)
     kept = []
     for file in files:
-        recording = store.recording_of(file.sha256)
+        recording = store.recordings.with_checksum(file.sha256)
         if recording is not None and recording.file.archived_as is not None:
             places = [str(archive.folder), *folders[recording.id]]
             name = recording.file.archived_as
@@ -210,7 +210,7 @@ def _has(target: Archive, source: Archive, name: str) -> bool:
 def _folders(store: Store) -> defaultdict[int, list[str]]:
     """Where copies of each recording were noted, the newest first."""
     found: defaultdict[int, list[str]] = defaultdict(list)
-    for copy in reversed(store.archive_copies()):
+    for copy in reversed(store.upkeep.list_copies()):
         found[copy.recording_id].append(copy.folder)
     return found
 
