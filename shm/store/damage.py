@@ -26,6 +26,7 @@ from shm.store.checksums import (
     content_checksum,
     damaged,
     healed,
+    key_of,
     loads,
     plain_table,
 )
@@ -33,7 +34,6 @@ from shm.store.columns import Document
 from shm.store.copying import Rows
 from shm.store.numbering import forget
 from shm.store.tables import APART
-from shm.store.trends import key_of
 
 
 def damaged_among(table: sa.Table, rows: Rows) -> Iterator[DamagedRow]:

@@ -11,7 +11,7 @@ import pytest
 from shm.errors import BadInput, ShmError
 from shm.pipeline import intake
 from shm.pipeline.intake import Sharing, receive
-from shm.store import Outcome, Receipt, Stage, Store, Workspace
+from shm.store import Outcome, Receipt, Stage, Workspace
 from shm.store.stored_recordings import Recordings
 from tests.helpers.workspaces import START, put
 
@@ -94,7 +94,13 @@ def test_a_copy_with_the_same_dates_is_still_noticed(workspace: Workspace, tmp_p
 
 @pytest.mark.parametrize(
     ("owner", "verb"),
-    [(Store, "receive"), (intake, "_remove"), (Path, "unlink"), (os, "fsync"), (Path, "rename")],
+    [
+        (Recordings, "receive"),
+        (intake, "_remove"),
+        (Path, "unlink"),
+        (os, "fsync"),
+        (Path, "rename"),
+    ],
 )
 def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, owner: object, verb: str

@@ -164,18 +164,18 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
     filled: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As by a full disk or a kill between any two of its rows: all or nothing."""
-    from shm.store import adopting
+    from shm.store import stored_posteriors
 
     held = rows(filled)
     for verb in ("insert_posterior", "insert_selection", "insert_baseline", "insert"):
-        keep = getattr(adopting, verb)
+        keep = getattr(stored_posteriors, verb)
 
         def cut(*arguments, keep=keep):  # type: ignore[no-untyped-def]
             keep(*arguments)
             raise sqlite3.OperationalError("cut short")
 
         with monkeypatch.context() as patched:
-            patched.setattr(adopting, verb, cut)
+            patched.setattr(stored_posteriors, verb, cut)
             with pytest.raises(sqlite3.OperationalError):
                 adopted(filled)
         assert rows(filled) == held

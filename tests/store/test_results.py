@@ -17,7 +17,7 @@ from shm.store import (
     Stage,
     Store,
     StoredTest,
-    holding,
+    stored_tests,
 )
 from shm.store.blobs import unpack
 from shm.values import AddedMass, Fingerprint, Posterior, Selection
@@ -231,6 +231,6 @@ def test_samples_are_compared_with_the_earliest_first_and_always_with_the_same_n
         store.tests.save(recording.id, items, LINEAGE, NOW, Judged(None, print_))
     known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[4])]
     assert known == [each.digest for each in prints[:4]]
-    monkeypatch.setattr(holding, "_MOST_COMPARED", 2)
+    monkeypatch.setattr(stored_tests, "_MOST_COMPARED", 2)
     known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[0])]
     assert known == [prints[0].digest, prints[3].digest]
