@@ -153,7 +153,7 @@ HEALING: Mapping[str, str] = {
 }
 """What to do about a damaged row, by table; of all others a backup is the only source.
 
-The row itself is named, as `recording_named` finds its recording; what it says may be wrong."""
+The row itself is named, as `Recordings.find` finds its recording; what it says may be wrong."""
 
 
 def loads(text: Any) -> Any:

@@ -88,6 +88,7 @@ def _hanger(row: Values) -> int | None:
 
 
 def damaged_rows(connection: Connection, table: sa.Table, ids: Iterable[int]) -> list[DamagedRow]:
+    """Those of the rows with these numbers that are damaged."""
     plain, key = plain_table(table.name), next(iter(table.primary_key)).name
     found: list[DamagedRow] = []
     for id_ in ids:
@@ -97,10 +98,12 @@ def damaged_rows(connection: Connection, table: sa.Table, ids: Iterable[int]) ->
 
 
 def damaged_ids(connection: Connection, table: sa.Table, ids: Iterable[int]) -> list[int]:
+    """The numbers of those that are damaged."""
     return [id_ for id_ in ids if damaged_rows(connection, table, [id_])]
 
 
 def drop_rows(connection: Connection, table: sa.Table, chosen: sa.Select[Any]) -> int:
+    """Throws away the damaged ones of the rows whose numbers are `chosen`; how many they are."""
     key = next(iter(table.primary_key))
     ids = damaged_ids(connection, table, connection.scalars(chosen).all())
     if ids:
@@ -110,5 +113,6 @@ def drop_rows(connection: Connection, table: sa.Table, chosen: sa.Select[Any]) -
 
 
 def overwrite(connection: Connection, table: sa.Table, id_: int, values: Mapping[str, Any]) -> None:
+    """Writes what was made anew over a damaged row, which is whole from then on."""
     connection.execute(sa.update(table).where(table.c.id == id_).values(**values))
     healed(connection, table, id_)

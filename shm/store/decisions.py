@@ -41,7 +41,7 @@ from shm.store.holding import (
 )
 from shm.store.queries import WEIGHED
 from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
-from shm.store.reprocessing import BEFORE, of_baselines, send_back, supersede_results
+from shm.store.reprocessing import BEFORE, of_baselines, reprocess, supersede_results
 from shm.store.results import advance_recordings
 from shm.store.rows import Stage
 from shm.store.tables import holds, recordings, tests, watch_states, watches
@@ -216,7 +216,7 @@ class Decisions(Repository):
         Raises NothingThere, and UsageError where the recording has not come so far.
         """
         with self.writing() as connection:
-            return send_back(connection, recording_id, stage, at, test)
+            return reprocess(connection, recording_id, stage, at, test)
 
 
 def _decided_with(

@@ -212,6 +212,7 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
 
 
 def undecided(connection: Connection, recording_id: int) -> Hold:
+    """The hold of a recording that waits for a decision; raises NothingThere or UsageError."""
     row = _latest(connection, recording_id)
     if row is None or row.decision is not None:
         known = sa.select(recordings.c.id).where(recordings.c.id == recording_id)
@@ -230,6 +231,7 @@ def undecided(connection: Connection, recording_id: int) -> Hold:
 
 
 def refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
+    """Raises UsageError where the time that a person gives a held test cannot be right."""
     if time is None:
         return
     if len(hold.tests) > 1:
@@ -242,6 +244,7 @@ def refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
 
 
 def held_rows(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
+    """The tests of a recording that are held, each with the time of its receipt."""
     own = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.HELD)
     query = sa.select(tests, recordings.c.received_at).join(recordings)
     return connection.execute(query.where(own, in_force(tests)).order_by(tests.c.id)).all()

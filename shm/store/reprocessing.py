@@ -39,7 +39,7 @@ AGAIN_FROM = (Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
 BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
-def send_back(
+def reprocess(
     connection: Connection,
     recording_id: int,
     stage: Stage,
@@ -52,7 +52,7 @@ def send_back(
     """
     recording = by_id(connection, recording_id)
     out = standing_discard(connection, recording)
-    if out is not None and not _counts(connection, recording_id):
+    if out is not None and not _any_counts(connection, recording_id):
         told = f"{recording.file_name} was {discarded_reason(out)}"
         raise UsageError(told, remedy=taking_back(out))
     chosen = _chosen(connection, recording, stage, test)
@@ -157,7 +157,7 @@ def _chosen(
     return rows
 
 
-def _counts(connection: Connection, recording_id: int) -> bool:
+def _any_counts(connection: Connection, recording_id: int) -> bool:
     """Whether any test of a recording counts."""
     own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
     return connection.execute(own.where(in_force(tests), counts(tests))).first() is not None

@@ -101,7 +101,7 @@ class Recordings(Decisions):
             return _waits(connection, by_id(connection, recording_id), stage, test_ids)
 
     def get(self, recording_id: int) -> StoredRecording:
-        """Raises NothingThere."""
+        """One recording by its number; raises NothingThere."""
         with self.reading() as connection:
             return recording_from(by_id(connection, recording_id))
 

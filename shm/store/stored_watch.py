@@ -194,12 +194,12 @@ class Watch(Repository):
         return {each.hanger: each for each in self._watches(found)}
 
     def list_detected(self, hanger: int) -> tuple[StoredWatch, ...]:
-        """The watches of a hanger that call a change against its baseline in force, by time."""
+        """The watches of a hanger that detected a change from its baseline in force, by time."""
         chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
         return self._watches(chosen)
 
     def detected_changes(self, excluding: Collection[int] = ()) -> dict[int, tuple[Change, ...]]:
-        """The changes called of each hanger against its baseline in force, by time.
+        """The changes detected of each hanger against its baseline in force, by time.
 
         Raises DamagedRow, which names a hanger: ask again, `excluding` it.
         """
@@ -212,7 +212,7 @@ class Watch(Repository):
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
-        """The watches that call a change against a baseline, and the latest against it, by time."""
+        """The watches that detected a change from a baseline, and the latest of it, by time."""
         against = sa.select(watches.c.id).where(
             watches.c.hanger == baseline.hanger,
             watches.c.baseline_id == baseline.id,
@@ -302,6 +302,6 @@ def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
-    """Which watches call a change against the baseline in force, of all hangers or of one."""
+    """Which watches detected a change from the baseline in force, of all hangers or of one."""
     against = watches.c.baseline_id.in_(baselines_now(hanger))
     return watches.c.called, against, in_force(watches)
