@@ -140,7 +140,7 @@ def test_a_step_that_is_no_stage_is_counted_under_its_name(
     with sqlite3.connect(bridge.database) as connection:
         (kept,) = connection.execute("SELECT MAX(id), stage FROM steps").fetchall()
         update = "UPDATE steps SET stage = ? WHERE id = ?"
-        for told, counted_as in ((stepping.NOTIFIED, "notified"), ("of the future", rows.OTHER)):
+        for told, counted_as in ((files.NOTIFIED, "notified"), ("of the future", rows.OTHER)):
             connection.execute(update, (told, kept[0]))
             connection.commit()
             assert said(client)["shm_stage_reached", counted_as] == 1
