@@ -16,7 +16,7 @@ from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.judging import judge
 from shm.pipeline.parcel import Opens, Parcel
 from shm.pipeline.terms import Taught, identify_lineage, update_terms
-from shm.pipeline.watching import to_watch
+from shm.pipeline.watching import tests_beside, to_watch
 from shm.resources import give_back_memory
 from shm.store import (
     Delivery,
@@ -248,6 +248,7 @@ class Jobs:
         compared = None if selection is None else selection.selection
         tension = averaged_now(current, compared, hanger.limits)
         step = partial(run_step, "watch_test", baseline, tests, current, hanger, limit_years)
+        beside = tests_beside(self.store, baseline, test)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -257,7 +258,7 @@ class Jobs:
             state = KeptWatch(needed.key, test.time, content)
             return self.store.watch.save(test, baseline, watched, alert, hooks, self.clock(), state)
 
-        return Step(partial(step, needed.kept, tension), keep)
+        return Step(partial(step, needed.kept, tension, beside), keep)
 
     def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

@@ -91,6 +91,9 @@ def _candidate(
         reference=[each.test for each in reference],
         reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
+        arrived=[
+            each.test for each in store.tests.latest_received(hanger.id, recording.id, _LATEST)
+        ],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
         copies=store.tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
@@ -127,11 +130,16 @@ def _notice(
     leading = max(held, key=lambda each: np.nan_to_num(abs(each.tension_shift)))
     candidate = candidates[leading.position]
     hanger = candidate.hanger.id
-    others = [
-        test.tension_shift for hold in store.recordings.list_holds(hanger) for test in hold.tests
-    ]
+    clocks = [hold for hold in store.recordings.list_holds(hanger) if hold.is_for_its_clock]
+    others = [test.tension_shift for hold in clocks for test in hold.tests]
     others += [test.tension_shift for test in held if test is not leading]
-    message = notice_of(candidate, leading.doubts, recording.id, others)
+    counted = {test.id: test for test in (*candidate.earlier, *candidate.arrived)}
+    for test in candidate.reference:
+        counted.pop(test.id, None)
+    shifts = [
+        implied_shift(test, candidate.reference, candidate.hanger) for test in counted.values()
+    ]
+    message = notice_of(candidate, leading.doubts, recording.id, others, shifts)
     if len(held) > 1:
         message += f" {len(held)} tests of {recording.file.file_name} are held."
     return Alert(

@@ -13,7 +13,7 @@ from shm.store import Store, StoredTest
 
 IDENTIFY_SETTINGS = tuple(identify_settings(Settings()))
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
-_LIBRARIES = ("numpy", "scipy", "pyOMA-2", "statsmodels")
+_LIBRARIES = ("numpy", "scipy", "pyOMA-2", "emcee")
 
 
 def test_lineage(store: Store, test: StoredTest) -> dict[str, str]:

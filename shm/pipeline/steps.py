@@ -24,6 +24,7 @@ from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import (
     Alert,
     Averaged,
+    Beside,
     Hanger,
     ModalTest,
     Posterior,
@@ -133,18 +134,22 @@ def watch_test(
     limit_years: float,
     kept: bytes | None = None,
     tension: Averaged | None = None,
+    beside: Beside | None = None,
 ) -> tuple[WatchedTest, Alert | None, bytes] | None:
     """What the watch says after a test, the alert that it calls for, and what to keep of it.
 
     The alert leads with the `tension` by the test.
 
     `tests` are those of the baseline and those since, the last of which is the one in question; or
-    that one alone, with what was `kept` before it: None where nothing can go on from that.
+    that one alone, with what was `kept` before it: None where nothing can go on from that. The
+    tests `beside` it are those that it may agree with, whatever the clocks say.
     """
     since_baseline, later = tests
     options = WatchOptions(limit_years=limit_years)
     try:
-        found = watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept)
+        found = watch_newest(
+            baseline.posterior, since_baseline, later, hanger, options, kept, beside
+        )
     except BadInput:
         if kept is None:
             raise

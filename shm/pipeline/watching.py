@@ -11,10 +11,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import shm
-from shm.store import Baseline, Store, StoredTest, WatchedName
+from shm.store import Baseline, Stage, Store, StoredTest, WatchedName
+from shm.values import Beside, ModalTest
 
 if TYPE_CHECKING:
     from shm.watch import DatedTest
+
+_BESIDE = 2  # of which two that agree have been told before
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,29 @@ def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
     if kept is None or kept.key != _key(before):
         return ToWatch(*dated_tests(store, baseline, newest), None, key)
     return ToWatch(_dated(store.tests.of_baseline(baseline)), _dated([newest]), kept.content, key)
+
+
+def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
+    """The tests that a test may agree with: two each way, as they came in and by their clocks.
+
+    What is held for its clock alone came in as any other: what it measured is in no doubt.
+    """
+    by_clock = [
+        hold.recording_id
+        for hold in store.recordings.list_holds(newest.hanger)
+        if hold.is_for_its_clock
+    ]
+    came = store.tests.received_beside(baseline, newest, _BESIDE, by_clock)
+    dated = store.tests.dated_beside(baseline, newest, _BESIDE)
+    held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
+    return Beside(_plain(came), _plain(dated), held)
+
+
+def _plain(
+    sides: tuple[Sequence[StoredTest], Sequence[StoredTest]],
+) -> tuple[Sequence[ModalTest], Sequence[ModalTest]]:
+    before, after = sides
+    return [each.test for each in before], [each.test for each in after]
 
 
 def dated_tests(

@@ -31,10 +31,10 @@ class Candidate:
     very same time. `modified_at` is when the file was last written, which copying resets.
     `built` is when the bridge was; `tolerance` how far ahead of the receipt a clock may be.
     `reference` are the tests of the hanger's baseline in force, the latest taken at
-    `reference_at`; `earlier` its latest tests that count, by time; `baseline` the posterior that
-    later tests are compared with. `copies` are recordings that may hold the same samples,
-    `others` the other hangers of the bridge with their latest tests that count. `signals` says
-    which of its channels are doubtful.
+    `reference_at`; `earlier` its latest tests that count, by time, `arrived` those that came in
+    last, whatever their time; `baseline` the posterior that later tests are compared with.
+    `copies` are recordings that may hold the same samples, `others` the other hangers of the bridge
+    with their latest tests that count. `signals` says which of its channels are doubtful.
     """
 
     hanger: Hanger
@@ -49,6 +49,7 @@ class Candidate:
     reference: Sequence[ModalTest] = ()
     reference_at: datetime | None = None
     earlier: Sequence[ModalTest] = ()
+    arrived: Sequence[ModalTest] = ()
     baseline: Posterior | None = None
     fingerprint: Fingerprint | None = None
     copies: Sequence[KnownSamples] = ()

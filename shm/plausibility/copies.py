@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from shm.plausibility import background
 from shm.plausibility.candidate import Candidate
 from shm.values import (
     Doubt,
@@ -84,7 +85,8 @@ It is 0.1 of a hum at most, and all of each simulated or real response that was 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:
     """What the samples of one test look like; None where nothing moves in them."""
-    moved = [row for record in records for row in _motions(record) if _moves(row)]
+    by_record = [[row for row in _motions(record) if _moves(row)] for record in records]
+    moved = [row for rows in by_record for row in rows]
     if not moved:
         return None
     forces = [each.force for each in records if isinstance(each, Recording) and each.force]
@@ -93,10 +95,18 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
     hashes = sorted(hashlib.sha256(row.tobytes()).digest() for row in numbers)
     most = max(2, min(_MOST_A_CHANNEL, _MOST // len(moved)))
     found = [_shapes(row, channel, most) for channel, row in enumerate(moved)]
+    in_time = [
+        rows
+        for rows, record in zip(by_record, records, strict=True)
+        if rows and isinstance(record, Recording)
+    ]
+    noise, places = background.traced(in_time)
     return Fingerprint(
         hashlib.sha256(b"".join(hashes)).hexdigest(),
         np.concatenate([shapes for shapes, _ in found])[:_MOST],
         np.concatenate([marks for _, marks in found])[:_MOST],
+        noise,
+        places,
     )
 
 
@@ -163,6 +173,18 @@ def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
     None where it does not."""
     if own.digest == other.digest:
         return Common(1.0, 1.0)
+    return _same_shapes(own, other) or _same_background(own, other)
+
+
+def _same_background(own: Fingerprint, other: Fingerprint) -> Common | None:
+    pairs = background.in_common(own, other)
+    if not pairs:
+        return None
+    own_has, other_has = _lengths(own.places), _lengths(other.places)
+    return Common(_share(pairs, own_has, 0), _share(pairs, other_has, 1))
+
+
+def _same_shapes(own: Fingerprint, other: Fingerprint) -> Common | None:
     if not len(own.marks) or not len(other.marks):
         return None
     here, there = _alike(own, other)
@@ -179,15 +201,19 @@ def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
     alike = min(len({pair[side] for pair in pairs}) for side in (0, 1))
     if 2 * alike < min(len(np.unique(each.marks[:, 0])) for each in (own, other)):
         return None
-    return Common(_share(pairs, own, 0), _share(pairs, other, 1))
+    return Common(_share(pairs, _lengths(own.marks), 0), _share(pairs, _lengths(other.marks), 1))
 
 
-def _share(pairs: Mapping[tuple[int, int], int], print_: Fingerprint, side: int) -> float:
-    """How much of a recording lies in pairs of channels that are copies.
+def _lengths(rows: IntArray) -> dict[int, int]:
+    """The samples of each channel: both stand first in marks and places."""
+    return {int(channel): int(length) for channel, length in rows[:, :2]}
+
+
+def _share(pairs: Mapping[tuple[int, int], int], samples: Mapping[int, int], side: int) -> float:
+    """How much of a recording, of so many samples a channel, lies in pairs that are copies.
 
     A channel of the one may hold several of the other, as that of a whole its cuts.
     """
-    samples = {int(channel): int(length) for channel, length in print_.marks[:, :2]}
     common = Counter[int]()
     for pair, length in pairs.items():
         common[pair[side]] += length

@@ -9,14 +9,19 @@ from shm.values import Doubt
 
 
 def notice_of(
-    candidate: Candidate, doubts: Sequence[Doubt], recording_id: int, others: Sequence[float]
+    candidate: Candidate,
+    doubts: Sequence[Doubt],
+    recording_id: int,
+    others: Sequence[float],
+    counted: Sequence[float] = (),
 ) -> str:
-    """The message of one held test; `others` are shifts of tension that other held tests imply.
+    """The message of one held test; `others` are shifts of tension that other held tests imply,
+    `counted` those that tests imply which count.
 
     Where its modes themselves are not in doubt, what they imply leads: a wrong clock must not hide
     a loss. Nor must the likeness to another hanger: there it is said of the case that it is wrong.
     """
-    loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others)
+    loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others, counted)
     if_own = "" if loss or any(doubt.check == "copy" for doubt in doubts) else _if_own(candidate)
     states = "; ".join(doubt.state for doubt in doubts)
     end = "" if states.endswith("?") else "."
@@ -61,15 +66,20 @@ def _if_own(candidate: Candidate) -> str:
     )
 
 
-def _loss(candidate: Candidate, others: Sequence[float]) -> str:
+def _loss(candidate: Candidate, others: Sequence[float], counted: Sequence[float]) -> str:
     """What the modes would mean for the tension; empty where that is below the threshold."""
     hanger, limit = candidate.hanger, candidate.hanger.thresholds.tension_shift_fraction
     shift = implied_shift(candidate.test, candidate.reference, hanger)
     if not abs(shift) >= limit:
         return ""
     moved, side = ("lost", "below") if shift < 0 else ("gained", "above")
-    agreeing = 1 + sum(each * shift > 0 and abs(each) >= limit for each in others)
-    say = f"{agreeing} held tests agree" if agreeing > 1 else "one held test says so"
+    held, counting = (
+        sum(each * shift > 0 and abs(each) >= limit for each in shifts)
+        for shifts in ((shift, *others), counted)
+    )
+    say = f"{held} held tests agree" if held > 1 else "one held test says so"
+    if counting:
+        say = f"{held + counting} tests agree, {held} of them held"
     change = frequency_change(candidate.test, candidate.reference)
     return (
         f"Hanger {hanger.id} may have {moved} {100 * abs(shift):.0f} % of its tension: {say}. "

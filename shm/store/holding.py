@@ -84,7 +84,7 @@ def notice_key(hanger: int, hold_id: int) -> str:
 
 
 def fingerprint_from(row: Row[Any]) -> Fingerprint:
-    """The marks are missing in those of before shapes had places."""
+    """Marks, noise and places are missing in those of before there were such."""
     return Fingerprint(row.digest, **unpack(row.shapes))
 
 
@@ -108,7 +108,8 @@ def _doubt_from(document: Mapping[str, Any]) -> Doubt:
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
     former = fingerprints.c.recording_id == recording_id
     connection.execute(sa.delete(fingerprints).where(former))
-    shapes = pack(shapes=found.shapes, marks=found.marks)
+    arrays = ("shapes", "marks", "noise", "places")
+    shapes = pack(**{name: getattr(found, name) for name in arrays})
     row = {"recording_id": recording_id, "digest": found.digest, "shapes": shapes}
     connection.execute(sa.insert(fingerprints).values(row))
 

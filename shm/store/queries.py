@@ -53,6 +53,17 @@ def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
     return query.order_by(tests.c.time, tests.c.id)
 
 
+def compared_with(baseline: Baseline) -> list[sa.ColumnElement[bool]]:
+    """Tests that were watched since a baseline."""
+    found = [
+        tests.c.hanger == baseline.hanger,
+        tests.c.stage == Stage.WATCHED,
+        tests.c.name.not_in(baseline.posterior.tests),
+        in_force(tests),
+    ]
+    return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
+
+
 def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
     """The tests of a query on `plain_tests`; raises DamagedRow."""
     return tuple(_test(row) for row in connection.execute(query))

@@ -181,6 +181,11 @@ class Hold:
     time: datetime | None = None
 
     @property
+    def is_for_its_clock(self) -> bool:
+        """Whether nothing but the time of its tests is in doubt: what they measured is not."""
+        return bool(self.doubts) and all(each.check.startswith("clock") for each in self.doubts)
+
+    @property
     def doubts(self) -> tuple[Doubt, ...]:
         """Of all its tests, each check once."""
         return tuple({d.check: d for test in self.tests for d in test.doubts}.values())

@@ -17,7 +17,14 @@ from shm.store.database import Repository, insert
 from shm.store.files import counts, in_force, write_step
 from shm.store.holding import Judged, fingerprint_from, keep_judgement
 from shm.store.list_rows import LatestTest, TestRow, WaitingTest
-from shm.store.queries import WEIGHED, counted_tests, lineage_from, plain_tests, read_tests
+from shm.store.queries import (
+    WEIGHED,
+    compared_with,
+    counted_tests,
+    lineage_from,
+    plain_tests,
+    read_tests,
+)
 from shm.store.results import advance_recordings, test_contents
 from shm.store.rows import (
     Baseline,
@@ -32,7 +39,7 @@ from shm.store.rows import (
 from shm.store.tables import baselines, fingerprints, posterior_tests, posteriors, recordings, tests
 from shm.values import Fingerprint, FrequencyResponse, KnownSamples
 
-# Recordings of a hanger: some 15 MB, at most 60; older ones are found by their digest.
+# Recordings of a hanger: some 20 MB, at most 110; older ones are found by their digest.
 _MOST_COMPARED = 1000
 _ROW = tuple(tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage"))
 _LATEST = 3
@@ -182,10 +189,31 @@ class Tests(Repository):
 
     def latest_before(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
         """The latest tests of a hanger that count, but for those of one recording, by time."""
-        mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
-        query = plain_tests.where(mine, counts(tests), in_force(tests))
-        latest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
-        return self._tests(latest)[::-1]
+        return self._latest_but(hanger, recording_id, limit, tests.c.time)
+
+    def latest_received(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
+        """Those of them that came in last, whatever their time."""
+        return self._latest_but(hanger, recording_id, limit, tests.c.recording_id)
+
+    def dated_beside(
+        self, baseline: Baseline, test: StoredTest, limit: int
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        """So many tests watched since a baseline before a test and after it, by time, the nearest
+        first."""
+        query = plain_tests.where(*compared_with(baseline), tests.c.id != test.id)
+        order = sa.tuple_(tests.c.time, tests.c.id)
+        return self._around(query, order, (test.time, test.id), limit)
+
+    def received_beside(
+        self, baseline: Baseline, test: StoredTest, limit: int, held: Collection[int] = ()
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        """The same as they came in, those among them that are held of the recordings `held`."""
+        is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
+        is_held &= tests.c.recording_id.in_(held) & in_force(tests)
+        counted = sa.and_(*compared_with(baseline))
+        query = plain_tests.where(counted | is_held, tests.c.id != test.id)
+        order = sa.tuple_(tests.c.recording_id, tests.c.id)
+        return self._around(query, order, (test.recording_id, test.id), limit)
 
     def latest_weighed(self, hangers: Collection[int], before: datetime) -> StoredTest | None:
         """The latest test of these hangers before then whose tension was read, too."""
@@ -263,6 +291,21 @@ class Tests(Repository):
             )
             for row in sorted(rows, key=lambda row: int(row.recording_id))
         )
+
+    def _latest_but(
+        self, hanger: int, recording_id: int, limit: int, order: sa.Column[Any]
+    ) -> tuple[StoredTest, ...]:
+        mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
+        query = plain_tests.where(mine, counts(tests), in_force(tests))
+        latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
+        return self._tests(latest)[::-1]
+
+    def _around(
+        self, query: sa.Select[Any], order: sa.Tuple, here: tuple[object, int], limit: int
+    ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
+        down, up = ([getattr(each, way)() for each in order.clauses] for way in ("desc", "asc"))
+        before = self._tests(query.where(order < here).order_by(*down).limit(limit))
+        return before, self._tests(query.where(order > here).order_by(*up).limit(limit))
 
     def _tests(self, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
         with self.reading() as connection:

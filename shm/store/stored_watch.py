@@ -19,7 +19,7 @@ from shm.store.database import Repository, insert
 from shm.store.files import in_force
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert
-from shm.store.queries import baseline_in_force, baselines_now, read_baseline
+from shm.store.queries import baseline_in_force, baselines_now, compared_with, read_baseline
 from shm.store.results import all_at, insert_baseline, insert_posterior, move
 from shm.store.rows import Baseline, KeptWatch, Lineage, Stage, StoredAlert, StoredTest, StoredWatch
 from shm.store.tables import baselines, drifts, posterior_tests, tests, watch_states, watches
@@ -133,14 +133,7 @@ class Watch(Repository):
         Tests that were watched against an earlier baseline count, but for those before a day since
         which the hanger is compared anew.
         """
-        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(
-            tests.c.hanger == baseline.hanger,
-            tests.c.stage == Stage.WATCHED,
-            tests.c.name.not_in(baseline.posterior.tests),
-            in_force(tests),
-        )
-        if baseline.since is not None:
-            query = query.where(tests.c.time >= baseline.since)
+        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*compared_with(baseline))
         if before is not None:
             at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
             query = query.where((tests.c.time < before.time) | at_once)

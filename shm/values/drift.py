@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.posterior import Averaged
+
+if TYPE_CHECKING:
+    from shm.values import ModalTest
 
 End = Literal["deck", "arch"]
 
@@ -164,6 +168,20 @@ class TemperatureCoefficient:
 
 
 AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "held", "test"]
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """The tests next to the newest, the nearest first: as they `came` in, before and after it, and
+    as they are `dated`.
+
+    Those that came may be `held` (their names) for their clock alone: what they measured counts.
+    Tests that are not watched yet are left out; each is asked of in its turn.
+    """
+
+    came: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
+    dated: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
+    held: Collection[str] = ()
 
 
 @dataclass(frozen=True)

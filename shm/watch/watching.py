@@ -2,29 +2,30 @@
 
 When an owner is told: from what the watch says after each test to at most one alert a test.
 
-Two rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
+Three rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
 change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
-level which the owner asked for. A condition that stands is told once. It ends when its probability
-falls below half that level, and only then can it be told again, so that a probability which hovers
-about the level does not ring every week. A change that was called and then passes the threshold is
-told again, since the owner must now do something else.
+level which the owner asked for. Two tests that agree are told whatever their clocks say, where
+neither of the former rules has (`agreement`). A condition that stands is told once. It ends when
+its probability falls below half that level, and only then can it be told again, so that a
+probability which hovers about the level does not ring every week. A change that was called and then
+passes the threshold is told again, since the owner must now do something else.
 
 All is derived from the sequence of tests, so that the same tests give the same alerts.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 from shm.errors import BadInput
 from shm.values import (
     Alert,
     AlertKind,
+    Beside,
     Change,
     Drift,
     Hanger,
@@ -34,16 +35,15 @@ from shm.values import (
     Reading,
     WatchedTest,
 )
+from shm.watch.agreement import Way, agreement
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
-from shm.watch.wording import message_of, suspects
+from shm.watch.wording import message_of, short_name, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
 _ENDS_BELOW = 0.5
-_LONGEST_TEST = 80
-_DIGITS = 12
 _BEYOND: AlertKind = "beyond threshold"
 
 
@@ -106,12 +106,14 @@ def watch_newest(
     hanger: Hanger,
     options: WatchOptions,
     kept: bytes | None = None,
+    beside: Beside | None = None,
 ) -> Newest | None:
     """The last of what `watch_hanger` finds, from what was `kept` after the tests before it.
 
     `later` are then the tests since, the newest alone as a rule; without `kept` all of them. None
     where nothing can go on from what was kept, since rules, options or description have changed:
-    then the watch must begin without it.
+    then the watch must begin without it. Where the watch itself calls for no alert, the newest may
+    yet agree with a test `beside` it.
     """
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = _options_of(hanger, len(baseline_tests), options)
@@ -131,6 +133,8 @@ def watch_newest(
     for test, time in later:
         state, found = watcher.after(state, reader.reading(test, max(time, since)))
         told, alert = after(told, found, hanger)
+    if alert is None and beside is not None and later:
+        alert = agreement(reader, later[-1], beside, hanger, options, told.beyond)
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
@@ -277,7 +281,7 @@ def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
 
 def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Hanger) -> str:
     rules = "+".join(kind.replace(" ", "-") for kind in kinds)
-    return f"hanger-{hanger.id}:{rules}:{_first_moved(news, test)}:{_short(test.test)}"
+    return f"hanger-{hanger.id}:{rules}:{_first_moved(news, test)}:{short_name(test.test)}"
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:
@@ -292,16 +296,6 @@ def _first_moved(news: _News, test: WatchedTest) -> str:
 
 def _way(shift: float) -> Way:
     return "down" if shift < 0 else "up"
-
-
-def _short(name: str) -> str:
-    """A test's name as far as a key has room for it; names that begin alike stay apart."""
-    if len(name) <= _LONGEST_TEST:
-        return name
-    return f"{name[:_LONGEST_TEST]}-{hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]}"
-
-
-Way = Literal["up", "down"]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence, Set
 from datetime import datetime
@@ -12,6 +13,7 @@ from shm.values.force_units import force_unit
 _NINETY_PERCENT = 1.645
 _CERTAIN = 0.999
 _LISTED = 3
+_LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 _EITHER_LIKELY = 0.8
 _WHICH_END = "which end is not known"
 
@@ -43,6 +45,33 @@ def message_of(
         _advice(change, beyond),
     ]
     return " ".join(part for part in parts if part)
+
+
+def message_of_agreeing(
+    drift: Drift, hanger: Hanger, tests: tuple[str, str], *, is_held: bool
+) -> str:
+    """The same of two `tests` that read beyond a threshold; the first `is_held` for its clock.
+
+    Nothing is said of when: that they are told at all is since their clocks may not tell.
+    """
+    name = quantity_words(drift.quantity)
+    first = f"{tests[0]} (held for its clock)" if is_held else tests[0]
+    parts = [
+        f"Hanger {hanger.id}: {name} "
+        f"{shift_words(drift.quantity, drift.shift_mean, drift.shift_sd)}.",
+        f"Tests {first} and {tests[1]} both read beyond its threshold of {_threshold(drift)}.",
+        _tension(drift) if drift.quantity == TENSION else "",
+        "This counts whatever their clocks say, so that it is not said when it came.",
+        f"{_advice(None, [drift])} Check the logger's clock.",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def short_name(test: str) -> str:
+    """A test's name as far as a key has room for it; names that begin alike stay apart."""
+    if len(test) <= _LONGEST_TEST:
+        return test
+    return f"{test[:_LONGEST_TEST]}-{hashlib.sha256(test.encode()).hexdigest()[:_DIGITS]}"
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:
@@ -244,14 +273,17 @@ def _now(test: WatchedTest, beyond: Sequence[Drift], change: Change | None) -> s
     )
     for drift in test.drifts:
         if drift.quantity == TENSION and TENSION in spoken:
-            now_n, before_n = drift.value, drift.baseline
-            unit = force_unit(now_n, before_n)
-            return (
-                f"Tension is now {unit.told(now_n)}, {100 * abs(now_n / before_n - 1):.1f} % "
-                f"{'below' if now_n < before_n else 'above'} the {unit.told(before_n)} of the "
-                "baseline."
-            )
+            return _tension(drift)
     return ""
+
+
+def _tension(drift: Drift) -> str:
+    now_n, before_n = drift.value, drift.baseline
+    unit = force_unit(now_n, before_n)
+    return (
+        f"Tension is now {unit.told(now_n)}, {100 * abs(now_n / before_n - 1):.1f} % "
+        f"{'below' if now_n < before_n else 'above'} the {unit.told(before_n)} of the baseline."
+    )
 
 
 # ---------------------------------------------------------------- when, how sure

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -239,3 +240,14 @@ def test_a_flip_in_the_text_of_the_schema_is_found_and_a_restore_heals_it(
     assert run(["--workspace", str(bridge.folder), "db", "backup", str(backup)]) == 5
     assert run(["--workspace", str(bridge.folder), "db", "restore", str(backup), "--replace"]) == 0
     assert run(["--workspace", str(bridge.folder), "db", "check", "--archive"]) == 0
+
+
+def test_a_name_in_the_archive_that_became_a_number_ends_no_check(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bits = bridge.database.read_bytes()
+    bridge.database.write_bytes(bits.replace(b"archived_as TEXT", b"archived_as TINT", 1))
+    with closing(sqlite3.connect(bridge.database)) as connection, connection:
+        connection.execute("UPDATE recordings SET archived_as = '7' WHERE id = 1")
+    assert run(["--workspace", str(bridge.folder), "db", "check", "--archive"]) == 5
+    assert "archive/7" in capsys.readouterr().err

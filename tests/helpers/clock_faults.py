@@ -15,7 +15,8 @@ from shm.values import Hanger, ModalTest
 from tests.helpers.flows import Clock, a_flow, receive_all
 from tests.helpers.workspaces import START, make_workspace, modes_of, put
 
-HOUR, DAY = timedelta(hours=1), timedelta(days=1)
+SECOND, HOUR, DAY = timedelta(seconds=1), timedelta(hours=1), timedelta(days=1)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 SPACINGS = (DAY, 30 * DAY, 180 * DAY)
 """Tests hours apart are no trial of the clock: the watch counts its evidence in years, and with a
 right clock it calls nothing within hours of the baseline either."""
@@ -26,10 +27,17 @@ PER_KELVIN = -2e-4  # of a frequency: a tension that goes with the temperature
 Told = Callable[[datetime, int, datetime, int], datetime]
 FAULTS: dict[str, Told] = {
     # The true time, which faulty test it is, the last good test's time, and a sign.
-    "epoch": lambda time, number, last, sign: datetime(1970, 1, 1, tzinfo=UTC) + number * HOUR,
+    "epoch": lambda time, number, last, sign: EPOCH + number * HOUR,
     "day off": lambda time, number, last, sign: time + sign * DAY,
     "stuck": lambda time, number, last, sign: last,
     "summer time": lambda time, number, last, sign: time + sign * HOUR,
+    "hardly moves": lambda time, number, last, sign: last + (number + 1) * SECOND,
+    "out of order": lambda time, number, last, sign: last + (time - last) / (4 if number else 1),
+    "first at epoch": lambda time, number, last, sign: time if number else EPOCH,
+    "second at epoch": lambda time, number, last, sign: EPOCH if number else time,
+    "anywhere": lambda time, number, last, sign: (
+        last + (time - last) * sign * ((time.microsecond + 617 * number) % 1000) / 1000
+    ),
 }
 
 

@@ -531,3 +531,81 @@ def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
         assert store.recordings.get(1).stage is Stage.DONE
         (notice,) = store.alerts.list_all()
         assert notice.acknowledgement is not None
+
+
+def test_a_counted_and_a_held_test_that_agree_say_so_in_either_order(
+    workspace: Workspace,
+) -> None:
+    """The notice said "one held test says so" beside a counted one, and then nothing more."""
+    spool(workspace, "good", day(0))
+    ingest(workspace)
+    spool(workspace, "counted", day(10), tension=0.9)
+    ingest(workspace)
+    spool(workspace, "held", EPOCH, tension=0.9)
+    ingest(workspace)
+    with workspace.store() as store:
+        (notice,) = (stored.alert for stored in store.alerts.list_all())
+        assert notice.kinds == ("held",)
+        assert "of its tension: 2 tests agree, 1 of them held. Repeat" in notice.message
+
+
+def test_a_counted_test_that_agrees_with_a_held_one_raises_an_alert(held: Workspace) -> None:
+    spool(held, "counted", day(10), tension=0.9)
+    ingest(held)
+    with held.store() as store:
+        notice, alert = (stored.alert for stored in store.alerts.list_all())
+        assert notice.kinds == ("held",)
+        assert alert.kinds == ("beyond threshold",)
+        assert alert.test == "counted"
+        assert "Tests lost (held for its clock) and counted both read beyond" in alert.message
+        assert [test.test.id for test in store.tests.list_all(3)] == ["good", "counted"]
+        assert check_store(store, quiet).troubles == ()
+
+
+def test_a_loss_that_is_told_by_two_tests_is_not_told_by_the_third(workspace: Workspace) -> None:
+    for number, seconds in enumerate((0, 1, 2, 3)):
+        time = day(0) + timedelta(seconds=seconds)
+        spool(workspace, f"t{number}", time, tension=0.9 if number else 1.0)
+        ingest(workspace)
+    with workspace.store() as store:
+        assert [stored.alert.test for stored in store.alerts.list_all()] == ["t2"]
+
+
+def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Workspace) -> None:
+    for name, when, tension in (("good", 0, 1.0), ("later", 80, 0.9), ("earlier", 40, 0.9)):
+        spool(workspace, name, day(when), tension=tension)
+        ingest(workspace)
+    with workspace.store() as store:
+        (alert,) = (stored.alert for stored in store.alerts.list_all())
+        assert alert.test == "earlier"
+        assert "Tests later and earlier both read beyond its threshold" in alert.message
+
+
+def test_a_copy_of_a_loss_confirms_no_loss(workspace: Workspace) -> None:
+    """Noise of 1 %, another date: the same hit became its own second test, and an alert."""
+    sound = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
+    for name, state, seed, when in (
+        ("a", sound, 1, 0),
+        ("b", replace(sound, tension_n=640e3), 2, 30),
+    ):
+        rng = np.random.default_rng(seed)
+        one = hammer_test(HANGER_3, state, HammerPlan(hits=3), rng, time=day(when), source="s")
+        write(one, workspace.spool / f"{name}.npz")
+        ingest(workspace)
+    rng = np.random.default_rng(3)
+    noisy = tuple(
+        replace(
+            each, values=each.values + 0.01 * each.values.std() * rng.normal(size=len(each.values))
+        )
+        for each in one.channels
+    )
+    write(replace(one, channels=noisy, time=day(60)), workspace.spool / "c.npz")
+    ingest(workspace)
+    with workspace.store() as store:
+        (notice,) = (stored.alert for stored in store.alerts.list_all())
+        assert notice.kinds == ("held",)
+        assert "it holds the samples of b.npz (recording 2) again" in notice.message
+        assert "--confirm 3" in notice.message
+        assert [test.test.id for test in store.tests.list_all(3)] == ["a", "b"]
+        store.recordings.confirm(3, "Ann", "another hit", day(61))
+        assert store.recordings.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]

@@ -22,6 +22,7 @@ from shm.values import (
     Recording,
     ResponsePoint,
 )
+from tests.helpers.altered import KNOWN, noisy
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test
 
@@ -99,6 +100,26 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
     assert copy is not None
     assert is_copy(copy, own)
     assert is_copy(own, copy)
+
+
+@pytest.mark.parametrize("hits", [1, 3])
+@pytest.mark.parametrize("how", KNOWN)
+def test_a_copy_that_was_altered_a_little_is_known(how: str, hits: int) -> None:
+    original = a_recording(seed=2, hits=hits)
+    altered = KNOWN[how](replace(original, time=START + timedelta(days=30)))
+    own, copy = fingerprint_of([original]), fingerprint_of([altered])
+    assert own is not None
+    assert copy is not None
+    assert is_copy(copy, own)
+    assert is_copy(own, copy)
+
+
+def test_an_altered_copy_is_named_with_the_file_that_it_is_of() -> None:
+    whole = a_recording()
+    assert state_of(noisy(whole, 0.01), known(1, a_recording(2)), known(2, whole)) == (
+        "it holds the samples of f2 (recording 2) again",
+        (),
+    )
 
 
 def candidate(own: Recording, *known: KnownSamples) -> Candidate:
@@ -185,6 +206,34 @@ def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: f
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
     assert len(pairs) == 28
     assert not any(is_copy(*pair) for pair in pairs)
+
+
+@pytest.mark.parametrize("bits", [12, 16, 24])
+@pytest.mark.parametrize("hits", [1, 3])
+def test_hits_of_a_machine_are_no_copies(hits: int, bits: int) -> None:
+    """One force at one sample: what differs is the background alone, or not even that where the
+    converter does not show it."""
+    plan = HammerPlan(hits=hits, adc_bits=bits, peak_force_scatter=0.0, hit_time_scatter_s=0.0)
+    machine = (
+        hammer_test(HANGER_3, STATE, plan, np.random.default_rng(n), time=START, source="s")
+        for n in range(6)
+    )
+    prints = [fingerprint_of([each]) for each in machine]
+    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
+    assert len(pairs) == 15
+    assert not any(is_copy(*pair) for pair in pairs)
+
+
+@pytest.mark.parametrize("hum_hz", [24.3, 50.0])
+def test_a_pump_or_the_mains_under_all_tests_makes_no_copies(hum_hz: float) -> None:
+    prints = []
+    for seed in range(5):
+        recording = a_recording(seed)
+        time_s = np.arange(len(recording.channels[0].values)) / 512
+        hum = sum(np.sin(2 * np.pi * k * hum_hz * time_s + seed) / k for k in (1, 2, 3))
+        humming = changed(recording, lambda c, hum=hum: replace(c, values=c.values + 0.05 * hum))
+        prints.append(fingerprint_of([humming]))
+    assert not any(is_copy(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b)
 
 
 def test_each_hit_of_a_recording_is_a_copy_of_it_but_not_of_another_hit() -> None:
@@ -277,7 +326,8 @@ def test_a_print_stays_small(channels: int) -> None:
     found = fingerprint_of([Recording("s", many, 512.0)])
     assert found is not None
     assert len(found.marks)
-    assert len(pack(shapes=found.shapes, marks=found.marks)) < 64_000
+    arrays = (found.shapes, found.marks, found.noise, found.places)
+    assert len(pack(**dict(zip("abcd", arrays, strict=True)))) < 120_000
 
 
 def test_frequency_responses_are_compared_too() -> None:

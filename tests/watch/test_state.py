@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
@@ -392,8 +390,3 @@ def test_what_cannot_be_used_is_refused() -> None:
         states(readings, [TENSION], np.array([0.0, 2.0, 0.0]))
     with pytest.raises(UsageError, match="Watched: tension"):
         states(readings, [TENSION]).filtered("log10_k9")
-
-
-def test_naming_the_module_does_not_load_statsmodels() -> None:
-    script = "import sys, shm.watch.state; sys.exit('statsmodels' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

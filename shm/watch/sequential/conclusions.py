@@ -171,7 +171,7 @@ def drifted(subject: Subject, bank: Bank, reading: Reading) -> tuple[Drift, ...]
         given_change = _given_any_change(bank, j, weights)
         shift = shift_of_mixture(quantity, given_change, mean[:, j], sd[:, j])
         moving = (sd[:, j] > 0) | (mean[:, j] != 0)
-        threshold = _threshold(subject, quantity)
+        threshold = threshold_of(quantity, subject.hanger)
         chance = beyond(quantity, weights[moving], mean[moving, j], sd[moving, j], threshold)
         found.append(_drift(subject, quantity, reading, shift, threshold, chance))
     return tuple(found)
@@ -207,13 +207,12 @@ def _shifts(bank: Bank) -> tuple[FloatArray, FloatArray]:
     return mean, np.sqrt(np.maximum(variance, 0))
 
 
-def _threshold(subject: Subject, quantity: WatchedQuantity) -> float:
-    limits = subject.hanger.thresholds
-    return (
-        limits.tension_shift_fraction
-        if quantity.name == TENSION
-        else limits.stiffness_shift_decades
-    )
+def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:
+    """The shift of which its owner must know: a fraction of the tension, or decades."""
+    limits = hanger.thresholds
+    if quantity.name == TENSION:
+        return limits.tension_shift_fraction
+    return limits.stiffness_shift_decades
 
 
 def _drift(

@@ -1,0 +1,176 @@
+"""Two tests that agree, whatever their clocks say and in whatever order they came.
+
+The sequential test counts its evidence in years: a change has had time to come only between two
+tests, and only tests dated before another speak for it there. A clock that hardly moves, or files
+that come in another order, would take the evidence away. So two tests next to each other, as they
+came in or by their clocks, that each read beyond the threshold to one side are told by themselves.
+
+One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
+thousand, and few of these read beyond a threshold, to one side and alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+import numpy as np
+
+from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
+from shm.watch.options import WatchOptions
+from shm.watch.quantities import shift_of, value_at
+from shm.watch.readings import Reader
+from shm.watch.sequential.conclusions import beyond, shift_of_mixture, threshold_of
+from shm.watch.wording import message_of_agreeing, short_name
+
+_CLEAR = 3.0
+"""Standard deviations from the baseline, temperature and scatter included: one good test in 740
+lies that far to one side, fewer than are blunders."""
+
+_PULL_STEPS = 10.0
+"""Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
+
+_TOLD = 2
+"""Tests that agree: as many as that were told when the second of them came."""
+
+Way = Literal["up", "down"]
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What one test says of one quantity by itself: its coordinate, and the variance of that."""
+
+    mean: float
+    variance: float
+
+
+def agreement(
+    reader: Reader,
+    newest: tuple[ModalTest, datetime],
+    beside: Beside,
+    hanger: Hanger,
+    options: WatchOptions,
+    told: Collection[tuple[str, Way]],
+) -> Alert | None:
+    """The alert of a test that is the second to show a shift beyond its threshold.
+
+    None where it shows none, no test beside it agrees, two that agree were there before it, or the
+    shift is `told` already.
+    """
+    for j, quantity in enumerate(reader.quantities):
+        own = _shown(reader, newest[0], j, hanger, options)
+        if own is None or (quantity.name, "down" if own.mean < 0 else "up") in told:
+            continue
+        runs = [
+            _run(reader, tests, own, j, hanger, options) for tests in (*beside.came, *beside.dated)
+        ]
+        others = [run[0] for run in runs if run]
+        if others and max(map(len, runs)) < _TOLD:
+            other, shown = others[0]
+            drift = _drift(quantity, newest, (own, shown), hanger)
+            return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
+    return None
+
+
+def _run(
+    reader: Reader,
+    tests: Sequence[ModalTest],
+    own: _Shown,
+    j: int,
+    hanger: Hanger,
+    options: WatchOptions,
+) -> list[tuple[ModalTest, _Shown]]:
+    """Of tests, the nearest first, those up to the first that does not agree."""
+    found: list[tuple[ModalTest, _Shown]] = []
+    for test in tests:
+        shown = _shown(reader, test, j, hanger, options)
+        if shown is None or not _agree(own, shown):
+            break
+        found.append((test, shown))
+    return found
+
+
+def _agree(one: _Shown, other: _Shown) -> bool:
+    apart = abs(one.mean - other.mean)
+    return one.mean * other.mean > 0 and apart < _CLEAR * math.sqrt(one.variance + other.variance)
+
+
+def _shown(
+    reader: Reader, test: ModalTest, j: int, hanger: Hanger, options: WatchOptions
+) -> _Shown | None:
+    """What a test shows of quantity `j`; None where that is not clear, or below its threshold."""
+    quantity = reader.quantities[j]
+    found = _read(reader, test, j, options)
+    is_beyond = abs(shift_of(quantity, found.mean)) >= threshold_of(quantity, hanger)
+    is_clear = abs(found.mean) >= _CLEAR * math.sqrt(found.variance)
+    return found if is_beyond and is_clear else None
+
+
+def _read(reader: Reader, test: ModalTest, j: int, options: WatchOptions) -> _Shown:
+    """With all that makes tests of an unchanged hanger differ: errors, scatter, temperature."""
+    reading = reader.reading(test, datetime.max)
+    quantity = reader.quantities[j]
+    pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
+    covariance = np.linalg.inv(reading.information + np.diag(pull))
+    kelvin = test.temperature_c - reader.reference_temperature_c
+    if not math.isfinite(kelvin):
+        kelvin = options.unknown_temperature_sd_k
+    if quantity.name == TENSION:
+        scatter, per_kelvin = max(options.tension_scatter), options.tension_per_kelvin_sd
+    else:
+        scatter = max(options.spring_scatter_of_step) * quantity.step_sd
+        per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
+    of_both = 2 * scatter**2  # a baseline of one test scatters as much
+    variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
+    return _Shown(float(reading.mean[j]), variance)
+
+
+def _drift(
+    quantity: WatchedQuantity,
+    newest: tuple[ModalTest, datetime],
+    both: tuple[_Shown, _Shown],
+    hanger: Hanger,
+) -> Drift:
+    """Of two tests that agree, as if what they share in error were of each alone: the larger."""
+    weights = [1 / each.variance for each in both]
+    x = float(np.average([each.mean for each in both], weights=weights))
+    sd = math.sqrt(max(each.variance for each in both))
+    alone = np.ones(1)
+    steps = alone * x / quantity.step_sd, alone * sd / quantity.step_sd
+    shift, threshold = shift_of_mixture(quantity, alone, *steps), threshold_of(quantity, hanger)
+    return Drift(
+        hanger=hanger.id,
+        test=newest[0].id,
+        time=newest[1],
+        quantity=quantity.name,
+        baseline=quantity.baseline,
+        value=value_at(quantity, x),
+        shift_mean=shift.mean,
+        shift_sd=shift.sd,
+        threshold=threshold,
+        probability=beyond(quantity, alone, *steps, threshold),
+    )
+
+
+def _alert(
+    drift: Drift,
+    newest: tuple[ModalTest, datetime],
+    other: ModalTest,
+    hanger: Hanger,
+    *,
+    is_held: bool,
+) -> Alert:
+    test, time = newest
+    way: Way = "down" if drift.shift_mean < 0 else "up"
+    return Alert(
+        key=f"hanger-{hanger.id}:two-tests-agree:{drift.quantity}-{way}:{short_name(test.id)}",
+        hanger=hanger.id,
+        test=test.id,
+        time=time,
+        message=message_of_agreeing(drift, hanger, (other.id, test.id), is_held=is_held),
+        drifts=(drift,),
+        kinds=("beyond threshold",),
+    )

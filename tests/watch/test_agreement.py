@@ -1,0 +1,120 @@
+"""Two tests that agree are told, whatever their clocks say and in whatever order they came."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from shm.inference import UpdateOptions
+from shm.models import build
+from shm.values import Alert, Beside, ModalTest, Thresholds
+from shm.watch import Newest, WatchOptions, watch_newest
+from tests.helpers import quick_update
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.workspaces import modelled_test
+
+BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
+SECOND = timedelta(seconds=1)
+LOST = 0.9
+
+
+def a_test(number: int, tension: float = LOST, temperature_c: float = 12.0) -> ModalTest:
+    """Dated a second after the one before it: the sequential test has no time for a change."""
+    test = modelled_test(f"t{number}", HANGER_3, tension=tension)
+    noise = np.random.default_rng(number).standard_normal(len(test.modes))
+    modes = tuple(
+        replace(mode, frequency_hz=hz, frequency_sd_hz=3e-4 * hz)
+        for mode, z in zip(test.modes, noise.tolist(), strict=True)
+        for hz in [mode.frequency_hz * (1 + 3e-4 * z)]
+    )
+    return replace(test, modes=modes, time=BEGIN + number * SECOND, temperature_c=temperature_c)
+
+
+def watch(newest: ModalTest, beside: Beside | None, later: Sequence[ModalTest] = ()) -> Newest:
+    first = a_test(0, 1.0)
+    options = UpdateOptions(samples=200, seed=1)
+    baseline = quick_update.update([first], build("beam1", HANGER_3), options)
+    dated = [(test, test.time or BEGIN) for test in (*later, newest)]
+    hanger = replace(HANGER_3, thresholds=Thresholds())
+    found = watch_newest(baseline, [(first, BEGIN)], dated, hanger, WatchOptions(), beside=beside)
+    assert found is not None
+    return found
+
+
+def told(newest: ModalTest, beside: Beside) -> Alert | None:
+    return watch(newest, beside).alert
+
+
+def came(*before: ModalTest, after: Sequence[ModalTest] = ()) -> Beside:
+    return Beside(came=(before, after))
+
+
+def test_the_second_of_two_is_told_and_says_which_and_how_far() -> None:
+    alert = told(a_test(2), came(a_test(1)))
+    assert alert is not None
+    assert alert.kinds == ("beyond threshold",)
+    assert alert.drifts[0].shift_mean == pytest.approx(-0.1, abs=0.02)
+    assert alert.drifts[0].probability > 0.95
+    assert alert.key == "hanger-3:two-tests-agree:tension-down:t2"
+    assert "Tests t1 and t2 both read beyond its threshold of 5 %." in alert.message
+    assert "Hanger 3: tension fell by" in alert.message
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [
+        Beside(came=([a_test(1)], [])),
+        Beside(came=([], [a_test(1)])),
+        Beside(dated=([a_test(1)], [])),
+        Beside(dated=([], [a_test(1)])),
+        Beside(came=([a_test(1, 1.0)], []), dated=([], [a_test(3)])),
+    ],
+)
+def test_it_may_stand_on_either_side_in_either_order(beside: Beside) -> None:
+    assert told(a_test(2), beside) is not None
+
+
+@pytest.mark.parametrize(
+    ("newest", "beside"),
+    [
+        (a_test(2), came()),  # it may be a blunder
+        (a_test(2), came(a_test(1, 1.0), a_test(3))),  # a sound one came between
+        (a_test(2), came(a_test(1, 1.1))),  # the other way
+        (a_test(2), came(a_test(1, 0.6))),  # of quite another size
+        (a_test(2, 0.96), came(a_test(1, 0.96))),  # below the threshold
+        (a_test(2, 0.93, 45.0), came(a_test(1, 0.93, 45.0))),  # it may be the warmth
+        (a_test(2, 1.0), came(a_test(1), a_test(3))),  # itself sound
+        (a_test(3), came(a_test(2), a_test(1))),  # the two before it have told it
+        (a_test(3), Beside(dated=([], [a_test(4), a_test(5)]))),
+        (a_test(3), Beside(came=([a_test(2)], []), dated=([a_test(2), a_test(1)], []))),
+    ],
+)
+def test_what_is_no_second_test_of_a_shift_is_not_told(newest: ModalTest, beside: Beside) -> None:
+    assert told(newest, beside) is None
+
+
+def test_a_held_test_is_named_as_one() -> None:
+    alert = told(a_test(2), replace(came(a_test(1)), held=["t1"]))
+    assert alert is not None
+    assert "Tests t1 (held for its clock) and t2 both" in alert.message
+
+
+def test_what_the_watch_has_told_is_not_told_again() -> None:
+    """Of tests a month apart it calls the loss itself, which says more."""
+    apart = [replace(a_test(n), time=BEGIN + n * timedelta(days=30)) for n in (1, 2, 3)]
+    second = watch(apart[1], came(apart[0]), apart[:1])
+    assert second.alert is not None
+    assert "two-tests" not in second.alert.key
+    assert watch(apart[2], came(apart[1]), apart[:2]).alert is None
+
+
+def test_two_blunders_in_a_row_are_rarely_alike() -> None:
+    """One in a hundred tests of any size from half to half as much again: of pairs in a row of
+    them, itself one in 10,000, not one in ten is told."""
+    rng = np.random.default_rng(5)
+    pairs = [(a_test(1, one), a_test(2, two)) for one, two in rng.uniform(0.5, 1.5, (100, 2))]
+    assert sum(told(second, came(first)) is not None for first, second in pairs) < 10
