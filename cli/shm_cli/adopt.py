@@ -97,7 +97,7 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bo
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
-        found = store.adoptions(hanger_id, undone=undone)
+        found = store.posteriors.list_adoptions(hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
     if as_json:
         show({"adoptions": documents})
@@ -140,8 +140,8 @@ def drop(
     with opened_store(ctx) as (workspace, store):
         workspace.bridge.hanger(hanger_id)
         chosen = _chosen(store, hanger_id, number)
-        made = store.drop_adoption(chosen.id, why, who or getpass.getuser(), utc_now())
-        model = store.selected_models()[hanger_id]
+        made = store.posteriors.drop_adoption(chosen.id, why, who or getpass.getuser(), utc_now())
+        model = store.posteriors.selected_models()[hanger_id]
     if as_json:
         show(_document(made))
         return
@@ -150,7 +150,7 @@ def drop(
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:
     """The adoption asked for, or the only one; raises NothingThere or UsageError."""
-    found = store.adoptions(hanger_id)
+    found = store.posteriors.list_adoptions(hanger_id)
     numbers = ", ".join(str(each.id) for each in found)
     if not found:
         raise NothingThere(

@@ -20,12 +20,12 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
     is superseded.
     """
     with workspace.store() as store:
-        recording_id, test = store.recording_named(which)
-        if stage is Stage.IDENTIFIED or store.damaged_tests(recording_id):
+        recording_id, test = store.recordings.find(which)
+        if stage is Stage.IDENTIFIED or store.upkeep.damaged_tests(recording_id):
             _refuse_without_raw_file(workspace, store, recording_id)
         for made in rebuild(workspace, store, recording_id, utc_now()):
             click.echo(made, err=True)
-        rerun = store.again(recording_id, stage, utc_now(), test)
+        rerun = store.recordings.reprocess(recording_id, stage, utc_now(), test)
     for sentence in sentences(rerun, stage):
         click.echo(sentence, err=True)
     try:
@@ -41,10 +41,10 @@ def _refuse_without_raw_file(workspace: Workspace, store: Store, recording_id: i
 
     And StoreError where it is damaged there: nothing is superseded for want of it.
     """
-    file = store.recording(recording_id).file
+    file = store.recordings.get(recording_id).file
     if workspace.archive.holds(file):
         return workspace.archive.refuse_damaged(file)
-    folder = store.removed_to().get(recording_id)
+    folder = store.upkeep.removed_to().get(recording_id)
     lies = f"; a copy lies in {folder}" if folder else ""
     raise NothingThere(
         f"the raw file {file.file_name} is no longer in the archive{lies}.",

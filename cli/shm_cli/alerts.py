@@ -52,7 +52,7 @@ def acknowledge(
     Example: shm alerts ack 4 --why "crew was there on 3 May: pin replaced"
     """
     with opened_store(ctx) as (_, store):
-        noted = store.acknowledge(alert_id, who or getpass.getuser(), why, utc_now())
+        noted = store.alerts.acknowledge(alert_id, who or getpass.getuser(), why, utc_now())
     if as_json:
         show({"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)})
         return
@@ -164,8 +164,8 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.hanger(hanger_id)
-        alerts = store.alerts(hanger_id)
-        deliveries = store.deliveries()
+        alerts = store.alerts.list_all(hanger_id)
+        deliveries = store.alerts.list_deliveries()
     rows = [_row(stored, deliveries) for stored in alerts]
     if as_json:
         show({"alerts": rows})

@@ -85,7 +85,7 @@ def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
     Example: shm archive fetch t7
     """
     with opened_store(ctx) as (workspace, store):
-        recording = store.recording(store.recording_named(which)[0])
+        recording = store.recordings.get(store.recordings.find(which)[0])
         held = workspace.archive.holds_whole(recording.file)
         folder = None if held else fetch(store, workspace.archive, recording)
     if as_json:

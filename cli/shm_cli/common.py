@@ -269,7 +269,7 @@ def tests_and_hanger(
         return tests, hanger
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
-        stored = store.tests(hanger.id)
+        stored = store.tests.list_all(hanger.id)
     if not stored:
         raise NothingThere(
             f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."

@@ -13,7 +13,6 @@ import rich_click as click
 
 from shm.errors import DamagedRow, StoreError, sentence
 from shm.store import Archive, Store, Workspace
-from shm.store.archive_copies import CopiedArchive, copy_archive
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
     CheckedArchive,
@@ -25,6 +24,7 @@ from shm.store.checking import (
 )
 from shm.store.copying import TableContent
 from shm.store.missing import MissingRow
+from shm.store.retention import CopiedArchive, copy_archive
 from shm_cli.common import (
     counting_bar,
     json_option,
@@ -73,9 +73,9 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
-            store.drop_damaged()
+            store.upkeep.drop_damaged()
             hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
-            made = sum(store.keep_summaries(hanger) for hanger in hangers)
+            made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
     if as_json:
         show({"store": location, "upgraded": True, "summed_up": made})
@@ -108,7 +108,7 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
     workspace = open_workspace(ctx)
     with workspace.store() as store, progress_bar("checking") as tell:
         if accepted is not None:
-            count = store.accept_missing(getpass.getuser(), accepted, datetime.now(UTC))
+            count = store.upkeep.accept_missing(getpass.getuser(), accepted, datetime.now(UTC))
             click.echo(f"Accepted as gone for good: {count} rows.", err=True)
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
@@ -160,11 +160,11 @@ def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -
     with workspace.store() as store, progress_bar("backup") as tell:
         written = back_up(store, file, tell)
         if copies is not None:
-            target, removed = Archive(copies), store.removed_names(workspace.archive)
+            target, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
             copied = copy_archive(workspace.archive, target, names, tell)
-            noted = store.note_copies(target, datetime.now(UTC))
-        store.note_backup(file.resolve(), datetime.now(UTC))
+            noted = store.upkeep.note_copies(target, datetime.now(UTC))
+        store.upkeep.note_backup(file.resolve(), datetime.now(UTC))
     if as_json:
         document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
         show({**document, "troubles": list(written.troubles)})

@@ -100,7 +100,7 @@ def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
     """
     tests = []
     for hanger in workspace.bridge.hangers:
-        measured = store.posterior(hanger.id) if hanger.id == MEASURED else None
+        measured = store.posteriors.get(hanger.id) if hanger.id == MEASURED else None
         for week in _weeks(hanger.id):
             tests.append(_planned(hanger, week, measured))
     return sorted(tests, key=lambda test: test.time)
@@ -247,10 +247,10 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes]) -> Iterator[int]:
     """How many recordings are through, again and again while the daemon lives."""
     deadline = time.monotonic() + _DAEMON_LIMIT_S
     while time.monotonic() < deadline and daemon.poll() is None:
-        refused = store.recordings(Stage.REFUSED)
+        refused = store.recordings.list_all(Stage.REFUSED)
         if refused:
             raise ShmError(f"a file of the demo was refused: {refused[0].reason}.")
-        yield store.stage_counts()[Stage.DONE]
+        yield store.recordings.stage_counts()[Stage.DONE]
         time.sleep(_POLL_S)
     raise ShmError("the demo's daemon did not finish.", remedy="Read daemon.log in its folder.")
 
@@ -258,7 +258,7 @@ def _watched(store: Store, daemon: subprocess.Popen[bytes]) -> Iterator[int]:
 def _await_alert(store: Store, daemon: subprocess.Popen[bytes]) -> Sequence[StoredAlert]:
     """The alerts, once the hook has had them."""
     for _ in _watched(store, daemon):
-        alerts, deliveries = store.alerts(), store.deliveries()
+        alerts, deliveries = store.alerts.list_all(), store.alerts.list_deliveries()
         if not alerts or all(delivery.state == "delivered" for delivery in deliveries):
             return alerts
     return ()

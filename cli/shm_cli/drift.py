@@ -113,7 +113,9 @@ def rebaseline(
         within = changes_within(store, hanger_id, order.since)
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
-        alerts = [each.id for each in store.alerts(hanger_id) if each.acknowledgement is None]
+        alerts = [
+            each.id for each in store.alerts.list_all(hanger_id) if each.acknowledgement is None
+        ]
     if as_json:
         show({**_document(made), "changes_within": [each.began_by for each in within]})
         return
@@ -181,9 +183,9 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
         if hanger_id is not None:
             hanger = workspace.bridge.hanger(hanger_id)
             hangers = [hanger_id]
-            states = hanger_states(workspace, store, hanger, store.baseline(hanger_id))
+            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
         shown = (
-            store.drifts(hanger_id)
+            store.watch.list_drifts(hanger_id)
             if all_tests
             else [drift for each in hangers for drift in latest_drifts(store, each)]
         )
@@ -215,7 +217,7 @@ command.add_command(bridge)
 
 def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
     """The baselines that were set by a person and with which no test has been compared yet."""
-    baselines = [store.baseline(hanger) for hanger in hangers]
+    baselines = [store.watch.baseline(hanger) for hanger in hangers]
     return [
         each for each in baselines if each and each.since and not latest_drifts(store, each.hanger)
     ]

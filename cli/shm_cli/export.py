@@ -52,8 +52,8 @@ def command(
     export.check_format(out, form)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
-        posterior = store.posterior(hanger_id, test)
-        tests = [store.test_named(hanger_id, name).test for name in posterior.tests]
+        posterior = store.posteriors.get(hanger_id, test)
+        tests = [store.tests.named(hanger_id, name).test for name in posterior.tests]
     with waiting("writing the samples"):
         _write(posterior, out, form, tests, hanger)
     if as_json:

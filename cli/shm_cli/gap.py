@@ -153,13 +153,13 @@ def _of_workspace(
 ) -> DiagnosisSheet:
     """The diagnosis of the latest tests, which the store keeps."""
     with opened_store(ctx) as (workspace, store):
-        stored = store.tests(hanger.id)[-count:]
+        stored = store.tests.list_all(hanger.id)[-count:]
         if not stored:
             raise NothingThere(
                 f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
             )
         found = _diagnosis([each.test for each in stored], hanger, options)
-        store.add_diagnosis(
+        store.posteriors.save_diagnosis(
             hanger.id, found, diagnosis_lineage(stored, hanger, asdict(options)), utc_now()
         )
     return DiagnosisSheet(found, hanger, workspace.bridge.name)

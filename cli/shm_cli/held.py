@@ -26,7 +26,7 @@ from shm_cli.working import LEFT_TO_IT, finish, working
 def show_held(workspace: Workspace, as_json: bool) -> int:
     """What nobody has decided on yet."""
     with workspace.store() as store:
-        found = store.holds()
+        found = store.recordings.list_holds()
     if as_json:
         show({"held": [hold_document(hold) for hold in found]})
         return 0
@@ -60,43 +60,43 @@ def decide(
     _refuse_impossible(time, workspace.bridge.built)
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:
-        known = {stored.id for stored in store.alerts()}
-        recording_id, test = store.recording_named(which)
+        known = {stored.id for stored in store.alerts.list_all()}
+        recording_id, test = store.recordings.find(which)
         held = _is_held(store, recording_id, test)
         if not held:
             _refuse_without_reason(store, recording_id, decision, why)
         withdrawal = None
         if decision is Decision.DISCARDED and held:
-            return Decided(store.discard(recording_id, who, why, utc_now()))
+            return Decided(store.recordings.discard(recording_id, who, why, utc_now()))
         if decision is Decision.DISCARDED:
-            withdrawal = store.withdraw(recording_id, who, why, utc_now(), test)
+            withdrawal = store.recordings.withdraw(recording_id, who, why, utc_now(), test)
             hold = withdrawal.hold
         elif held:
-            _refuse_copy_without_reason(store.latest_hold(recording_id), why)
-            hold = store.confirm(recording_id, who, why, utc_now(), time)
+            _refuse_copy_without_reason(store.recordings.latest_hold(recording_id), why)
+            hold = store.recordings.confirm(recording_id, who, why, utc_now(), time)
         else:
-            hold = store.reinstate(recording_id, who, why, utc_now(), time, test)
+            hold = store.recordings.reinstate(recording_id, who, why, utc_now(), time, test)
         try:
             with working(workspace) as flow:
                 finish(flow, [recording_id])
         except StoreBusy:
             click.echo(LEFT_TO_IT, err=True)
-        raised = [stored for stored in store.alerts() if stored.id not in known]
+        raised = [stored for stored in store.alerts.list_all() if stored.id not in known]
         return Decided(hold, raised, withdrawal)
 
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
     """Whether the recording waits for a decision, or that test of it."""
-    hold = store.latest_hold(recording_id)
+    hold = store.recordings.latest_hold(recording_id)
     if hold is None or hold.decision is not None:
         return False
-    present = [each for each in store.former_tests(recording_id) if each.superseded_at is None]
+    present = [each for each in store.tests.list_former(recording_id) if each.superseded_at is None]
     return test is None or any(t.name == test and t.stage is Stage.HELD for t in present)
 
 
 def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
     """What counts, or was decided on, is not turned round by one word."""
-    recording, hold = store.recording(recording_id), store.latest_hold(recording_id)
+    recording, hold = store.recordings.get(recording_id), store.recordings.latest_hold(recording_id)
     confirms = decision is Decision.CONFIRMED
     is_out = hold is not None and hold.is_out
     if why or (not is_out if confirms else recording.stage is Stage.REFUSED):

@@ -125,10 +125,10 @@ def command(
         refuse_oversize(sum(path.stat().st_size for path in files), most)
         files = (bundle(files, folder / f"{files[0].stem}.zip"),)
     with workspace.store() as store:
-        known = {stored.id for stored in store.alerts()}
+        known = {stored.id for stored in store.alerts.list_all()}
         receipts, unreadable = _ingest(workspace, files)
         rows = [_row_of(store, path, receipt) for path, receipt in receipts.items()]
-        raised = [stored.alert for stored in store.alerts() if stored.id not in known]
+        raised = [stored.alert for stored in store.alerts.list_all() if stored.id not in known]
     _show(rows + unreadable, raised, as_json)
     refused = any(row["outcome"] == _REFUSED for row in rows + unreadable)
     return BadInput.exit_code if refused else 0
@@ -168,7 +168,7 @@ def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> in
     which, record = about["confirm"] or about["discard"], (about["who"], about["why"])
     made = decide(workspace, which, decision, record, about["time"])
     with workspace.store() as store:
-        stage = store.recording(made.hold.recording_id).stage
+        stage = store.recordings.get(made.hold.recording_id).stage
     if as_json:
         alerts = [alert_document(stored.alert) for stored in made.alerts]
         show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts})
@@ -181,11 +181,11 @@ def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> in
 
 def _again(workspace: Workspace, which: str, stage: Stage, as_json: bool) -> int:
     with workspace.store() as store:
-        known = {stored.id for stored in store.alerts()}
+        known = {stored.id for stored in store.alerts.list_all()}
         rerun = send_back(workspace, which, stage)
-        recording = store.recording(rerun.recording.id)
+        recording = store.recordings.get(rerun.recording.id)
         row = _row(Path(recording.file.file_name), Outcome.REOPENED, recording)
-        raised = [stored.alert for stored in store.alerts() if stored.id not in known]
+        raised = [stored.alert for stored in store.alerts.list_all() if stored.id not in known]
     _show([row], raised, as_json, again=rerun_document(rerun, stage))
     return BadInput.exit_code if row["outcome"] == _REFUSED else 0
 
@@ -218,8 +218,8 @@ def _received(
 
 
 def _row_of(store: Store, path: Path, receipt: Receipt) -> dict[str, object]:
-    row = _row(path, receipt.outcome, store.recording(receipt.recording.id))
-    hold = store.discarded(receipt.recording.id)
+    row = _row(path, receipt.outcome, store.recordings.get(receipt.recording.id))
+    hold = store.recordings.discard_in_force(receipt.recording.id)
     if receipt.outcome is Outcome.DISCARDED and hold is not None:
         row |= {"outcome": Outcome.DISCARDED.value, "reason": discarded_words(hold)}
     return row

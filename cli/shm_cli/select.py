@@ -104,7 +104,7 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
     if hanger_id is None:
         return load_settings().model_names
     with opened_store(ctx) as (workspace, store):
-        adopted = [each.adoption.model for each in store.adoptions(hanger_id)]
+        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger_id)]
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
 
 

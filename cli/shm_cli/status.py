@@ -168,17 +168,17 @@ def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
-    alerts, deliveries = store.alerts(), store.delivery_counts()
+    alerts, deliveries = store.alerts.list_all(), store.alerts.delivery_counts()
     open_at = Counter(each.alert.hanger for each in alerts if each.acknowledgement is None)
-    counts = store.stage_counts()
+    counts = store.recordings.stage_counts()
     ended = sum(counts[stage] for stage in ENDED)
-    held = store.holds()
+    held = store.recordings.list_holds()
     return {
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
         "recordings": counts,
         "under_way": sum(counts.values()) - ended,
-        "oldest_waiting_at": store.oldest_waiting(),
+        "oldest_waiting_at": store.recordings.oldest_waiting(),
         "spool": len(scan(workspace.spool)),
         "never_taken": [
             {"path": str(path.relative_to(workspace.spool)), "what": what}
@@ -204,15 +204,15 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
 def _hangers(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int], held: Mapping[int, int]
 ) -> list[dict[str, Any]]:
-    models, latest, rows = store.selected_models(), store.latest_tests(), []
-    damage = {each.hanger: str(each) for each in store.known_damage()}
+    models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
+    damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
         try:
-            baseline, watch = store.baseline(hanger.id), gap_watch(store, hanger.id)
-            of_baseline = store.tests_of(baseline) if baseline else ()
-            adopted = [each.adoption.model for each in store.adoptions(hanger.id)]
+            baseline, watch = store.watch.baseline(hanger.id), gap_watch(store, hanger.id)
+            of_baseline = store.tests.of_baseline(baseline) if baseline else ()
+            adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
         except DamagedRow as error:
             damage[hanger.id] = str(error)
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
@@ -241,11 +241,16 @@ _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
     """Raises NothingThere where there is no such recording or test."""
     with opened_store(ctx) as (_, store):
-        recording_id, _ = store.recording_named(which)
-        recording = store.recording(recording_id)
-        steps, tests = store.steps(recording_id), store.former_tests(recording_id)
-        noticed = store.events(recording_id=recording_id)
-        other_names = [n for n in store.names_of(recording_id) if n != recording.file.file_name]
+        recording_id, _ = store.recordings.find(which)
+        recording = store.recordings.get(recording_id)
+        steps, tests = (
+            store.recordings.list_steps(recording_id),
+            store.tests.list_former(recording_id),
+        )
+        noticed = store.recordings.list_events(recording_id=recording_id)
+        other_names = [
+            n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
+        ]
     if as_json:
         show(
             {

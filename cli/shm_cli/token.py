@@ -40,7 +40,7 @@ def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
     from shm.store import Scope
 
     with opened_store(ctx) as (_, store):
-        secret = store.create_token(name, Scope(scope), utc_now())
+        secret = store.upkeep.create_token(name, Scope(scope), utc_now())
     if as_json:
         show({"name": name, "scope": scope, "token": secret})
         return
@@ -58,7 +58,7 @@ def list_tokens(ctx: click.Context, as_json: bool) -> None:
     Example: shm token list --json
     """
     with opened_store(ctx) as (_, store):
-        tokens = store.tokens()
+        tokens = store.upkeep.list_tokens()
     if as_json:
         show({"tokens": [{**vars(each), "scopes": sorted(each.scopes)} for each in tokens]})
         return
@@ -86,7 +86,7 @@ def revoke(ctx: click.Context, name: str, as_json: bool) -> None:
     from shm.pipeline import utc_now
 
     with opened_store(ctx) as (_, store):
-        store.revoke_token(name, utc_now())
+        store.upkeep.revoke_token(name, utc_now())
     if as_json:
         show({"name": name, "revoked": True})
         return

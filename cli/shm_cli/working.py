@@ -40,7 +40,9 @@ def finish(flow: Flow, ids: Sequence[int]) -> None:
         task = bar.add_task("ingesting", total=len(ids))
 
         def count() -> None:
-            through = sum(flow.store.recording(recording_id).stage in ENDED for recording_id in ids)
+            through = sum(
+                flow.store.recordings.get(recording_id).stage in ENDED for recording_id in ids
+            )
             bar.update(task, completed=through)
 
         flow.drain(count)

@@ -275,7 +275,7 @@ class Listener:
     def _is_received(self, sha256: str) -> bool:
         if self._store is None:
             self._store = self._workspace.store()
-        return self._store.recording_of(sha256) is not None
+        return self._store.recordings.with_checksum(sha256) is not None
 
 
 def _name(given: str, level: str, payload: bytes, sha256: str) -> str:

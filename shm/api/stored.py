@@ -55,22 +55,22 @@ class Store:
     def tests(self, hanger_id: int) -> tuple[ModalTest, ...]:
         """The modal tests of a hanger, oldest first; empty before the first."""
         self.hanger(hanger_id)
-        return tuple(stored.test for stored in self._store.tests(hanger_id))
+        return tuple(stored.test for stored in self._store.tests.list_all(hanger_id))
 
     def posterior(self, hanger_id: int, test_id: str | None = None) -> Posterior:
         """The latest posterior of a hanger, or that of one test; raises NothingThere."""
         self.hanger(hanger_id)
-        return self._store.posterior(hanger_id, test_id)
+        return self._store.posteriors.get(hanger_id, test_id)
 
     def posteriors(self, hanger_id: int) -> tuple[Posterior, ...]:
         """The posterior of each test that is through updating, oldest first: all samples."""
         self.hanger(hanger_id)
-        return tuple(posterior for _, posterior in self._store.history(hanger_id))
+        return tuple(posterior for _, posterior in self._store.posteriors.history(hanger_id))
 
     def selection(self, hanger_id: int) -> Selection:
         """The model classes compared on the hanger's first tests; raises NothingThere."""
         self.hanger(hanger_id)
-        found = self._store.selection(hanger_id)
+        found = self._store.posteriors.selection(hanger_id)
         if found is None:
             raise NothingThere(
                 f"no model class is selected for hanger {hanger_id} yet.",
@@ -81,7 +81,7 @@ class Store:
     def diagnosis(self, hanger_id: int) -> Diagnosis:
         """The latest gap diagnosis of a hanger; raises NothingThere."""
         self.hanger(hanger_id)
-        found = self._store.latest_diagnosis(hanger_id)
+        found = self._store.posteriors.latest_diagnosis(hanger_id)
         if found is None:
             raise NothingThere(
                 f"the gap of hanger {hanger_id} has not been diagnosed yet.",
@@ -95,13 +95,13 @@ class Store:
         Raises BadInput where a file gave the modes and holds no record.
         """
         stored = self._stored(hanger_id, test_id)
-        file = self._store.recording(stored.recording_id).file
+        file = self._store.recordings.get(stored.recording_id).file
         with self._workspace.archive.opened(file) as path:
             return read_test(path)
 
     def frequency_response(self, hanger_id: int, test_id: str) -> FrequencyResponse:
         """What the modes of a test were identified from; raises NothingThere where none is kept."""
-        found = self._store.frequency_response(self._stored(hanger_id, test_id))
+        found = self._store.tests.frequency_response(self._stored(hanger_id, test_id))
         if found is None:
             raise NothingThere(
                 f"no frequency response of test {test_id} is kept.",
@@ -115,7 +115,7 @@ class Store:
 
     def _stored(self, hanger_id: int, test_id: str) -> StoredTest:
         self.hanger(hanger_id)
-        return self._store.test_named(hanger_id, test_id)
+        return self._store.tests.named(hanger_id, test_id)
 
     def __enter__(self) -> Self:
         return self

@@ -66,11 +66,11 @@ def _percent(value: float) -> str:
 
 def gap_watch(store: Store, hanger: int) -> GapWatch | None:
     """The gap of the class that a hanger has adopted last; None where none is in force."""
-    adopted = store.adoptions(hanger)
+    adopted = store.posteriors.list_adoptions(hanger)
     if not adopted:
         return None
     made = adopted[-1].adoption
-    latest, baseline = store.posterior(hanger), store.baseline(hanger)
+    latest, baseline = store.posteriors.get(hanger), store.watch.baseline(hanger)
     since = latest.model == made.model and (
         baseline is None or latest.tests != baseline.posterior.tests
     )
@@ -92,8 +92,8 @@ def adopt(
     met, BadInput where the class cannot describe the tests of the baseline.
     """
     before, baseline = _in_force(store, hanger)
-    diagnosis = store.latest_diagnosis(hanger.id)
-    tests = store.tests(hanger.id)
+    diagnosis = store.posteriors.latest_diagnosis(hanger.id)
+    tests = store.tests.list_all(hanger.id)
     name = adopted_name(wish.effects, wish.at, wish.baseline, hanger, diagnosis, tests)
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
@@ -111,11 +111,11 @@ def adopt(
     competing = [*before.selection.posteriors, posterior]
     models = [class_of(each, hanger) for each in competing]
     probabilities = class_probabilities(competing, models, measured)
-    return store.adopt(adoption, posterior, probabilities, (before, chosen), lineage, at)
+    return store.posteriors.adopt(adoption, posterior, probabilities, (before, chosen), lineage, at)
 
 
 def _in_force(store: Store, hanger: Hanger) -> tuple[StoredSelection, Baseline]:
-    selection, baseline = store.selection(hanger.id), store.baseline(hanger.id)
+    selection, baseline = store.posteriors.selection(hanger.id), store.watch.baseline(hanger.id)
     if selection is None or baseline is None:
         raise NothingThere(
             f"hanger {hanger.id} has no baseline yet, and so no gap.",
@@ -126,7 +126,7 @@ def _in_force(store: Store, hanger: Hanger) -> tuple[StoredSelection, Baseline]:
 
 def _refuse_second(store: Store, hanger: Hanger, model: str) -> None:
     """Said before the work is done, not after."""
-    if any(each.adoption.model == model for each in store.adoptions(hanger.id)):
+    if any(each.adoption.model == model for each in store.posteriors.list_adoptions(hanger.id)):
         raise UsageError(
             f"hanger {hanger.id} has adopted {model} already.", remedy="See `shm gap adopted`."
         )

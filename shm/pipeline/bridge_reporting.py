@@ -16,7 +16,7 @@ from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
 from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
-from shm.store.listing import of_readable
+from shm.store.checksums import of_readable
 from shm.values import TENSION, Change, Drift, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
@@ -37,7 +37,7 @@ def bridge_report(
         )
     courses = _courses(store, hangers, period) if period else {}
     if period and not any(course.tests for course in courses.values()):
-        latest = store.latest_trends(hangers)
+        latest = store.posteriors.latest_trends(hangers)
         newest = max(latest.values(), key=lambda point: point.time)
         raise NothingThere(
             f"no test of any hanger lies in the period {period}.",
@@ -78,13 +78,13 @@ class _Kept:
 
     @classmethod
     def of(cls, store: Store, hangers: Sequence[Hanger]) -> _Kept:
-        damaged = {row.hanger: row for row in store.known_damage() if row.hanger is not None}
+        damaged = {row.hanger: row for row in store.upkeep.known_damage() if row.hanger is not None}
         return cls(
-            store.latest_trends(hangers),
-            store.baselines_in_force(hangers),
-            of_readable(store.latest_watches, damaged),
-            of_readable(store.called_changes, damaged),
-            store.open_alert_counts(),
+            store.posteriors.latest_trends(hangers),
+            store.watch.baselines_in_force(hangers),
+            of_readable(store.watch.latest, damaged),
+            of_readable(store.watch.detected_changes, damaged),
+            store.alerts.open_counts(),
             damaged,
         )
 
@@ -119,9 +119,11 @@ class _Kept:
 
 def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:
     """What became of each hanger in the period."""
-    raised = Counter(each.alert.hanger for each in store.alerts() if period.holds(each.alert.time))
+    raised = Counter(
+        each.alert.hanger for each in store.alerts.list_all() if period.holds(each.alert.time)
+    )
     return {
-        hanger.id: _course(store.trend(hanger, period.since), raised[hanger.id])
+        hanger.id: _course(store.posteriors.trend(hanger, period.since), raised[hanger.id])
         for hanger in hangers
     }
 
@@ -145,8 +147,8 @@ def latest_drifts(store: Store, hanger: int, model: str | None = None) -> tuple[
 
     None where no test has been compared with it, as after the hanger was given a new one.
     """
-    baseline = store.baseline(hanger, model)
-    told = store.telling_watches(baseline) if baseline else ()
+    baseline = store.watch.baseline(hanger, model)
+    told = store.watch.list_detected_and_latest(baseline) if baseline else ()
     return told[-1].watched.drifts if told else ()
 
 
@@ -160,7 +162,7 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
 
 def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]:
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
-    latest, before_c = of_readable(store.latest_watches, {}), store.baseline_temperatures()
+    latest, before_c = of_readable(store.watch.latest, {}), store.watch.baseline_temperatures()
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
     changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}
@@ -173,5 +175,5 @@ def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
     drifts = latest.watched.drifts
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
-    watches = store.watches(latest.hanger, latest.baseline_id)
+    watches = store.watch.list_all(latest.hanger, latest.baseline_id)
     return [drift for watch in watches for drift in watch.watched.drifts]

@@ -104,7 +104,7 @@ class Flow:
         self._running: dict[tuple[str, int], Running] = {}
         self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
         self._damaged: dict[int, datetime] = {}  # hangers that stand still, and until when
-        deaths = store.deaths()
+        deaths = store.recordings.deaths()
         self._suspects = set(deaths)
         self._postponed = {key: each.last_at + _pause(each) for key, each in deaths.items()}
         self.use(workspace)
@@ -112,7 +112,7 @@ class Flow:
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge; raises UsageError where it is wrong."""
-        selected = self.store.selected_models()
+        selected = self.store.posteriors.selected_models()
         for hanger in workspace.bridge.hangers:
             competing(hanger, workspace.settings, {})
             competing(hanger, workspace.settings, selected)
@@ -250,7 +250,7 @@ class Flow:
     def _stop(self, job: Job, error: DamagedRow) -> None:
         """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""
         self._hold(job, error.retry_after_s or _AGAIN_S)
-        if self.store.note_damage(error, self.clock()):
+        if self.store.upkeep.note_damage(error, self.clock()):
             log.error("%s %s stands still: %s", *job.key, error, extra=_about(job))
 
     def _hold(self, job: Job, seconds: float) -> None:
@@ -279,8 +279,8 @@ class Flow:
         death = Death.FROM_OUTSIDE if outside else Death.BY_ITSELF
         for recording_id in job.recordings:
             noted = death if running.alone else Death.BESIDE_OTHERS
-            self.store.died(recording_id, noted, _how_it_died(error), now)
-        known = self.store.deaths()
+            self.store.recordings.note_death(recording_id, noted, _how_it_died(error), now)
+        known = self.store.recordings.deaths()
         deaths = [known.get(key, Deaths(0, 0, now)) for key in job.recordings]
         if len(deaths) == 1 and _is_enough(deaths[0]):
             self._refuse(job, _refusal(deaths[0], error))
@@ -298,11 +298,11 @@ class Flow:
         if not isinstance(error, ShmError):
             log.error("%s %s failed", *job.key, exc_info=error, extra=_about(job))
         for recording_id in job.recordings:
-            if not self.store.waits(recording_id, job.stage, job.tests):
+            if not self.store.recordings.is_waiting(recording_id, job.stage, job.tests):
                 continue
-            recording, now = self.store.recording(recording_id), self.clock()
+            recording, now = self.store.recordings.get(recording_id), self.clock()
             reason = reason_document(error, recording, now)
-            if self.store.events(Outcome.REDESCRIBED, recording_id=recording_id):
+            if self.store.recordings.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
                 reason["remedy"] += _NO_MORE
             name, archive = recording.file.file_name, self.workspace.archive
             try:
@@ -313,7 +313,7 @@ class Flow:
                 if damage.retry_after_s is not None:
                     raise
                 log.error("%s is not laid in the quarantine: %s", name, damage)
-            self.store.refuse(recording_id, reason, now, job.tests, stage=job.stage)
+            self.store.recordings.refuse(recording_id, reason, now, job.tests, stage=job.stage)
             about = {**_about(job), "recording": recording_id, "file": name}
             why = (reason["message"], reason["remedy"])
             log.warning("%s is refused: %s %s", name, *why, extra=about)
@@ -328,7 +328,7 @@ class Flow:
         refused = isinstance(error, DeliveryRefused)
         again = not refused and delivery.attempts + 1 < settings.hook_attempts
         next_attempt_at = now + wait if again else None
-        self.store.delivery_failed(delivery, str(error), now, next_attempt_at)
+        self.store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
         about = {**_about_alert(delivery.alert), "hook": delivery.hook}
         end = "" if again else "; given up: nobody is told of it by this hook"
         said = "hook %s failed on %s: %s%s"

@@ -87,7 +87,7 @@ def receive(
         kept_sidecar.archived_as if kept_sidecar else None,
         modified_at,
     )
-    receipt = store.receive(file, at)
+    receipt = store.recordings.receive(file, at)
     if spooled:
         _remove(path, kept, kept_sidecar, sharing or Sharing())
     return receipt
@@ -127,9 +127,9 @@ def _set_aside(
         "sha256": None,
     }
     lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    said = {event.message for event in store.events("refused", file_name=name)}
+    said = {event.message for event in store.recordings.list_events("refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start
-        store.refused_unread(name, error.message, at)
+        store.recordings.refuse_unread(name, error.message, at)
 
 
 def _place(path: Path, spool: Path) -> tuple[Path, bool]:

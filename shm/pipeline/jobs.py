@@ -92,12 +92,12 @@ class Jobs:
         earliest of its tests make the baseline; a watch waits for the files that came in before its
         test, so that what it says does not depend on which step was the faster.
         """
-        received = self.store.waiting_recordings(limit, excluding=held)
+        received = self.store.recordings.list_waiting(limit, excluding=held)
         for recording in received:
             yield Job(
                 ("identify", recording.id), partial(self._identify, recording), (recording.id,)
             )
-        selected = self.store.selected_models()
+        selected = self.store.posteriors.selected_models()
         waiting = self._waiting_tests(limit, held)
         oldest = min((recording.id for recording in received), default=None)
         for hanger in self.workspace.bridge.hangers:
@@ -118,7 +118,9 @@ class Jobs:
             return
         ids = [delivery.id for delivery in under_way]
         waits = [wait_after(count, self.workspace.settings) for count in range(_DOUBLINGS)]
-        for delivery in self.store.due_deliveries(self.clock(), 2 * DELIVERIES, ids, waits):
+        for delivery in self.store.alerts.list_due_deliveries(
+            self.clock(), 2 * DELIVERIES, ids, waits
+        ):
             if taken[delivery.hook] < _DELIVERIES_A_HOOK and taken.total() < DELIVERIES:
                 taken[delivery.hook] += 1
                 prepare = partial(self._deliver, notifier, delivery)
@@ -129,7 +131,7 @@ class Jobs:
     ) -> defaultdict[int, list[WaitingTest]]:
         waiting: defaultdict[int, list[WaitingTest]] = defaultdict(list)
         most = max(limit, self.workspace.settings.baseline_tests)
-        for test in self.store.waiting_tests(most, excluding=held):
+        for test in self.store.tests.list_waiting(most, excluding=held):
             waiting[test.hanger].append(test)
         return waiting
 
@@ -152,14 +154,16 @@ class Jobs:
 
     def _untaught(self, tests: Sequence[WaitingTest]) -> Iterator[WaitingTest]:
         """Tests up to the first whose tension was read: later ones learn from its posterior."""
-        weighed = self.store.weighed_among([test.id for test in tests]) if len(tests) > 1 else ()
+        weighed = (
+            self.store.tests.weighed_among([test.id for test in tests]) if len(tests) > 1 else ()
+        )
         for test in tests:
             yield test
             if test.id in weighed:
                 return
 
     def _identify(self, recording: StoredRecording) -> Step:
-        workspace, selected = self.workspace, self.store.selected_models()
+        workspace, selected = self.workspace, self.store.posteriors.selected_models()
         settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
@@ -172,10 +176,10 @@ class Jobs:
         """What is implausible is held: kept with the rest, and counted in nothing."""
         lineage = identify_lineage(recording, found[0].test.hanger, self.workspace)
         found, judged = judge(self.workspace, self.store, recording, found)
-        return self.store.identified(recording.id, found, lineage, self.clock(), judged)
+        return self.store.tests.save(recording.id, found, lineage, self.clock(), judged)
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
-        tests = [self.store.test(test.id) for test in first]
+        tests = [self.store.tests.get(test.id) for test in first]
         names = competing_names(hanger, self.workspace.settings.model_names)
         settings = self.workspace.settings
         taught = self.taught(hanger, min(test.time for test in tests))
@@ -184,13 +188,16 @@ class Jobs:
         run = partial(run_step, registered().select, plain, hanger, names, terms)
 
         def keep(found: Selection) -> None:
-            self.store.selected(hanger.id, tests, found, lineage, self.clock())
-            self.store.keep_summaries(hanger)
+            self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
+            self.store.posteriors.save_summaries(hanger)
 
         return Step(run, keep)
 
     def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
-        test, baseline = self.store.test(waiting.id), self.store.baseline(hanger.id, model)
+        test, baseline = (
+            self.store.tests.get(waiting.id),
+            self.store.watch.baseline(hanger.id, model),
+        )
         # Not the latest posterior: a result must not depend on which tests were computed before.
         known = baseline.posterior if baseline else None
         settings, taught = self.workspace.settings, self.taught(hanger, test.time)
@@ -201,8 +208,8 @@ class Jobs:
 
         def keep(found: Posterior) -> None:
             now, to_watch = self.clock(), not makes_baseline
-            self.store.updated(test, found, lineage, now, to_watch=to_watch)
-            self.store.keep_summaries(hanger)
+            self.store.posteriors.save(test, found, lineage, now, to_watch=to_watch)
+            self.store.posteriors.save_summaries(hanger)
 
         return Step(run, keep)
 
@@ -215,33 +222,33 @@ class Jobs:
             for each in self.workspace.bridge.hangers
             if hanger.family and each.family == hanger.family and each.id != hanger.id
         ]
-        own = self.store.weighed_test([hanger.id], before)
-        weighed = own or (self.store.weighed_test(siblings, before) if siblings else None)
+        own = self.store.tests.latest_weighed([hanger.id], before)
+        weighed = own or (self.store.tests.latest_weighed(siblings, before) if siblings else None)
         if weighed is None:
             return None
         try:
-            posterior = self.store.posterior_of(weighed)
+            posterior = self.store.posteriors.of_test(weighed)
         except NothingThere:  # not through updating yet
             return None
         return Taught(posterior, own is not None)
 
     def _makes_baseline(self, test: StoredTest, model: str) -> bool:
         """Whether a test, done again, would be compared with what it has made itself."""
-        baseline = self.store.baseline(test.hanger, model, test.time)
+        baseline = self.store.watch.baseline(test.hanger, model, test.time)
         return baseline is not None and test.test.id in baseline.posterior.tests
 
     def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
-        test = self.store.test(waiting.id)
-        current = self.store.posterior_of(test)
+        test = self.store.tests.get(waiting.id)
+        current = self.store.posteriors.of_test(test)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
-        baseline = self.store.baseline(hanger.id, current.model, test.time)
+        baseline = self.store.watch.baseline(hanger.id, current.model, test.time)
         if baseline is None:
             raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
         limit_years = self.workspace.settings.false_call_years
         needed = to_watch(self.store, baseline, test)
         tests = (needed.baseline_tests, needed.later)
-        selection = self.store.selection(hanger.id)
+        selection = self.store.posteriors.selection(hanger.id)
         compared = None if selection is None else selection.selection
         tension = averaged_now(current, compared, hanger.limits)
         beside = tests_beside(self.store, baseline, test)
@@ -250,18 +257,18 @@ class Jobs:
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
-                self.store.forget_watch(baseline)
+                self.store.watch.forget_state(baseline)
                 return None
             watched, alert, content = found
             state = KeptWatch(needed.key, test.time, content)
-            return self.store.watched(test, baseline, watched, alert, hooks, self.clock(), state)
+            return self.store.watch.save(test, baseline, watched, alert, hooks, self.clock(), state)
 
         return Step(run, keep)
 
     def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}
         run = partial(_notify, notifier, hooks.get(delivery.hook), delivery)
-        return Step(run, lambda _: self.store.delivered(delivery, self.clock()))
+        return Step(run, lambda _: self.store.alerts.save_delivery(delivery, self.clock()))
 
 
 def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[WaitingTest]) -> Job:

@@ -40,7 +40,7 @@ def judge(
     gave it.
     """
     sidecar_as, fingerprint = recording.file.sidecar_as, found[0].fingerprint
-    decided = store.decided(recording.id, sidecar_as)
+    decided = store.recordings.decisions(recording.id, sidecar_as)
     out = tuple(n for n, hold in decided.items() if hold.is_out)
     if set(out) >= {item.position for item in found}:  # sent anew, to be asked of once more
         out = ()
@@ -73,10 +73,10 @@ def _candidate(
     found: Sequence[IdentifiedTest],
 ) -> Candidate:
     test, hanger = item.test, workspace.bridge.hanger(item.test.hanger or 0)
-    earlier = store.latest_tests_before(hanger.id, recording.id, _LATEST)
-    baseline = store.baseline(hanger.id, time=_possible(test.time))
-    reference = store.tests_of(baseline) if baseline else earlier
-    at_once = store.tests_at(hanger.id, test.time, recording.id) if test.time else ()
+    earlier = store.tests.latest_before(hanger.id, recording.id, _LATEST)
+    baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
+    reference = store.tests.of_baseline(baseline) if baseline else earlier
+    at_once = store.tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
     print_ = item.fingerprint
     return Candidate(
         hanger=hanger,
@@ -92,11 +92,11 @@ def _candidate(
         reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
         arrived=[
-            each.test for each in store.latest_tests_received(hanger.id, recording.id, _LATEST)
+            each.test for each in store.tests.latest_received(hanger.id, recording.id, _LATEST)
         ],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
-        copies=store.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        copies=store.tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
         signals=item.signals,
         others=[
             (other, [each.test for each in _latest_of(store, other, recording)])
@@ -109,9 +109,9 @@ def _candidate(
 def _latest_of(store: Store, hanger: Hanger, recording: StoredRecording) -> Sequence[StoredTest]:
     """Of another hanger; none where a row of it is damaged, which must not stop this one."""
     try:
-        return store.latest_tests_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
+        return store.tests.latest_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
     except DamagedRow as error:
-        store.note_damage(error, recording.received_at)
+        store.upkeep.note_damage(error, recording.received_at)
         return ()
 
 
@@ -130,7 +130,7 @@ def _notice(
     leading = max(held, key=lambda each: np.nan_to_num(abs(each.tension_shift)))
     candidate = candidates[leading.position]
     hanger = candidate.hanger.id
-    clocks = [hold for hold in store.holds(hanger) if hold.is_for_its_clock]
+    clocks = [hold for hold in store.recordings.list_holds(hanger) if hold.is_for_its_clock]
     others = [test.tension_shift for hold in clocks for test in hold.tests]
     others += [test.tension_shift for test in held if test is not leading]
     counted = {test.id: test for test in (*candidate.earlier, *candidate.arrived)}

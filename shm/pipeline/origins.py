@@ -18,7 +18,7 @@ _LIBRARIES = ("numpy", "scipy", "pyOMA-2", "emcee")
 
 def test_lineage(store: Store, test: StoredTest) -> dict[str, str]:
     """The file of a test, the checksums of what its modes come from, the software."""
-    file = store.recording(test.recording_id)
+    file = store.recordings.get(test.recording_id)
     return {
         "file_name": file.file.file_name,
         "file_sha256": file.file.sha256,

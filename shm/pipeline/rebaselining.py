@@ -43,7 +43,7 @@ def rebaseline(
     worked through; BadInput where the class in force cannot describe the tests; StoreBusy where
     another baseline came in meanwhile.
     """
-    before = store.baseline(hanger.id)
+    before = store.watch.baseline(hanger.id)
     if before is None:
         raise NothingThere(
             f"hanger {hanger.id} has no baseline yet, and so none to replace.",
@@ -60,23 +60,23 @@ def rebaseline(
         hint=before.posterior,
     )
     record = (order.who, order.why, order.since)
-    return store.rebaseline(before, posterior, chosen, record, lineage, at)
+    return store.watch.rebaseline(before, posterior, chosen, record, lineage, at)
 
 
 def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, ...]:
     """The changes called of a hanger that lie among its tests since then: a baseline of these would
     be made of two states."""
-    times = [test.time for test in store.tests(hanger) if test.time >= since]
+    times = [test.time for test in store.tests.list_all(hanger) if test.time >= since]
     return tuple(
         each
-        for each in store.called_changes().get(hanger, ())
+        for each in store.watch.detected_changes().get(hanger, ())
         if times and min(times) <= each.began_after and max(times) >= each.began_by
     )
 
 
 def _since(store: Store, hanger: Hanger, since: datetime) -> tuple[StoredTest, ...]:
     """Tests of then and later that have been watched: those on their way are later ones."""
-    tests = store.tests(hanger.id)
+    tests = store.tests.list_all(hanger.id)
     found = [test for test in tests if test.time >= since and test.stage is Stage.WATCHED]
     if not found:
         latest = f"its latest is of {tests[-1].time:%Y-%m-%d}" if tests else "it has none at all"

@@ -21,20 +21,20 @@ def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime)
     description or settings no longer take it.
     """
     said = []
-    dropped = store.drop_damaged(recording_id)
+    dropped = store.upkeep.drop_damaged(recording_id)
     if dropped:
         said.append(f"Damaged rows that are made again by themselves, removed: {dropped}.")
-    damaged = store.damaged_tests(recording_id)
+    damaged = store.upkeep.damaged_tests(recording_id)
     if damaged:
-        recording, selected = store.recording(recording_id), store.selected_models()
+        recording, selected = store.recordings.get(recording_id), store.posteriors.selected_models()
         terms = (workspace.bridge, workspace.settings, selected)
         found = run_step(registered().identify, recording, workspace.archive, *terms)
         lineage = identify_lineage(recording, found[0].test.hanger, workspace)
-        store.heal_tests(damaged, found, lineage)
+        store.upkeep.heal_tests(damaged, found, lineage)
         said.append(f"Damaged tests, identified again from the archive: {len(damaged)}.")
-    posteriors = store.damaged_posteriors(recording_id)
+    posteriors = store.upkeep.damaged_posteriors(recording_id)
     for each in posteriors:
-        tests = [store.test(test_id) for test_id in each.tests]
+        tests = [store.tests.get(test_id) for test_id in each.tests]
         hanger = workspace.bridge.hanger(tests[0].hanger)
         taught = Jobs(workspace, store, lambda: at).taught(hanger, min(t.time for t in tests))
         options, lineage = update_terms(
@@ -42,7 +42,7 @@ def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime)
         )
         plain = [test.test for test in tests]
         selection = run_step(registered().select, plain, hanger, [each.model], options)
-        store.heal_posterior(each.id, selection.selected, tests, lineage, at)
+        store.upkeep.heal_posterior(each.id, selection.selected, tests, lineage, at)
     if posteriors:
         said.append(f"Damaged posteriors, made again from their tests: {len(posteriors)}.")
     return said

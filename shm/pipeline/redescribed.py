@@ -31,7 +31,7 @@ def redescribed(hanger: Hanger, baseline: Baseline | None) -> tuple[str, ...]:
 
 def discarded_of(store: Store, baseline: Baseline | None) -> tuple[str, ...]:
     """The tests of a baseline that count no more, by name: a person has discarded them since."""
-    tests = () if baseline is None else store.tests_of(baseline)
+    tests = () if baseline is None else store.tests.of_baseline(baseline)
     return tuple(each.test.id for each in tests if each.stage == Stage.REFUSED)
 
 

@@ -41,13 +41,13 @@ def hanger_report(
     """
     hanger = workspace.bridge.hanger(hanger_id)
     now = hanger_now(workspace, store, hanger, _trend(store, hanger, period), generated_at)
-    latest = store.test_named(hanger_id, now.latest.id)
+    latest = store.tests.named(hanger_id, now.latest.id)
     return replace(
         now,
         alerts=tuple(each for each in now.alerts if period is None or period.holds(each.time)),
-        frequency_response=store.frequency_response(latest),
+        frequency_response=store.tests.frequency_response(latest),
         states=hanger_states(
-            workspace, store, hanger, store.baseline(hanger_id, now.posterior.model)
+            workspace, store, hanger, store.watch.baseline(hanger_id, now.posterior.model)
         ),
         neighbours=_neighbours(workspace, store) if now.is_called else None,
         period=period,
@@ -65,11 +65,14 @@ def hanger_now(
 
     Those are its frequency response, its states over time and what moved over the bridge.
     """
-    latest = store.test_named(hanger.id, trend[-1].test)
-    posterior = store.posterior(hanger.id, latest.test.id)
-    selection, baseline = store.selection(hanger.id), store.baseline(hanger.id, posterior.model)
-    diagnosis, watch = store.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
-    watched, alerts = _watched_against(store, baseline), store.alerts(hanger.id)
+    latest = store.tests.named(hanger.id, trend[-1].test)
+    posterior = store.posteriors.get(hanger.id, latest.test.id)
+    selection, baseline = (
+        store.posteriors.selection(hanger.id),
+        store.watch.baseline(hanger.id, posterior.model),
+    )
+    diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
+    watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     return HangerReport(
         bridge=workspace.bridge.name,
         hanger=hanger,
@@ -90,16 +93,16 @@ def hanger_now(
         is_called=any(each.change.called for each in watched),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),
-        redescribed=redescribed(hanger, store.baseline(hanger.id)),
-        discarded=discarded_of(store, store.baseline(hanger.id)),
+        redescribed=redescribed(hanger, store.watch.baseline(hanger.id)),
+        discarded=discarded_of(store, store.watch.baseline(hanger.id)),
     )
 
 
 def _trend(store: Store, hanger: Hanger, period: Period | None) -> tuple[TrendPoint, ...]:
-    points = store.trend(hanger, period.since if period else None)
+    points = store.posteriors.trend(hanger, period.since if period else None)
     if points:
         return points
-    latest = store.latest_trends([hanger]).get(hanger.id)
+    latest = store.posteriors.latest_trends([hanger]).get(hanger.id)
     if latest is None:
         raise NothingThere(
             f"no test of hanger {hanger.id} has been through updating yet.",
@@ -133,7 +136,7 @@ def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
 
 def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
     """The watches that call a change, and the latest one."""
-    found = store.telling_watches(baseline) if baseline else ()
+    found = store.watch.list_detected_and_latest(baseline) if baseline else ()
     return tuple(each.watched for each in found)
 
 
@@ -163,9 +166,9 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
     Raises NothingThere for an unknown test and for one whose modes a file gave.
     """
     hanger = workspace.bridge.hanger(hanger_id)
-    stored = store.test_named(hanger_id, name)
-    recording = store.recording(stored.recording_id)
-    if store.frequency_response(stored) is None and not stored.quality:
+    stored = store.tests.named(hanger_id, name)
+    recording = store.recordings.get(stored.recording_id)
+    if store.tests.frequency_response(stored) is None and not stored.quality:
         raise NothingThere(
             f"{recording.file.file_name} gave the modes of {name}, not what they come from.",
             remedy="Ask for a test that was identified here.",

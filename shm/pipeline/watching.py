@@ -36,11 +36,11 @@ class ToWatch:
 
 def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
     """What the watch of a test needs; how many tests there were before costs next to nothing."""
-    before, kept = store.watched_since(baseline, newest), store.kept_watch(baseline)
+    before, kept = store.watch.list_watched(baseline, newest), store.watch.state(baseline)
     key = _key([*before, WatchedName(newest.id, newest.test.id, newest.time)])
     if kept is None or kept.key != _key(before):
         return ToWatch(*dated_tests(store, baseline, newest), None, key)
-    return ToWatch(_dated(store.tests_of(baseline)), _dated([newest]), kept.content, key)
+    return ToWatch(_dated(store.tests.of_baseline(baseline)), _dated([newest]), kept.content, key)
 
 
 def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
@@ -48,9 +48,13 @@ def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside
 
     What is held for its clock alone came in as any other: what it measured is in no doubt.
     """
-    by_clock = [hold.recording_id for hold in store.holds(newest.hanger) if hold.is_for_its_clock]
-    came = store.tests_that_came_beside(baseline, newest, _BESIDE, by_clock)
-    dated = store.tests_dated_beside(baseline, newest, _BESIDE)
+    by_clock = [
+        hold.recording_id
+        for hold in store.recordings.list_holds(newest.hanger)
+        if hold.is_for_its_clock
+    ]
+    came = store.tests.received_beside(baseline, newest, _BESIDE, by_clock)
+    dated = store.tests.dated_beside(baseline, newest, _BESIDE)
     held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
     return Beside(_plain(came), _plain(dated), held)
 
@@ -66,9 +70,11 @@ def dated_tests(
     store: Store, baseline: Baseline, newest: StoredTest | None = None
 ) -> tuple[list[DatedTest], list[DatedTest]]:
     """The tests of a baseline, and those since that were watched, up to and with `newest`."""
-    watched = {each.id for each in store.watched_since(baseline, newest)}
-    later = [each for each in store.tests(baseline.hanger) if each.id in watched]
-    return _dated(store.tests_of(baseline)), _dated([*later, *([newest] if newest else [])])
+    watched = {each.id for each in store.watch.list_watched(baseline, newest)}
+    later = [each for each in store.tests.list_all(baseline.hanger) if each.id in watched]
+    return _dated(store.tests.of_baseline(baseline)), _dated(
+        [*later, *([newest] if newest else [])]
+    )
 
 
 def _dated(tests: Sequence[StoredTest]) -> list[DatedTest]:

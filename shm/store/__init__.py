@@ -2,8 +2,9 @@
 
 from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
-from shm.store.deaths import Death, Deaths
-from shm.store.glances import (
+from shm.store.decisions import Withdrawal
+from shm.store.holding import Judged
+from shm.store.list_rows import (
     AlertRow,
     BaselineGlance,
     DeliveryRow,
@@ -12,10 +13,24 @@ from shm.store.glances import (
     Numbers,
     TestRow,
     TrendPoint,
+    WaitingTest,
+    WatchedName,
 )
-from shm.store.hold_rows import Decision, HeldTest, Hold
-from shm.store.judging import Judged
-from shm.store.queries import WaitingTest, WatchedName
+from shm.store.recording_rows import (
+    Death,
+    Deaths,
+    Decision,
+    Event,
+    HeldTest,
+    Hold,
+    Outcome,
+    Receipt,
+    ReceivedFile,
+    Rerun,
+    Step,
+    StoredRecording,
+)
+from shm.store.reprocessing import AGAIN_FROM
 from shm.store.rows import (
     ENDED,
     Acknowledgement,
@@ -23,31 +38,22 @@ from shm.store.rows import (
     Baseline,
     Delivery,
     DeliveryState,
-    Event,
     FormerPosterior,
     FormerTest,
     IdentifiedTest,
     KeptWatch,
     Lineage,
-    Outcome,
-    Receipt,
-    ReceivedFile,
-    Rerun,
     Stage,
-    Step,
     StoredAdoption,
     StoredAlert,
     StoredDiagnosis,
     StoredPosterior,
-    StoredRecording,
     StoredSelection,
     StoredTest,
     StoredWatch,
 )
 from shm.store.store import Store
-from shm.store.superseding import AGAIN_FROM
-from shm.store.tokens import Scope, StoredToken
-from shm.store.withdrawing import Withdrawal
+from shm.store.upkeep import Scope, StoredToken
 from shm.store.workspace import Workspace
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import sqlalchemy as sa
@@ -10,29 +10,14 @@ from sqlalchemy.engine import Connection
 
 from shm.errors import DamagedRow, sentence
 from shm.store.archive import Archive, checksum
-from shm.store.blobs import (
-    alert_from_document,
-    change_from,
-    posterior_from,
-    test_from_document,
-    unpack,
-)
-from shm.store.checksums import (
-    RESTORE,
-    Values,
-    checksum_of,
-    content_checksum,
-    damaged,
-    key_of,
-    loads,
-)
-from shm.store.columns import Document
+from shm.store.checksums import RESTORE
 from shm.store.copying import Rows, TableContent, Tell, contents
+from shm.store.damage import damaged_among
 from shm.store.database import Database
 from shm.store.missing import MissingRow, missing_rows
 from shm.store.schema import changed_objects
-from shm.store.tables import APART, recordings
-from shm.store.upkeep import Upkeep
+from shm.store.store import Store
+from shm.store.tables import recordings
 
 
 @dataclass(frozen=True)
@@ -181,60 +166,9 @@ def read_rows(connection: Connection, tell: Tell, troubles: tuple[str, ...] = ()
     return CheckedStore(tables, (*troubles, *map(str, rows)), tuple(rows))
 
 
-def damaged_among(table: sa.Table, rows: Rows) -> Iterator[DamagedRow]:
-    """Those of some rows, read without types, that are damaged."""
-    for row in rows:
-        if not (_as_written(table, row) and _can_be_decoded(table, row)):
-            key = key_of(table, row)
-            yield damaged(table, key[0] if len(key) == 1 else key, _hanger(row))
-
-
-def _as_written(table: sa.Table, row: Values) -> bool:
-    """A row without a checksum was written by something else than shm, or lost it."""
-    apart = APART.get(table.name)
-    if apart and content_checksum(row[apart]) != row[f"{apart}_checksum"]:
-        return False
-    return bool(row["checksum"] == checksum_of(table, row))
-
-
-def _can_be_decoded(table: sa.Table, row: Values) -> bool:
-    """Whether its documents and arrays can be read: of a row that was damaged before there were
-    checksums that is all that can be told."""
-    try:
-        for column in table.columns:
-            if isinstance(column.type, Document):
-                loads(row[column.name])
-        if table.name in _DECODERS:
-            _DECODERS[table.name](row)
-    except Exception:  # noqa: BLE001 - damaged bytes fail in any way
-        return False
-    return True
-
-
-def _decode_test(row: Values) -> None:
-    test_from_document(loads(row["document"]), row["hanger"])
-    if row["frequency_response"] is not None:
-        unpack(row["frequency_response"])
-
-
-# What is made of the contents of a row. What the watch keeps is its own affair, and may be thrown
-# away at will; diagnoses of former versions are of other forms.
-_DECODERS: Mapping[str, Callable[[Values], object]] = {
-    "tests": _decode_test,
-    "posteriors": lambda row: posterior_from(loads(row["document"]), row["samples"]),
-    "watches": lambda row: change_from(loads(row["document"])),
-    "alerts": lambda row: alert_from_document(loads(row["document"])),
-}
-
-
-def _hanger(row: Values) -> int | None:
-    hanger = row.get("hanger")
-    return hanger if isinstance(hanger, int) else None
-
-
-def check_archive(store: Upkeep, archive: Archive, tell: Tell) -> CheckedArchive:
+def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
     """Reads every raw file that the store refers to and compares it with its name, a SHA-256."""
-    referenced, removed = archived_names(store), store.removed_names(archive)
+    referenced, removed = archived_names(store), store.upkeep.removed_names(archive)
     names = [name for name in referenced if name not in removed]
     missing, damaged = [], []
     for number, name in enumerate(names, start=1):

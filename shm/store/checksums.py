@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache, lru_cache
@@ -153,7 +153,7 @@ HEALING: Mapping[str, str] = {
 }
 """What to do about a damaged row, by table; of all others a backup is the only source.
 
-The row itself is named, as `recording_named` finds its recording; what it says may be wrong."""
+The row itself is named, as `Recordings.find` finds its recording; what it says may be wrong."""
 
 
 def loads(text: Any) -> Any:
@@ -253,3 +253,17 @@ def note_damage(error: DamagedRow) -> None:
 @lru_cache(1000)
 def _log_once(message: str) -> None:
     log.error("%s", message)
+
+
+def of_readable(
+    ask: Callable[[Collection[int]], Mapping[int, _T]], damaged: dict[int, DamagedRow]
+) -> Mapping[int, _T]:
+    """What `ask` says of all hangers but those with a damaged row, which are put into `damaged`."""
+    while True:
+        try:
+            return ask(damaged)
+        except DamagedRow as error:
+            if error.hanger is None or error.hanger in damaged:
+                raise
+            note_damage(error)
+            damaged[error.hanger] = error

@@ -137,15 +137,11 @@ def insert(connection: Connection, table: sa.Table, values: Mapping[str, Any]) -
     return int((result.inserted_primary_key or (0,))[0])
 
 
-class Database:
-    """One database and its transactions; the verbs of the store stand on it."""
+class Repository:
+    """Verbs on one database; each is one transaction."""
 
     def __init__(self, engine: Engine):
         self.engine = engine
-        self.location = shown(engine.url)
-
-    def close(self) -> None:
-        self.engine.dispose()
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
@@ -160,3 +156,14 @@ class Database:
         """One consistent view that holds up nobody; raises StoreError."""
         with reading(self.engine) as connection:
             yield connection
+
+
+class Database(Repository):
+    """One database, to be closed by who opened it."""
+
+    def __init__(self, engine: Engine):
+        super().__init__(engine)
+        self.location = shown(engine.url)
+
+    def close(self) -> None:
+        self.engine.dispose()

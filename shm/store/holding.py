@@ -1,9 +1,9 @@
-"""Verbs on what is held: listed, confirmed, discarded; and what a new recording is judged by."""
+"""Rows of what is held and of what people decide of it, within the caller's transaction."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -12,16 +12,14 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.blobs import test_from_document
+from shm.store.blobs import number as number_from
+from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import by_id, counts, end_recording, end_tests, in_force, write_event
-from shm.store.hold_rows import Decision, Hold
-from shm.store.judging import fingerprint_from, held_tests_from, notice_key
-from shm.store.queries import Queries, plain_tests
-from shm.store.results import advance_recordings
-from shm.store.rows import Stage, StoredTest
-from shm.store.stepping import write_step
+from shm.store.files import in_force, write_event, write_step
+from shm.store.outbox import raise_alert
+from shm.store.recording_rows import Decision, HeldTest, Hold
+from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
     acknowledgements,
     alerts,
@@ -31,142 +29,149 @@ from shm.store.tables import (
     recordings,
     tests,
 )
-from shm.values import Fingerprint, KnownSamples
+from shm.values import Alert, Doubt, Fingerprint
 
-_MOST_COMPARED = (
-    1000  # recordings of a hanger: some 20 MB, at most 110; older ones are found by their digest
-)
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
 
-class Holding(Queries):
-    """The part of the store that keeps account of what is held."""
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What plausibility says of a recording with the sidecar that it was judged with.
 
-    def holds(self, hanger: int | None = None) -> tuple[Hold, ...]:
-        """What nobody has decided on yet, the oldest first; of one hanger where named."""
-        query = _holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
-        if hanger is not None:
-            query = query.where(recordings.c.hanger == hanger)
-        with self.reading() as connection:
-            return tuple(_hold(row) for row in connection.execute(query))
+    `held` are its tests that are held, `notice` what to tell of that; None where none is.
+    `fingerprint` is that of its samples, None where it has none. `out` are the places in the file
+    of tests that a person has discarded with this sidecar: they stay so.
+    """
 
-    def latest_hold(self, recording_id: int) -> Hold | None:
-        """Why a recording is or was last held, and what a person made of it."""
-        with self.reading() as connection:
-            row = _latest(connection, recording_id)
-        return None if row is None else _hold(row)
+    sidecar_as: str | None
+    fingerprint: Fingerprint | None = None
+    held: tuple[HeldTest, ...] = ()
+    notice: Alert | None = None
+    hooks: Sequence[str] = ()
+    out: tuple[int, ...] = ()
 
-    def discarded(self, recording_id: int) -> Hold | None:
-        """The decision by which a recording is out; None where it counts, or was refused since."""
-        with self.reading() as connection:
-            return standing_discard(connection, by_id(connection, recording_id))
 
-    def confirm(
-        self,
-        recording_id: int,
-        who: str,
-        why: str,
-        at: datetime,
-        time: datetime | None = None,
-    ) -> Hold:
-        """Lets the held tests of a recording count from now on; the hold with that decision.
+def keep_judgement(
+    connection: Connection, recording: Row[Any], judged: Judged, at: datetime
+) -> StoredAlert | None:
+    """Holds what is in doubt; the notice of that, None where nothing is."""
+    if judged.fingerprint is not None:
+        _keep_fingerprint(connection, recording.id, judged.fingerprint)
+    for position in judged.out:
+        _mark(connection, recording.id, position, Stage.REFUSED, at)
+    if judged.notice is None:
+        return None
+    held = _hold_tests(connection, recording.id, judged.held, at)
+    document = {
+        "message": judged.notice.message,
+        "sidecar_as": judged.sidecar_as,
+        "tests": [asdict(test) for test in judged.held],
+    }
+    row = {"recording_id": recording.id, "held_at": at, "document": document}
+    hold_id = insert(connection, holds, row)
+    reason = reason_of(recording, judged.notice.message, at)
+    by_id = recordings.c.id == recording.id
+    connection.execute(sa.update(recordings).where(by_id).values(reason=reason))
+    write_event(connection, at, "held", recording.id, recording.file_name, reason["message"])
+    notice = replace(judged.notice, key=notice_key(judged.notice.hanger, hold_id))
+    leading = held[notice.test]
+    return raise_alert(connection, leading, None, notice, judged.hooks, at)
 
-        `time` is the true time of its test; without it, one whose time is certainly wrong counts
-        from its receipt. Raises NothingThere where there is no such recording, UsageError where it
-        is not held, or where the time cannot be right.
-        """
-        with self.writing() as connection:
-            hold = _undecided(connection, recording_id)
-            _refuse_time(hold, time, at)
-            for row in _held(connection, recording_id):
-                values = confirmed_values(connection, row, hold, time, who)
-                this = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
-                write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
-            own = sa.update(recordings).where(recordings.c.id == recording_id)
-            connection.execute(own.values(reason=None))
-            advance_recordings(connection, [recording_id], at)
-            decided = replace(hold, decision=Decision.CONFIRMED, time=time)
-            return _decide(connection, decided, who, why, at)
 
-    def discard(self, recording_id: int, who: str, why: str, at: datetime) -> Hold:
-        """Ends the held tests of a recording; its raw file stays in the archive.
+def notice_key(hanger: int, hold_id: int) -> str:
+    """The key of the notice of a hold: once for each time that a recording is held."""
+    return f"hanger-{hanger}:held-{hold_id}"
 
-        Raises NothingThere where there is no such recording, UsageError where it is not held.
-        """
-        with self.writing() as connection:
-            hold = _undecided(connection, recording_id)
-            end_tests(
-                connection, recording_id, [row.id for row in _held(connection, recording_id)], at
-            )
-            reason = connection.scalar(
-                sa.select(recordings.c.reason).where(recordings.c.id == recording_id)
-            )
-            decided = replace(hold, decision=Decision.DISCARDED, decided_at=at, who=who, why=why)
-            told = {"message": discarded_reason(decided), "remedy": taking_back(decided)}
-            end_recording(connection, recording_id, {**(loads(reason) or {}), **told}, at)
-            return _decide(connection, decided, who, why, at)
 
-    def known_samples(
-        self, recording_id: int, hanger: int, fingerprint: Fingerprint
-    ) -> tuple[KnownSamples, ...]:
-        """Recordings that may hold the same samples: those of the hanger, and the same numbers of
-        any other; the earliest first, as the others may be copies of it."""
-        same_numbers = fingerprints.c.digest == fingerprint.digest
-        query = (
-            sa.select(fingerprints, *(recordings.c[n] for n in ("file_name", "hanger", "stage")))
-            .join(recordings)
-            .where(
-                (recordings.c.hanger == hanger) | same_numbers,
-                _before(recordings.c.id, recordings.c.stage, recording_id),
-            )
-            .order_by(same_numbers.desc(), recordings.c.id.desc())
-            .limit(_MOST_COMPARED)
+def fingerprint_from(row: Row[Any]) -> Fingerprint:
+    """Marks, noise and places are missing in those of before there were such."""
+    return Fingerprint(row.digest, **unpack(row.shapes))
+
+
+def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
+    """The tests of a hold back from its document."""
+    return tuple(
+        HeldTest(
+            each["position"],
+            each["name"],
+            tuple(_doubt_from(doubt) for doubt in each["doubts"]),
+            number_from(each["tension_shift"]),
         )
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
-        return tuple(
-            KnownSamples(
-                f"{row.file_name} (recording {row.recording_id})",
-                row.hanger,
-                fingerprint_from(row),
-                row.recording_id,
-                row.stage != Stage.HELD,
-            )
-            for row in sorted(rows, key=lambda row: int(row.recording_id))
-        )
+        for each in document["tests"]
+    )
 
-    def tests_at(self, hanger: int, time: datetime, recording_id: int) -> tuple[StoredTest, ...]:
-        """Tests of a hanger with the very same time, in other recordings."""
-        others = _before(tests.c.recording_id, tests.c.stage, recording_id)
-        same = (tests.c.hanger == hanger) & (tests.c.taken_at == time) & in_force(tests)
-        return self._tests(plain_tests.where(same, others).order_by(tests.c.id))
 
-    def latest_tests_before(
-        self, hanger: int, recording_id: int, limit: int
-    ) -> tuple[StoredTest, ...]:
-        """The latest tests of a hanger that count, but for those of one recording, by time."""
-        return self._latest_but(hanger, recording_id, limit, tests.c.time)
+def _doubt_from(document: Mapping[str, Any]) -> Doubt:
+    return Doubt(**{**document, "instead_of": tuple(document.get("instead_of", ()))})
 
-    def latest_tests_received(
-        self, hanger: int, recording_id: int, limit: int
-    ) -> tuple[StoredTest, ...]:
-        """Those of them that came in last, whatever their time."""
-        return self._latest_but(hanger, recording_id, limit, tests.c.recording_id)
 
-    def _latest_but(
-        self, hanger: int, recording_id: int, limit: int, order: sa.Column[Any]
-    ) -> tuple[StoredTest, ...]:
-        mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
-        query = plain_tests.where(mine, counts(tests), in_force(tests))
-        latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
-        return self._tests(latest)[::-1]
+def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
+    former = fingerprints.c.recording_id == recording_id
+    connection.execute(sa.delete(fingerprints).where(former))
+    arrays = ("shapes", "marks", "noise", "places")
+    shapes = pack(**{name: getattr(found, name) for name in arrays})
+    row = {"recording_id": recording_id, "digest": found.digest, "shapes": shapes}
+    connection.execute(sa.insert(fingerprints).values(row))
+
+
+def _hold_tests(
+    connection: Connection, recording_id: int, held: Sequence[HeldTest], at: datetime
+) -> dict[str, int]:
+    """Marks the tests that are held; their numbers by the name that they came with."""
+    return {
+        test.name: _mark(connection, recording_id, test.position, Stage.HELD, at) for test in held
+    }
+
+
+def _mark(
+    connection: Connection, recording_id: int, position: int, stage: Stage, at: datetime
+) -> int:
+    """Brings the test at a place of a file to a stage; its number."""
+    own = (tests.c.recording_id == recording_id) & in_force(tests)
+    here = own & (tests.c.position == position)
+    number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
+    connection.execute(sa.update(tests).where(here).values(stage=stage))
+    write_step(connection, recording_id, stage, at, number)
+    return number
+
+
+def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "") -> dict[str, Any]:
+    """Why a recording is held, or counts no more."""
+    return {
+        "schema": "shm.reason/1",
+        "file": recording.file_name,
+        "line": None,
+        "channel": None,
+        "message": message,
+        "remedy": remedy,
+        "time": at,
+        "sha256": recording.sha256,
+    }
+
+
+def open_holds(connection: Connection, hanger: int | None = None) -> tuple[Hold, ...]:
+    """What nobody has decided on yet, the oldest first; of one hanger where named."""
+    query = _holds.where(holds.c.decision.is_(None)).order_by(holds.c.id)
+    if hanger is not None:
+        query = query.where(recordings.c.hanger == hanger)
+    return tuple(_hold(row) for row in connection.execute(query))
 
 
 def holds_of(connection: Connection, recording_id: int) -> tuple[Hold, ...]:
     """All holds of a recording and decisions on it, the oldest first."""
     query = _holds.where(holds.c.recording_id == recording_id).order_by(holds.c.id)
     return tuple(_hold(row) for row in connection.execute(query))
+
+
+def latest_hold(connection: Connection, recording_id: int) -> Hold | None:
+    """Why a recording is or was last held, and what a person made of it."""
+    row = _latest(connection, recording_id)
+    return None if row is None else _hold(row)
+
+
+def _latest(connection: Connection, recording_id: int) -> Row[Any] | None:
+    query = _holds.where(holds.c.recording_id == recording_id)
+    return connection.execute(query.order_by(holds.c.id.desc()).limit(1)).one_or_none()
 
 
 def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None:
@@ -204,23 +209,11 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
     row = _latest(connection, recording_id)
     if row is not None and row.decision is None:
         hold = replace(_hold(row), decision=Decision.REPLACED)
-        _decide(connection, hold, "shm", "done again", at)
+        decide(connection, hold, "shm", "done again", at)
 
 
-def _before(
-    id_: sa.Column[int], stage: sa.Column[str], recording_id: int
-) -> sa.ColumnElement[bool]:
-    """Other rows that count or, of those received before, are held: never a copy made later."""
-    held_before = (stage == Stage.HELD) & (id_ < recording_id)
-    return (id_ != recording_id) & (stage.not_in([Stage.REFUSED, Stage.HELD]) | held_before)
-
-
-def _latest(connection: Connection, recording_id: int) -> Row[Any] | None:
-    query = _holds.where(holds.c.recording_id == recording_id)
-    return connection.execute(query.order_by(holds.c.id.desc()).limit(1)).one_or_none()
-
-
-def _undecided(connection: Connection, recording_id: int) -> Hold:
+def undecided(connection: Connection, recording_id: int) -> Hold:
+    """The hold of a recording that waits for a decision; raises NothingThere or UsageError."""
     row = _latest(connection, recording_id)
     if row is None or row.decision is not None:
         known = sa.select(recordings.c.id).where(recordings.c.id == recording_id)
@@ -238,7 +231,8 @@ def _undecided(connection: Connection, recording_id: int) -> Hold:
     return _hold(row)
 
 
-def _refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
+def refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
+    """Raises UsageError where the time that a person gives a held test cannot be right."""
     if time is None:
         return
     if len(hold.tests) > 1:
@@ -250,7 +244,8 @@ def _refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
         raise UsageError("that time is yet to come.", remedy="Give it as 2026-05-01T10:00:00Z.")
 
 
-def _held(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
+def held_rows(connection: Connection, recording_id: int) -> Sequence[Row[Any]]:
+    """The tests of a recording that are held, each with the time of its receipt."""
     own = (tests.c.recording_id == recording_id) & (tests.c.stage == Stage.HELD)
     query = sa.select(tests, recordings.c.received_at).join(recordings)
     return connection.execute(query.where(own, in_force(tests)).order_by(tests.c.id)).all()
@@ -281,7 +276,7 @@ def time_note(hold: Hold, time: datetime | None, who: str) -> str:
     return f"time {given}, confirmed by {who}{why}"
 
 
-def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> Hold:
+def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> Hold:
     """Notes a decision, and with it that the notice was seen to its end."""
     made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
     connection.execute(sa.update(holds).where(holds.c.id == hold.id).values(**made))

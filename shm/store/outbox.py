@@ -1,4 +1,4 @@
-"""An alert and what is owed of it to hooks, written within the caller's transaction."""
+"""Rows of alerts and what is owed of them to hooks, within the caller's transaction."""
 
 from __future__ import annotations
 
@@ -7,13 +7,22 @@ from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection
+from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document
+from shm.errors import DamagedRow
+from shm.store.blobs import alert_from_document
+from shm.store.checksums import decoding, loads, note_damage
 from shm.store.database import insert
-from shm.store.rows import DeliveryState, StoredAlert
-from shm.store.tables import alerts, deliveries
+from shm.store.rows import Acknowledgement, DeliveryState, StoredAlert
+from shm.store.tables import acknowledgements, alerts, deliveries, tests
 from shm.values import Alert
+
+stored_alerts = sa.select(
+    alerts,
+    tests.c.name.label("test"),
+    *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
+).select_from(alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id))
 
 
 def raise_alert(
@@ -51,3 +60,26 @@ def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
         "next_attempt_at": at,
         "last_error": "",
     }
+
+
+def stored_alert(row: Row[Any]) -> StoredAlert:
+    """An alert and its acknowledgement, of a row of `stored_alerts`."""
+    return StoredAlert(row.id, alert_of(row), row.raised_at, acknowledgement_of(row))
+
+
+def alert_of(row: Row[Any]) -> Alert:
+    """An alert that was raised is told even where its document is damaged: as much as is left."""
+    try:
+        with decoding(alerts, row, row.hanger):
+            return alert_from_document(loads(row.document))
+    except DamagedRow as error:
+        note_damage(error)
+        message = f"{row.message} (Details are lost: {error.message})"
+        return Alert(row.key, row.hanger, row.test or "", row.time, message, ())
+
+
+def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
+    """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
+    if row.ack_at is None:
+        return None
+    return Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)

@@ -1,4 +1,4 @@
-"""What may leave the archive and the quarantine: old files of which a whole copy lies elsewhere.
+"""Second copies of raw files, and what may leave the archive and the quarantine for having one.
 
 A copy counts only if it is another file than the one here and has its SHA-256 at the moment of the
 removal; that it was noted once is not enough. Rows and results always stay.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -17,8 +17,10 @@ from typing import Any
 from shm.errors import NothingThere, StoreError
 from shm.read import sidecar_path
 from shm.store.archive import Archive, checksum, is_whole
+from shm.store.checking import file_troubles
 from shm.store.copying import Tell
-from shm.store.rows import Stage, StoredRecording
+from shm.store.recording_rows import StoredRecording
+from shm.store.rows import Stage
 from shm.store.store import Store
 
 REASON_SUFFIX = ".reason.json"
@@ -28,6 +30,20 @@ _NO_COPY = "no copy is noted"
 _COPY_LOST = "no noted copy is whole"
 _SHARED = "another recording needs its file"
 _UNDER_WAY = "not through yet"
+
+
+@dataclass(frozen=True)
+class CopiedArchive:
+    """What came of copying an archive: files copied now and before, and what could not be."""
+
+    copied: int
+    present: int
+    missing: tuple[str, ...]
+    damaged: tuple[str, ...]
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        return file_troubles(self.missing, self.damaged)
 
 
 @dataclass(frozen=True)
@@ -63,10 +79,33 @@ class Refused:
     sha256: str
 
 
+def copy_archive(
+    source: Archive, target: Archive, names: Collection[str], tell: Tell
+) -> CopiedArchive:
+    """Copies files of one archive, by their path in it, into another; what is there stays.
+
+    Raises ShmError with `retry_after_s` where the disk is full.
+    """
+    target.folder.mkdir(parents=True, exist_ok=True)
+    copied, present = 0, 0
+    missing, damaged = [], []
+    for number, name in enumerate(names, start=1):
+        if _has(target, source, name):
+            present += 1
+        elif not (source.folder / name).is_file():
+            missing.append(name)
+        elif target.keep(source.folder / name, follow=True).archived_as == name:
+            copied += 1
+        else:  # it went to where its content belongs, which is not where its name says
+            damaged.append(name)
+        tell("archive", number / len(names))
+    return CopiedArchive(copied, present, tuple(missing), tuple(damaged))
+
+
 def removable(store: Store, archive: Archive, before: datetime, tell: Tell) -> Retention:
     """The raw files here of recordings that were received before a time and may go."""
     folders = _folders(store)
-    everything = store.recordings()
+    everything = store.recordings.list_all()
     old = [each for each in everything if each.received_at < before and archive.holds(each.file)]
     kept: Counter[str] = Counter()
     found: dict[int, str] = {}
@@ -99,10 +138,10 @@ def remove(store: Store, archive: Archive, removals: Iterable[Removal], at: date
     """
     freed = 0
     for removal in removals:
-        ended = store.recording(removal.recording.id).stage in _ENDED
+        ended = store.recordings.get(removal.recording.id).stage in _ENDED
         if not ended or _copy(archive, removal.recording, [removal.copy_folder]) is None:
             continue
-        store.note_removed(removal.recording, removal.copy_folder, at)
+        store.upkeep.note_removed(removal.recording, removal.copy_folder, at)
         for name in removal.names:
             path = archive.folder / name
             freed += _size(path)
@@ -143,7 +182,7 @@ def expendable(store: Store, archive: Archive, files: Iterable[Refused]) -> tupl
     folders = _folders(store)
     kept = []
     for file in files:
-        recording = store.recording_of(file.sha256)
+        recording = store.recordings.with_checksum(file.sha256)
         if recording is not None and recording.file.archived_as is not None:
             places = [str(archive.folder), *folders[recording.id]]
             name = recording.file.archived_as
@@ -160,10 +199,18 @@ def empty_quarantine(files: Iterable[Refused]) -> None:
         file.reason.unlink(missing_ok=True)
 
 
+def _has(target: Archive, source: Archive, name: str) -> bool:
+    """Files appear in an archive whole or not at all, so one of the right size is the right one."""
+    path, original = target.folder / name, source.folder / name
+    if not path.is_file():
+        return False
+    return not original.is_file() or original.stat().st_size == path.stat().st_size
+
+
 def _folders(store: Store) -> defaultdict[int, list[str]]:
     """Where copies of each recording were noted, the newest first."""
     found: defaultdict[int, list[str]] = defaultdict(list)
-    for copy in reversed(store.archive_copies()):
+    for copy in reversed(store.upkeep.list_copies()):
         found[copy.recording_id].append(copy.folder)
     return found
 

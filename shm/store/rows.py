@@ -42,17 +42,6 @@ ENDED = (Stage.DONE, Stage.REFUSED, Stage.HELD)
 """Where a recording waits for no step: it is through, or for a person to look at."""
 
 
-class Outcome(StrEnum):
-    """What came of receiving a file."""
-
-    NEW = "new"
-    RESUMED = "resumed"  # the same spool entry, after a crash before it was removed
-    DUPLICATE = "duplicate"  # the same bytes dropped again
-    REOPENED = "reopened"  # refused before, dropped again: tried again
-    DISCARDED = "discarded before"  # a person discarded it, dropped again: it stays so
-    REDESCRIBED = "redescribed"  # the same bytes with another sidecar: done again with that
-
-
 class DeliveryState(StrEnum):
     """What has become of a delivery."""
 
@@ -113,42 +102,6 @@ class Lineage:
 def checksum_of(document: object) -> str:
     """SHA-256 of a document's JSON text, as 64 hexadecimal digits."""
     return hashlib.sha256(dump(document).encode()).hexdigest()
-
-
-@dataclass(frozen=True)
-class ReceivedFile:
-    """A file as it came in; `archived_as` and `sidecar_as` are relative to the archive.
-
-    `modified_at` is when the file was last written, as its folder says; copying resets that.
-    """
-
-    sha256: str
-    file_name: str
-    size_bytes: int
-    arrival: str
-    archived_as: str | None = None
-    sidecar_as: str | None = None
-    modified_at: datetime | None = None
-
-
-@dataclass(frozen=True)
-class StoredRecording:
-    """A file that was taken in and how far it has come; `reason` says why it was refused."""
-
-    id: int
-    file: ReceivedFile
-    received_at: datetime
-    stage: Stage
-    hanger: int | None = None
-    reason: Mapping[str, Any] | None = None
-
-
-@dataclass(frozen=True)
-class Receipt:
-    """What came of taking a file in."""
-
-    outcome: Outcome
-    recording: StoredRecording
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,20 +285,6 @@ class Delivery:
 
 
 @dataclass(frozen=True)
-class Step:
-    """A stage that a recording or, where one is named, a test of it has reached.
-
-    `version` is that of the shm that brought it there; None where it was not noted.
-    """
-
-    stage: str
-    at: datetime
-    version: str | None
-    test_id: int | None = None
-    test: str | None = None
-
-
-@dataclass(frozen=True)
 class FormerPosterior:
     """A posterior of one test, in force or superseded, without its samples."""
 
@@ -368,29 +307,3 @@ class FormerTest:
     superseded_at: datetime | None
     lineage: Lineage
     posteriors: tuple[FormerPosterior, ...]
-
-
-@dataclass(frozen=True)
-class Rerun:
-    """What was sent back to be done again, and what that has superseded.
-
-    `of_baseline` are those of the tests from which the hanger's baseline was made: they are not
-    watched, and the baseline stays as it was made until it is set anew.
-    """
-
-    recording: StoredRecording
-    tests: tuple[str, ...]
-    posteriors: int
-    watches: int
-    of_baseline: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something noticed on the way: a duplicate, a file reopened or refused."""
-
-    at: datetime
-    kind: str
-    file_name: str
-    message: str
-    recording_id: int | None = field(default=None)

@@ -1,4 +1,4 @@
-"""The store: one class whose verbs are grouped by what they are about."""
+"""The store: one database, its verbs in six repositories by what they are about."""
 
 from __future__ import annotations
 
@@ -11,46 +11,33 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
-from shm.store.acknowledging import Acknowledging
-from shm.store.adopting import Adopting
-from shm.store.alert_rows import AlertRows
-from shm.store.archive_copies import ArchiveCopies
-from shm.store.damage import Damage
-from shm.store.database import make_engine
-from shm.store.holding import Holding
-from shm.store.listing import Listing
-from shm.store.measuring import Measuring
-from shm.store.naming import Naming
-from shm.store.receiving import Receiving
-from shm.store.results import Results
-from shm.store.stepping import Stepping
-from shm.store.superseding import Superseding
-from shm.store.tokens import Tokens
-from shm.store.trends import Trends
+from shm.store.database import Database, make_engine
+from shm.store.stored_alerts import Alerts
+from shm.store.stored_posteriors import Posteriors
+from shm.store.stored_recordings import Recordings
+from shm.store.stored_tests import Tests
+from shm.store.stored_watch import Watch
 from shm.store.upkeep import Upkeep
-from shm.store.withdrawing import Withdrawing
 
 
-class Store(
-    Receiving,
-    Results,
-    Holding,
-    Listing,
-    AlertRows,
-    Trends,
-    Acknowledging,
-    Adopting,
-    Stepping,
-    Superseding,
-    Withdrawing,
-    Naming,
-    Measuring,
-    Tokens,
-    ArchiveCopies,
-    Upkeep,
-    Damage,
-):
-    """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`."""
+class Store(Database):
+    """Keeps every noun of the flow. Open it with `Store.open`; close it, or use it in a `with`.
+
+    `recordings` are the received files, how far each has come and what people decided of it;
+    `tests` what was identified from them; `posteriors` what was computed from tests, with
+    selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
+    `alerts` those that were raised, and their deliveries; `upkeep` tokens, copies, backups and
+    the healing of rows.
+    """
+
+    def __init__(self, engine: Engine):
+        super().__init__(engine)
+        self.recordings = Recordings(engine)
+        self.tests = Tests(engine)
+        self.posteriors = Posteriors(engine)
+        self.watch = Watch(engine)
+        self.alerts = Alerts(engine)
+        self.upkeep = Upkeep(engine)
 
     @classmethod
     def open(cls, location: str | Path) -> Self:

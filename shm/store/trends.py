@@ -26,10 +26,9 @@ from shm.documents import averaged_document, averaged_from
 from shm.errors import UsageError
 from shm.store.blobs import number
 from shm.store.checksums import checksum_of, readable
-from shm.store.columns import Number
-from shm.store.database import Database
+from shm.store.database import Repository
 from shm.store.files import counts, in_force
-from shm.store.glances import BaselineGlance, Numbers, TrendPoint
+from shm.store.list_rows import BaselineGlance, Numbers, TrendPoint
 from shm.store.queries import (
     baselines_now,
     hidden,
@@ -42,7 +41,6 @@ from shm.values import NAN, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 
 log = logging.getLogger(__name__)
-
 _AT_ONCE = 50
 _HANGERS_KNOWN = 4096
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
@@ -55,8 +53,8 @@ _SUMMARY = (
 )
 
 
-class Trends(Database):
-    """The part of the store that answers in numbers."""
+class Trends(Repository):
+    """The part of `Posteriors` that answers in numbers."""
 
     def trend(self, hanger: Hanger, since: datetime | None = None) -> tuple[TrendPoint, ...]:
         """Each test of a hanger that has a posterior, in numbers, by time: see `history`."""
@@ -81,41 +79,7 @@ class Trends(Database):
             ids = [id_ for id_ in connection.scalars(query) if id_ is not None]
         return {point.hanger: point for point in self._points(ids, known)}
 
-    def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
-        """The baseline in force of each hanger that has one, in numbers, by hanger."""
-        known = {hanger.id: hanger for hanger in hangers}
-        now = baselines_now(next(iter(known)) if len(known) == 1 else None)
-        query = (
-            sa.select(baselines, posteriors.c.model, *_SUMMARY)
-            .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
-            .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
-            .where(baselines.c.id.in_(now))
-            .order_by(baselines.c.hanger)
-        )
-        with self.reading() as connection:
-            rows = [row for row in connection.execute(query) if row.hanger in known]
-            numbers = _numbers(connection, rows, known)
-            made_of = _made_of(connection, [row.posterior_id for row in rows])
-        return {
-            row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
-            for row in rows
-            if row.posterior_id in numbers
-        }
-
-    def baseline_temperatures(self) -> dict[int, float]:
-        """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""
-        mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
-        query: sa.Select[Any] = (
-            sa.select(baselines.c.hanger, mean_c.label("mean_c"))
-            .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
-            .join(tests, tests.c.id == posterior_tests.c.test_id)
-            .where(baselines.c.id.in_(baselines_now()))
-            .group_by(baselines.c.hanger)
-        )
-        with self.reading() as connection:
-            return {row.hanger: row.mean_c for row in connection.execute(query)}
-
-    def keep_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
+    def save_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
         """Keeps the summaries of a hanger that are not kept yet; how many there were.
 
         Some at a time, each time a transaction: it may be killed and begun again.
@@ -184,6 +148,29 @@ class Trends(Database):
         # What is damaged has no numbers: it is noted, and `shm db check` names it.
         read = [row for row in rows if row.posterior_id in numbers]
         return tuple(_point(row, numbers[row.posterior_id]) for row in read)
+
+
+def baselines_in_numbers(
+    connection: Connection, hangers: Iterable[Hanger]
+) -> dict[int, BaselineGlance]:
+    """The baseline in force of each hanger that has one, by hanger; a damaged one is left out."""
+    known = {hanger.id: hanger for hanger in hangers}
+    now = baselines_now(next(iter(known)) if len(known) == 1 else None)
+    query = (
+        sa.select(baselines, posteriors.c.model, *_SUMMARY)
+        .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
+        .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
+        .where(baselines.c.id.in_(now))
+        .order_by(baselines.c.hanger)
+    )
+    rows = [row for row in connection.execute(query) if row.hanger in known]
+    numbers = _numbers(connection, rows, known)
+    made_of = _made_of(connection, [row.posterior_id for row in rows])
+    return {
+        row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
+        for row in rows
+        if row.posterior_id in numbers
+    }
 
 
 def _shown_tests() -> sa.Select[Any]:

@@ -90,7 +90,7 @@ class Receiver:
 
 def states(workspace: Workspace) -> Counter[str]:
     with workspace.store() as store:
-        return Counter(delivery.state.value for delivery in store.deliveries())
+        return Counter(delivery.state.value for delivery in store.alerts.list_deliveries())
 
 
 def main() -> None:
@@ -172,9 +172,11 @@ def judge(
     ways = Counter(way for way, _ in tries)
     had = Counter(key for way, key in tries if way != "busy")
     with workspace.store() as store:
-        delivered = {each.alert.key for each in store.deliveries(DeliveryState.DELIVERED)}
-        alerts = {each.alert.key for each in store.alerts()}
-        attempts = sum(each.attempts for each in store.deliveries())
+        delivered = {
+            each.alert.key for each in store.alerts.list_deliveries(DeliveryState.DELIVERED)
+        }
+        alerts = {each.alert.key for each in store.alerts.list_all()}
+        attempts = sum(each.attempts for each in store.alerts.list_deliveries())
     failed = sum(number for way, number in ways.items() if way != "took")
     after_kill = sum(had.values()) - len(had) - ways["lost"] - ways["late"]
     print(f"\n{options.hook}, seed {options.seed}\n\n| | |\n|---|---|")

@@ -155,7 +155,7 @@ def ask(workspace: Workspace, rounds: int) -> tuple[Visitor, float]:
     ids = [hanger.id for hanger in workspace.bridge.hangers]
     with workspace.store() as store:
         names = {
-            hanger: [row.name for row in store.test_rows(hanger, 10)]
+            hanger: [row.name for row in store.tests.list_rows(hanger, 10)]
             for hanger in (ids[len(ids) * place // rounds] for place in range(rounds))
         }
     with server(workspace) as (client, pid):

@@ -61,7 +61,7 @@ def filled(folder: Path, hangers: int, tests: int) -> Workspace:
     first, *others = workspace.bridge.hangers
     with workspace.store() as store:
         _fill(store, workspace.archive, first, tests)
-        store.keep_summaries(first)
+        store.posteriors.save_summaries(first)
         with store.reading() as connection:
             tables = [each for each in metadata.sorted_tables if each.name not in _NOT_COPIED]
             rooms = {table.name: _room(connection, table) for table in tables}
@@ -80,24 +80,24 @@ def _fill(store: Store, archive: Archive, hanger: Hanger, tests: int) -> None:
     raw = _raw(archive, hanger)
     for each in made:
         _take_in(store, each, raw)
-    stored = dict(zip((each.name for each in made), store.tests(hanger.id), strict=True))
+    stored = dict(zip((each.name for each in made), store.tests.list_all(hanger.id), strict=True))
     first = stored[made[0].name]
     clamped = replace(made[0].posterior, model="beam1", log_evidence=-40.0)
     selection = Selection((made[0].posterior, clamped), (0.97, 0.03))
-    store.selected(hanger.id, [first], selection, LINEAGE, first.time)
-    baseline = store.baseline(hanger.id)
+    store.posteriors.save_selection(hanger.id, [first], selection, LINEAGE, first.time)
+    baseline = store.watch.baseline(hanger.id)
     assert baseline is not None
     for each in made[1:]:
         test = stored[each.name]
-        store.updated(test, each.posterior, LINEAGE, test.time)
+        store.posteriors.save(test, each.posterior, LINEAGE, test.time)
         alert = replace(an_alert(), key=f"{each.name} moved", hanger=hanger.id, test=each.name)
         is_alerted = any(abs(each.age - age) < 0.5 / tests for age in ALERTED)
         found = alert if is_alerted else None
-        store.watched(test, baseline, each.watched, found, ["operator"], test.time)
-    for raised in store.alerts(hanger.id)[:-1]:
-        store.acknowledge(raised.id, "engineer", "looked at the pin", raised.raised_at)
+        store.watch.save(test, baseline, each.watched, found, ["operator"], test.time)
+    for raised in store.alerts.list_all(hanger.id)[:-1]:
+        store.alerts.acknowledge(raised.id, "engineer", "looked at the pin", raised.raised_at)
     diagnosis = replace(a_diagnosis(), tests=(made[-1].name,))
-    store.add_diagnosis(hanger.id, diagnosis, LINEAGE, made[-1].time)
+    store.posteriors.save_diagnosis(hanger.id, diagnosis, LINEAGE, made[-1].time)
 
 
 class _Made:
@@ -190,9 +190,9 @@ def _take_in(store: Store, made: _Made, raw: Kept) -> None:
         response = a_response(lines=RESPONSE_LINES)
         item = replace(item, frequency_response=response, quality=(check,) * 8, notes=("a note",))
         file = replace(file, file_name=f"{made.name}.csv", archived_as=raw.archived_as)
-    receipt = store.receive(file, made.time)
+    receipt = store.recordings.receive(file, made.time)
     assert receipt.outcome is Outcome.NEW
-    store.identified(receipt.recording.id, [item], LINEAGE, made.time)
+    store.tests.save(receipt.recording.id, [item], LINEAGE, made.time)
 
 
 # ---------------------------------------------------------------- all others

@@ -174,7 +174,7 @@ def through_a_flow(files: int, seed: int) -> Counter[str]:
             for path in dropped:
                 flow.receive(path)
             flow.drain()
-            refused = flow.store.recordings(Stage.REFUSED)
+            refused = flow.store.recordings.list_all(Stage.REFUSED)
             pids = len(list(workspace.quarantine.folder.glob("*.reason.json")))
         reasons = [
             json.loads(path.read_text())

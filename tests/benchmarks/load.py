@@ -142,7 +142,7 @@ def until_done(workspace: Workspace, files: int, pid: int) -> Load:
     with workspace.store() as store:
         while not load.done or load.done[-1][1] < files:
             time.sleep(2.0)
-            counts = store.stage_counts()
+            counts = store.recordings.stage_counts()
             if counts[Stage.REFUSED]:
                 raise SystemExit(f"{counts[Stage.REFUSED]} files are refused")
             load.done.append((time.monotonic() - began, counts[Stage.DONE]))
@@ -207,7 +207,7 @@ def called(store: Store, hanger: Hanger, drops: Iterator[float], folder: Path) -
 
 def heard_of(store: Store, hanger: int, folder: Path) -> float | None:
     """When the hook had the alert of a hanger; None where its file is done and called none."""
-    before, end = store.stage_counts()[Stage.DONE], math.inf
+    before, end = store.recordings.stage_counts()[Stage.DONE], math.inf
     while time.monotonic() < end:
         for path in (each for each in folder.iterdir() if not each.name.startswith(".")):
             heard, at = json.loads(path.read_text())["hanger"], path.stat().st_mtime
@@ -215,7 +215,7 @@ def heard_of(store: Store, hanger: int, folder: Path) -> float | None:
             if heard == hanger:
                 return at
         time.sleep(0.05)
-        if end == math.inf and store.stage_counts()[Stage.DONE] > before:
+        if end == math.inf and store.recordings.stage_counts()[Stage.DONE] > before:
             end = time.monotonic() + LONGEST_DELIVERY_S
     return None
 

@@ -29,7 +29,7 @@ def main(megabytes: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         workspace = make_workspace(Path(folder) / "bridge")
         with workspace.store() as store:
-            token = store.create_token("benchmark", Scope.WRITE, utc_now())
+            token = store.upkeep.create_token("benchmark", Scope.WRITE, utc_now())
         command = [sys.executable, "-m", "shm_daemon.web", str(workspace.folder), "127.0.0.1"]
         with subprocess.Popen(
             [*command, str(PORT)], cwd=ROOT, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL

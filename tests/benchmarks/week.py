@@ -125,7 +125,7 @@ def lived(week: Week, every: int) -> list[Sample]:
             for first in range(last - every, last, BATCH):
                 until = min(first + BATCH, last)
                 week.drop(first, until)
-                while store.stage_counts()[Stage.DONE] < until:
+                while store.recordings.stage_counts()[Stage.DONE] < until:
                     time.sleep(0.1)
             samples.append(sampled(last, every, time.monotonic() - began))
             print(samples[-1], file=sys.stderr, flush=True)
@@ -163,8 +163,10 @@ def faults(week: Week, told: list[tuple[str, object]]) -> list[str]:
     found = [name for name, value in told if isinstance(value, Trend) and value.grows(NEGLIGIBLE)]
     with week.workspace.store() as store:
         hangers = [hanger.id for hanger in week.workspace.bridge.hangers]
-        watched = sum(len(store.watches(hanger)) for hanger in hangers)
-        if store.stage_counts()[Stage.DONE] != week.tests or watched != week.tests - len(hangers):
+        watched = sum(len(store.watch.list_all(hanger)) for hanger in hangers)
+        if store.recordings.stage_counts()[Stage.DONE] != week.tests or watched != week.tests - len(
+            hangers
+        ):
             found.append("tests are lost or doubled")
     return found
 

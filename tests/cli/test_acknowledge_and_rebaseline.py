@@ -27,7 +27,7 @@ def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     folder = tmp_path / "arch"
     shutil.copytree(bridge.folder, folder)
     with Workspace.open(folder, {}).store() as store:
-        assert len(store.alerts()) == 1
+        assert len(store.alerts.list_all()) == 1
     return folder
 
 
@@ -36,7 +36,7 @@ def test_an_alert_is_acknowledged_with_who_and_why(shm: Shm, workspace: Path) ->
     assert ended.code == 0, ended.err
     assert ended.out == "Alert 1 of hanger 3 is acknowledged.\n"
     with Workspace.open(workspace, {}).store() as store:
-        (noted,) = [stored.acknowledgement for stored in store.alerts()]
+        (noted,) = [stored.acknowledgement for stored in store.alerts.list_all()]
     assert noted is not None
     assert (noted.who, noted.why) == ("Jansen", "pin replaced")
 
@@ -91,7 +91,7 @@ def test_a_hanger_is_compared_anew_from_a_day_on(shm: Shm, workspace: Path) -> N
         "Hanger 3 is compared with its one test since 2026-06-30 from now on: 5"
     )
     with Workspace.open(workspace, {}).store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
     assert baseline is not None
     assert baseline.posterior.tests == ("t2",)
 

@@ -24,21 +24,21 @@ SHIFTS = {5: 0.021, 6: -0.05, 7: 0.026}
 def watch(store: Store, hanger: int, shift: float) -> None:
     """A baseline at 11.5 deg C and a test at 31.5 deg C of one hanger."""
     for day, temperature in ((0, 11.5), (1, 31.5)):
-        recording = store.receive(a_file(10 * hanger + day), NOW).recording
+        recording = store.recordings.receive(a_file(10 * hanger + day), NOW).recording
         name = f"h{hanger}-{day}"
         test = a_test(name, day, hanger=hanger, temperature_c=temperature)
-        store.identified(recording.id, [IdentifiedTest(test)], LINEAGE, NOW)
-    first, later = store.tests(hanger)
+        store.tests.save(recording.id, [IdentifiedTest(test)], LINEAGE, NOW)
+    first, later = store.tests.list_all(hanger)
     posterior = a_posterior(tests=(first.test.id,))
-    store.selected(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
-    store.updated(later, a_posterior(tests=(later.test.id,)), LINEAGE, NOW)
+    store.posteriors.save_selection(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    store.posteriors.save(later, a_posterior(tests=(later.test.id,)), LINEAGE, NOW)
     drift = Drift(
         hanger, later.test.id, NOW, "tension", 700e3, 700e3 * (1 + shift), shift, 0.002, 0.05, 0.5
     )
-    baseline = store.baseline(hanger)
+    baseline = store.watch.baseline(hanger)
     assert baseline is not None
     watched = WatchedTest(later.test.id, NOW, 31.5, (drift,), a_change())
-    store.watched(later, baseline, watched, None, [], NOW)
+    store.watch.save(later, baseline, watched, None, [], NOW)
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def test_a_lost_workspace_comes_back_from_its_backup(
     assert (again["archive"]["copied"], again["archive"]["present"]) == (0, 3)
     assert again["newly_noted"] == 0
     with copied.store() as store:
-        noted = [(copy.recording_id, copy.folder) for copy in store.archive_copies()]
+        noted = [(copy.recording_id, copy.folder) for copy in store.upkeep.list_copies()]
     assert noted == [(number, str(copies)) for number in (1, 2, 3)]
     copied.database.unlink()
     shutil.rmtree(copied.archive.folder)
@@ -117,7 +117,7 @@ def test_raw_files_that_cannot_be_copied_are_told_and_not_noted(
     assert (ended.code, ended.document["newly_noted"]) == (5, 2)
     assert lost.name in ended.err
     with Store.open(tmp_path / "may.db") as backup:
-        assert len(backup.recordings()) == 3
+        assert len(backup.recordings.list_all()) == 3
 
 
 def test_a_restore_over_a_store_is_refused_or_keeps_the_old_one(
@@ -132,7 +132,7 @@ def test_a_restore_over_a_store_is_refused_or_keeps_the_old_one(
     kept = Path(ended.document["kept"])
     assert kept.parent == copied.folder
     with Store.open(kept) as store:
-        assert len(store.recordings()) == 3
+        assert len(store.recordings.list_all()) == 3
 
 
 def test_a_restore_waits_for_no_daemon(shm: Shm, copied: Workspace, tmp_path: Path) -> None:
@@ -163,9 +163,9 @@ def test_a_bridge_moves_to_a_server_and_back(
     assert not any("hush" in ended.out + ended.err for ended in said)
     assert shm(*call, "db", "copy", "--to", tmp_path / "back.db").code == 0
     with Store.open(tmp_path / "back.db") as store:
-        assert [test.test.id for test in store.tests(3)] == ["t0", "t1", "t2", "later"]
+        assert [test.test.id for test in store.tests.list_all(3)] == ["t0", "t1", "t2", "later"]
     with Store.open(copied.database) as store:
-        assert len(store.tests(3)) == 3
+        assert len(store.tests.list_all(3)) == 3
 
 
 def test_a_new_bridge_is_made_on_a_server(

@@ -84,7 +84,7 @@ def test_a_file_that_is_known_is_said_to_be_known_and_not_stored_twice(
     (row,) = [row for row in json.loads(ended.stdout)["files"] if row["outcome"] == "known already"]
     assert (row["file"], row["known_as"]) == ("again.modes.json", "a.modes.json")
     with workspace.store() as store:
-        assert len(store.recordings()) == 4
+        assert len(store.recordings.list_all()) == 4
 
 
 def test_while_a_daemon_serves_the_workspace_ingest_says_what_to_do(
@@ -104,7 +104,7 @@ def test_the_daemon_empties_the_spool_once_and_ends(empty: Workspace) -> None:
     assert ended.stdout == ""
     assert "watching" in ended.stderr
     with empty.store() as store:
-        assert len(store.history(3)) == 1
+        assert len(store.posteriors.history(3)) == 1
 
 
 def test_peek_shows_what_is_in_a_file_and_takes_nothing_in(
@@ -122,7 +122,7 @@ def test_peek_shows_what_is_in_a_file_and_takes_nothing_in(
     assert look["sampling_rate_hz"] == 512
     assert look["channels"][0]["quantity"] == "force"
     with empty.store() as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
 
 
 def test_peek_goes_on_after_a_file_it_cannot_read(

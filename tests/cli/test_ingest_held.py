@@ -79,9 +79,9 @@ def test_what_is_confirmed_is_done_at_once_with_its_true_time(shm: Shm, held: Wo
     assert (ended.document["who"], ended.document["why"]) == ("Ann", "clock was dead")
     assert ended.document["stage"] == "done"
     with held.store() as store:
-        times = {test.test.id: test.time for test in store.tests(3)}
+        times = {test.test.id: test.time for test in store.tests.list_all(3)}
         assert times == {"good": START, "lost": datetime(2026, 6, 1, 10, tzinfo=UTC)}
-        assert [drift.test for drift in store.drifts(3)] == ["lost"]
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["lost"]
     assert shm("--workspace", held.folder, "ingest", "--held").out == "Nothing is held.\n"
 
 
@@ -92,7 +92,7 @@ def test_what_is_confirmed_while_a_daemon_serves_is_left_to_it(shm: Shm, held: W
     assert "The daemon does the rest" in ended.err
     assert "its receipt counts" in ended.out
     with held.store() as store:
-        assert store.stage_counts()[Stage.IDENTIFIED] == 1
+        assert store.recordings.stage_counts()[Stage.IDENTIFIED] == 1
 
 
 def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspace) -> None:
@@ -145,8 +145,8 @@ def test_what_counts_is_discarded_with_a_reason_and_taken_back(shm: Shm, held: W
     assert "`shm drift rebaseline --hanger 3 --since 2026-05-01 --why TEXT`" in said
     assert "`shm ingest --confirm 1 --why TEXT`" in said
     with held.store() as store:
-        assert store.tests(3) == ()
-        assert discarded_of(store, store.baseline(3)) == ("good",)
+        assert store.tests.list_all(3) == ()
+        assert discarded_of(store, store.watch.baseline(3)) == ("good",)
     assert shm("--workspace", held.folder, "db", "check").code == 0
     stages = " ".join(shm("--workspace", held.folder, "status", "--of", 1).out.split())
     assert "refused" not in stages
@@ -168,8 +168,8 @@ def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Works
     assert [hold["recording"] for hold in shm(*say, "--held", "--json").document["held"]] == [2]
     assert shm(*say, "--discard", 2).code == 0
     with held.store() as store:
-        assert [test.test.id for test in store.tests(3)] == ["good"]
-        assert store.drifts(3) == ()
+        assert [test.test.id for test in store.tests.list_all(3)] == ["good"]
+        assert store.watch.list_drifts(3) == ()
 
 
 def test_a_copy_is_not_confirmed_without_a_reason(shm: Shm, held: Workspace) -> None:
@@ -206,4 +206,4 @@ def test_what_makes_no_sense_changes_nothing(
     (tmp_path / "a.csv").write_text("")
     assert shm("--workspace", held.folder, "ingest", *words).code == code
     with held.store() as store:
-        assert len(store.holds()) == 1
+        assert len(store.recordings.list_holds()) == 1

@@ -56,9 +56,13 @@ def test_files_taken_in_together_are_one_test_kept_as_one_archive(
     workspace, code = taken_in
     assert code == 0
     with workspace.store() as store:
-        assert sum(store.stage_counts().values()) == store.stage_counts()[Stage.DONE] == 1
-        (stored,) = store.tests(3)
-        assert store.recording(stored.recording_id).file.file_name == "set_up_0.zip"
+        assert (
+            sum(store.recordings.stage_counts().values())
+            == store.recordings.stage_counts()[Stage.DONE]
+            == 1
+        )
+        (stored,) = store.tests.list_all(3)
+        assert store.recordings.get(stored.recording_id).file.file_name == "set_up_0.zip"
     assert stored.test.id == "set_up_0"
     assert {check.name for check in stored.quality} >= {"hits", "noise", "repeatability"}
 
@@ -70,7 +74,7 @@ def test_a_stored_test_shows_how_it_was_identified(
     ask = ("--workspace", workspace.folder, "report", "--hanger", 3, "--test", "set_up_0")
     document = json.loads(shm(*ask, "--json").out)
     with workspace.store() as store:
-        (stored,) = store.tests(3)
+        (stored,) = store.tests.list_all(3)
     shown = [mode["frequency_hz"] for mode in document["test"]["modes"]]
     assert shown == pytest.approx([mode.frequency_hz for mode in stored.test.modes])
     assert [check["name"] for check in document["quality"]] == [c.name for c in stored.quality]

@@ -90,7 +90,7 @@ def test_a_changed_length_is_said_first_with_the_command_until_there_is_a_new_ba
 def test_what_no_posterior_depends_on_asks_for_nothing(before: Workspace) -> None:
     hanger = before.bridge.hanger(3)
     with before.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
     assert baseline is not None
     known = replace(baseline, described={**asdict(hanger), "name": "old", "limits": {}})
     assert redescribed(replace(hanger, name="new", models=("beam1",)), known) == ()
@@ -107,7 +107,7 @@ def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Work
         if each.name in known | {"mass_per_length_kg_m", "nominal_tension_n", "diameter_m"}
     }
     with before.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
     assert baseline is not None
     assert redescribed(hanger, replace(baseline, described=described)) == ()
     strand = replace(hanger, kind="strand", scatter=replace(hanger.scatter, section=0.02))
@@ -121,7 +121,7 @@ def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Work
 def test_every_other_field_of_a_hanger_is_compared(before: Workspace, name: str) -> None:
     """A field that is added to a hanger must be compared, or be said to move nothing."""
     with before.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
     assert baseline is not None
     assert baseline.described is not None
     other = replace(baseline, described={**baseline.described, name: "another"})

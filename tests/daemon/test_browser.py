@@ -72,8 +72,8 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     write_recording(workspace)
     ingest(workspace)
     with workspace.store() as store:
-        assert {each.stage for each in store.recordings()} == {Stage.DONE}
-        assert [each.test.id for each in store.tests(3)][-1] == RECORDED
+        assert {each.stage for each in store.recordings.list_all()} == {Stage.DONE}
+        assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("shm_daemon.web.app.Workshop", partial(Workshop, pool=a_thread))
         with real_daemon(folder), served(workspace) as running:

@@ -52,8 +52,8 @@ def test_a_cluster_gives_what_the_processes_of_one_machine_give_to_the_bit(
     there = worked_through(tmp_path / "there", cluster.address)
     here = worked_through(tmp_path / "here", "")
     with there.store() as first, here.store() as second:
-        assert first.stage_counts()[Stage.DONE] == FILES
-        assert first.stage_counts()[Stage.REFUSED] == 1
+        assert first.recordings.stage_counts()[Stage.DONE] == FILES
+        assert first.recordings.stage_counts()[Stage.REFUSED] == 1
         assert canonical(first) == canonical(second)
 
 

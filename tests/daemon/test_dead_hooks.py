@@ -33,7 +33,7 @@ def with_webhook(folder: Path, url: str, **settings: object) -> Workspace:
 
 def outbox(workspace: Workspace) -> Delivery:
     with workspace.store() as store:
-        (delivery,) = store.deliveries()
+        (delivery,) = store.alerts.list_deliveries()
     return delivery
 
 
@@ -123,7 +123,7 @@ def until_refused(workspace: Workspace, number: int) -> None:
     end = time.monotonic() + 20
     while time.monotonic() < end:
         with workspace.store() as store:
-            if store.stage_counts()[Stage.REFUSED] == number:
+            if store.recordings.stage_counts()[Stage.REFUSED] == number:
                 return
         time.sleep(0.05)
     raise TimeoutError(f"{number} files are not refused")

@@ -296,7 +296,7 @@ def test_tests_that_wait_for_a_baseline_are_not_stuck(tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "three", settings={"baseline_tests": 3})
     with workspace.store() as store:
         entered(store, [1, 2])
-        assert store.stage_counts()[Stage.IDENTIFIED] == 2
+        assert store.recordings.stage_counts()[Stage.IDENTIFIED] == 2
     assert "none is on its way" in only(workspace, "recordings", NOW + timedelta(days=9)).found
     forming = [each.found for each in found(workspace, "hangers")]
     assert "no baseline yet: 3 (2 of 3 tests)" in forming
@@ -326,13 +326,13 @@ def test_backups_that_are_missing_old_or_without_raw_files_are_told(
     with workspace.store() as store:
         file = receive(workspace.spool / "raw.csv", workspace, store, NOW).recording.file
         assert only(workspace, "backup").found == "never made here"
-        store.note_backup(tmp_path / "b.db", NOW)
+        store.upkeep.note_backup(tmp_path / "b.db", NOW)
         fresh, alone = found(workspace, "backup", NOW + timedelta(days=1))
         assert (fresh.level, "without a copy elsewhere: 1" in alone.found) == (Level.OK, True)
         copies = Archive(tmp_path / "copies")
         copies.folder.mkdir()
         copies.keep(workspace.archive.folder / str(file.archived_as))
-        store.note_copies(copies, NOW)
+        store.upkeep.note_copies(copies, NOW)
     old = only(workspace, "backup", NOW + timedelta(days=30))
     assert (old.level, "30 d ago" in old.found) == (Level.WARNING, True)
 
@@ -368,9 +368,9 @@ def test_deliveries_that_fail_and_that_were_given_up_are_told(workspace: Workspa
     assert only(workspace, "deliveries", NOW).level is Level.OK
     assert "not tried yet" in only(workspace, "deliveries", NOW + timedelta(hours=1)).found
     with workspace.store() as store:
-        first, second = store.deliveries(DeliveryState.WAITING)
-        store.delivery_failed(first, "no such host", NOW, NOW + timedelta(hours=9))
-        store.delivery_failed(second, "answered 403", NOW, None)
+        first, second = store.alerts.list_deliveries(DeliveryState.WAITING)
+        store.alerts.save_failure(first, "no such host", NOW, NOW + timedelta(hours=9))
+        store.alerts.save_failure(second, "answered 403", NOW, None)
     failing, lost = found(workspace, "deliveries", NOW)
     assert "siren, tried 1 times: no such host" in failing.found
     assert "answered 403" in lost.found

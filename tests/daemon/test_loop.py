@@ -15,8 +15,9 @@ import pytest
 from shm.errors import ShmError, StoreBusy, StoreError
 from shm.pipeline import Flow, Sharing, steps
 from shm.settings import Settings
-from shm.store import Archive, Delivery, DeliveryState, Stage, Store, Workspace
+from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
+from shm.store.stored_recordings import Recordings
 from shm_daemon import Bell, run
 from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update
@@ -68,12 +69,12 @@ def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
 
 def counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return {stage: count for stage, count in store.stage_counts().items() if count}
+        return {stage: count for stage, count in store.recordings.stage_counts().items() if count}
 
 
 def deliveries(workspace: Workspace) -> tuple[Delivery, ...]:
     with workspace.store() as store:
-        return store.deliveries()
+        return store.alerts.list_deliveries()
 
 
 def test_files_dropped_while_it_runs_are_done(
@@ -148,7 +149,7 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert why_turn_failed(workspace) == ""
     with workspace.store() as store:
         assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in store.events("refused")]
+        names = [event.file_name for event in store.recordings.list_events("refused")]
     assert len(names) == len(_ODD_NAMES)
     assert all(name.isprintable() and len(name) <= 200 for name in names)
 
@@ -274,10 +275,10 @@ def test_a_store_that_cannot_be_used_for_now_is_waited_for(
 def test_a_store_that_waiting_cannot_mend_ends_the_daemon(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def damaged(self: Store, *args: object) -> None:
+    def damaged(self: Recordings, *args: object) -> None:
         raise StoreError("is damaged.", remedy="Restore it from a backup.")
 
-    monkeypatch.setattr(Store, "receive", damaged)
+    monkeypatch.setattr(Recordings, "receive", damaged)
     write_test(workspace.spool / "a.modes.json", workspace)
     with pytest.raises(StoreError, match="damaged"):
         run_once(workspace)
@@ -323,7 +324,7 @@ def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
     write_loss(workspace.spool, workspace)
     run_once(workspace, notifier=Postman(failures=9))
     with workspace.store() as store:
-        assert [each.attempts for each in store.deliveries()] == [1]
+        assert [each.attempts for each in store.alerts.list_deliveries()] == [1]
 
 
 def test_a_missing_store_is_told(workspace: Workspace) -> None:

@@ -119,7 +119,7 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
         time.sleep(0.5)
         assert (spooled(bridge), second.waiting) == ([], [])
     with bridge.store() as store:
-        assert store.events() == ()
+        assert store.recordings.list_events() == ()
 
 
 def test_what_came_while_the_daemon_was_down_is_taken_in(bridge: Workspace, broker: Broker) -> None:

@@ -68,8 +68,10 @@ def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) 
     assert reason["message"] == f"{HUNDRED_GB} bytes are more than the 1000000000 that are taken."
     assert "max_file_bytes" in reason["remedy"]
     with workspace.store() as store:
-        assert [each.stage for each in store.recordings()] == [Stage.DONE]
-        assert [event.file_name for event in store.events("refused")] == ["huge.csv"]
+        assert [each.stage for each in store.recordings.list_all()] == [Stage.DONE]
+        assert [event.file_name for event in store.recordings.list_events("refused")] == [
+            "huge.csv"
+        ]
 
 
 def test_two_of_one_name_lie_beside_each_other(tmp_path: Path) -> None:
@@ -102,7 +104,7 @@ def test_what_cannot_be_moved_stays_where_it_is_and_is_said_once(
     reason = json.loads((workspace.quarantine.folder / "huge.csv.reason.json").read_text())
     assert f"left at {huge}" in reason["remedy"]
     with workspace.store() as store:
-        assert len(store.events("refused")) == 1
+        assert len(store.recordings.list_events("refused")) == 1
 
 
 def test_a_file_that_a_person_names_is_refused_unread_and_stays(tmp_path: Path) -> None:
@@ -181,4 +183,4 @@ def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
     monkeypatch.setattr(digest, lambda data=b"": slow(data) if data else Slow())
     assert serve_for(workspace, 14.0) < 5.0
     with workspace.store() as store:
-        assert len(store.recordings()) == 1
+        assert len(store.recordings.list_all()) == 1

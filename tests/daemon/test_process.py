@@ -27,7 +27,7 @@ def log_of(workspace: Workspace) -> str:
 
 def done(workspace: Workspace) -> int:
     with workspace.store() as store:
-        return store.stage_counts()[Stage.DONE]
+        return store.recordings.stage_counts()[Stage.DONE]
 
 
 def processes_of(workspace: Workspace) -> list[int]:

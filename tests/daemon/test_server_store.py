@@ -56,7 +56,7 @@ def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
 
 def done(url: str) -> int:
     with Store.open(url) as store:
-        return store.stage_counts()[Stage.DONE]
+        return store.recordings.stage_counts()[Stage.DONE]
 
 
 def test_the_daemon_waits_while_its_server_is_away_and_goes_on(
@@ -80,4 +80,4 @@ def test_a_cut_of_its_connections_costs_the_daemon_nothing(
         postgresql.cut_connections(url)
     until(lambda: done(url) == 4)
     with Store.open(url) as store:
-        assert [test.test.id for test in store.tests(3)] == ["t0", "t1", "t2", "t3"]
+        assert [test.test.id for test in store.tests.list_all(3)] == ["t0", "t1", "t2", "t3"]

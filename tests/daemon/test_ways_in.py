@@ -129,8 +129,8 @@ def test_messages_outlast_killed_daemons_and_each_is_stored_once(tmp_path: Path)
                     assert daemons.kill(pid) == -signal.SIGKILL
                     until_serving(daemons.begin(), workspace.folder)
             with workspace.store() as store:
-                until(lambda: store.stage_counts()[Stage.DONE] == messages)
-                assert sum(store.stage_counts().values()) == messages
+                until(lambda: store.recordings.stage_counts()[Stage.DONE] == messages)
+                assert sum(store.recordings.stage_counts().values()) == messages
             daemons.kill(int((workspace.folder / "shm.lock").read_text()))
 
 

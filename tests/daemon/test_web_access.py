@@ -77,7 +77,7 @@ def test_a_revoked_token_is_refused_at_once(elsewhere: Served, workspace: Worksp
     with elsewhere.client(elsewhere.write_token) as client:
         assert client.post(UPLOAD, content=b"x").status_code == 202
         with workspace.store() as store:
-            store.revoke_token("write", utc_now())
+            store.upkeep.revoke_token("write", utc_now())
         assert client.post(UPLOAD, content=b"x").status_code == 401
         assert statuses(client) == {401}
 
@@ -221,7 +221,7 @@ def test_no_secret_reaches_the_log_or_the_disk(
 
 def test_only_the_checksum_of_a_token_is_kept(workspace: Workspace) -> None:
     with workspace.store() as store:
-        secret = store.create_token("logger", Scope.READ, utc_now())
+        secret = store.upkeep.create_token("logger", Scope.READ, utc_now())
     with sqlite3.connect(workspace.database) as connection:
         kept = connection.execute("SELECT * FROM tokens").fetchone()
     assert len(secret) > 40
@@ -231,19 +231,19 @@ def test_only_the_checksum_of_a_token_is_kept(workspace: Workspace) -> None:
 def test_a_name_is_free_again_after_its_token_was_revoked(workspace: Workspace) -> None:
     now = utc_now()
     with workspace.store() as store:
-        first = store.create_token("logger", Scope.READ, now)
+        first = store.upkeep.create_token("logger", Scope.READ, now)
         with pytest.raises(UsageError, match="in force already"):
-            store.create_token("logger", Scope.WRITE, now)
-        store.revoke_token("logger", now)
+            store.upkeep.create_token("logger", Scope.WRITE, now)
+        store.upkeep.revoke_token("logger", now)
         with pytest.raises(NothingThere):
-            store.revoke_token("logger", now)
-        second = store.create_token("logger", Scope.WRITE, now)
-        assert store.token_of(first, now) is None
-        found = store.token_of(second, now)
+            store.upkeep.revoke_token("logger", now)
+        second = store.upkeep.create_token("logger", Scope.WRITE, now)
+        assert store.upkeep.token_of(first, now) is None
+        found = store.upkeep.token_of(second, now)
         assert found is not None
         assert found.scopes == {Scope.READ, Scope.WRITE}
-        store.token_of(second, now + timedelta(seconds=30))
-        assert [token.last_used_at for token in store.tokens()] == [None, now]
+        store.upkeep.token_of(second, now + timedelta(seconds=30))
+        assert [token.last_used_at for token in store.upkeep.list_tokens()] == [None, now]
 
 
 def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> None:
@@ -252,7 +252,7 @@ def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> Non
         refuse_unguarded(workspace, ELSEWHERE)
     assert "shm token create" in refused.value.remedy
     with workspace.store() as store:
-        store.create_token("logger", Scope.READ, utc_now())
+        store.upkeep.create_token("logger", Scope.READ, utc_now())
     refuse_unguarded(workspace, ELSEWHERE)
 
 

@@ -43,7 +43,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     )
     ingest(workspace, clock=Clock(START + timedelta(days=200)))
     with workspace.store() as store:
-        store.add_diagnosis(3, replace(LED, hanger=3), Lineage.of({}, {}), START)
+        store.posteriors.save_diagnosis(3, replace(LED, hanger=3), Lineage.of({}, {}), START)
     return workspace
 
 

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
 from shm.pipeline import utc_now
-from shm.store import Workspace, glances, rows, stepping
+from shm.store import Workspace, files, list_rows, recording_rows, rows
 from shm.store.columns import Number, UtcTime
 from shm.store.tables import metadata
 from shm_daemon.heartbeat import beat
@@ -42,12 +42,12 @@ def names() -> set[str]:
     """Every name that a row may say: of all enumerations of the store, and one of the future."""
     kinds = {
         kind
-        for module in (rows, glances)
+        for module in (rows, recording_rows, list_rows)
         for _, kind in inspect.getmembers(module, inspect.isclass)
         if issubclass(kind, StrEnum)
     }
     said = {str(member) for kind in kinds for member in kind}
-    return said | stepping.STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
+    return said | files.STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
 
 
 def odd_values(column: sa.Column[object]) -> Iterator[object]:
@@ -140,7 +140,7 @@ def test_a_step_that_is_no_stage_is_counted_under_its_name(
     with sqlite3.connect(bridge.database) as connection:
         (kept,) = connection.execute("SELECT MAX(id), stage FROM steps").fetchall()
         update = "UPDATE steps SET stage = ? WHERE id = ?"
-        for told, counted_as in ((stepping.NOTIFIED, "notified"), ("of the future", rows.OTHER)):
+        for told, counted_as in ((files.NOTIFIED, "notified"), ("of the future", rows.OTHER)):
             connection.execute(update, (told, kept[0]))
             connection.commit()
             assert said(client)["shm_stage_reached", counted_as] == 1

@@ -96,7 +96,7 @@ def test_a_revoked_token_is_out_at_once(
     sign_in(browser, elsewhere.write_token)
     assert browser.get("/").status_code == 200
     with workspace.store() as store:
-        store.revoke_token("write", utc_now())
+        store.upkeep.revoke_token("write", utc_now())
     assert browser.get("/").status_code == 401
     assert browser.post(UPLOAD, content=b"x").status_code == 401
 

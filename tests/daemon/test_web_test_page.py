@@ -71,8 +71,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     write_test(workspace.spool / "x.modes.json", workspace, day=9, name=MODES_ALONE)
     ingest(workspace)
     with workspace.store() as store:
-        names = [stored.test.id for stored in store.tests(3)]
-        assert {recording.stage for recording in store.recordings()} == {Stage.DONE}
+        names = [stored.test.id for stored in store.tests.list_all(3)]
+        assert {recording.stage for recording in store.recordings.list_all()} == {Stage.DONE}
     assert names[1:] == [MODES_ALONE]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("shm_daemon.web.app.Workshop", partial(Workshop, pool=a_thread))
@@ -190,8 +190,8 @@ def test_the_document_tells_where_the_results_come_from(site: Site, client: http
     assert (found["verdict"], found["stage"], found["missing"]) == ("warning", "watched", "")
     assert (found["previous"], found["next"]) == (None, MODES_ALONE)
     with site.workspace.store() as store:
-        stored = store.test_named(3, site.odd)
-        file = store.recording(stored.recording_id).file
+        stored = store.tests.named(3, site.odd)
+        file = store.recordings.get(stored.recording_id).file
     assert found["file"]["sha256"] == file.sha256
     assert found["lineage"]["settings_sha256"] == stored.lineage.settings_sha256
     assert [step["stage"] for step in found["steps"]][-1] == "done"
@@ -235,8 +235,8 @@ def test_an_address_holds_any_name() -> None:
 
 def test_a_test_whose_raw_file_is_gone_shows_what_is_stored(site: Site) -> None:
     with site.workspace.store() as store:
-        stored = store.test_named(3, site.odd)
-        file = store.recording(stored.recording_id).file
+        stored = store.tests.named(3, site.odd)
+        file = store.recordings.get(stored.recording_id).file
     assert file.archived_as is not None
     kept = site.workspace.archive.folder / file.archived_as
     aside = kept.with_name("aside")

@@ -33,7 +33,7 @@ def test_rot_is_refused_and_the_same_file_dropped_again_heals_it(
     assert run([*call, "ingest", "--again", "t0"]) == 5
     assert f"archive/{raw.parent.name}/{raw.name}" in capsys.readouterr().err.replace("\n", "")
     with workspace.store() as store:  # nothing was superseded for want of the raw file
-        assert store.test_named(3, "t0").stage is Stage.WATCHED
+        assert store.tests.named(3, "t0").stage is Stage.WATCHED
     (workspace.spool / "t0.modes.json").write_bytes(good)
     with a_flow(workspace) as flow:
         receipt = flow.receive(workspace.spool / "t0.modes.json")

@@ -33,9 +33,9 @@ def test_a_clock_that_jumps_back_holds_nothing_up(workspace: Workspace) -> None:
             receive_all(flow)
             clock.now -= timedelta(days=1)
             flow.drain()
-        assert flow.store.stage_counts()[Stage.DONE] == 3
-        assert [test.test.id for test, _ in flow.store.history(3)] == ["t0", "t1", "t2"]
-        stages = [step.stage for step in flow.store.steps(3)]
+        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
+        assert [test.test.id for test, _ in flow.store.posteriors.history(3)] == ["t0", "t1", "t2"]
+        stages = [step.stage for step in flow.store.recordings.list_steps(3)]
     assert stages == ["archived", "received", *2 * ["identified"], *2 * ["updated"],
                       "watched", "done"]  # fmt: skip
 
@@ -67,4 +67,4 @@ def test_a_spool_of_which_the_file_system_tells_nothing_is_scanned(
     write_test(workspace.spool / "t0.modes.json", workspace)
     run(workspace, once=True, make_executor=threads)
     with workspace.store() as store:
-        assert store.stage_counts()[Stage.DONE] == 1
+        assert store.recordings.stage_counts()[Stage.DONE] == 1

@@ -69,7 +69,7 @@ def through_the_flow(workspace: Workspace) -> dict[str, Stage]:
     with a_flow(workspace, clock=Clock(START + timedelta(days=200))) as flow:
         receive_all(flow)
         flow.drain()
-        return {each.file.file_name: each.stage for each in flow.store.recordings()}
+        return {each.file.file_name: each.stage for each in flow.store.recordings.list_all()}
 
 
 def next_tests(workspace: Workspace) -> None:
@@ -96,7 +96,7 @@ def test_one_damaged_posterior_stops_its_hanger_alone_and_says_so(
     assert "hanger 3 stands still: row 1 of posteriors of hanger 3 is damaged" in said
     assert "shm ingest --again" in said
     with bridge.store() as store:
-        assert [row.hanger for row in store.known_damage()] == [3]
+        assert [row.hanger for row in store.upkeep.known_damage()] == [3]
     assert run(["--workspace", str(bridge.folder), "ingest", "--again", "h3-0"]) == 0
     assert troubles(bridge) == ()
     stages = through_the_flow(bridge)
@@ -104,12 +104,12 @@ def test_one_damaged_posterior_stops_its_hanger_alone_and_says_so(
     after = tension_of(bridge)
     assert {name: after[name] for name in before} == pytest.approx(before, rel=1e-3)
     with bridge.store() as store:
-        assert store.known_damage() == ()
+        assert store.upkeep.known_damage() == ()
 
 
 def baseline_tension_n(workspace: Workspace) -> FloatArray:
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         return baseline.posterior.tension_n
 
@@ -124,10 +124,10 @@ def test_the_daemon_lives_with_a_damaged_posterior(bridge: Workspace) -> None:
     next_tests(bridge)
     shm_daemon.run(bridge, once=True, make_executor=threads)
     with bridge.store() as store:
-        assert store.test_named(4, "h4-90").stage is Stage.WATCHED
+        assert store.tests.named(4, "h4-90").stage is Stage.WATCHED
         # It cannot be judged without the baseline, so it is not even kept as identified.
-        assert store.recordings()[6].stage is Stage.RECEIVED
-        assert [row.hanger for row in store.known_damage()] == [3]
+        assert store.recordings.list_all()[6].stage is Stage.RECEIVED
+        assert [row.hanger for row in store.upkeep.known_damage()] == [3]
 
 
 def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: Workspace) -> None:
@@ -148,7 +148,7 @@ def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: 
                 assert len(lines) == 2
                 assert lines[1].status is Status.ALERT, table
                 assert hanger_report(bridge, store, 4, START).posterior.hanger == 4
-                assert len(store.alerts()) == len(store.alert_rows()) == 2
+                assert len(store.alerts.list_all()) == len(store.alerts.list_rows()) == 2
             assert run(["--workspace", str(bridge.folder), "status"]) == 0
             assert run(["--workspace", str(bridge.folder), "report", "--bridge"]) == 0
             assert run(["--workspace", str(bridge.folder), "db", "check"]) == 5
@@ -222,7 +222,7 @@ def test_a_backup_keeps_all_else_and_names_the_damaged_row(
     assert run(["--workspace", str(bridge.folder), "db", "backup", str(file)]) == 5
     assert "row 2 of posteriors of hanger 3 is damaged" in capsys.readouterr().err
     with Store.open(file) as store:
-        assert len(store.recordings()) == 6
+        assert len(store.recordings.list_all()) == 6
 
 
 @pytest.mark.parametrize(

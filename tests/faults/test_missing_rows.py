@@ -198,7 +198,9 @@ def test_what_no_backup_has_is_accepted_and_no_more_than_that(
     assert "waits for a decision that nobody can make" in " ".join(said.err.split())
     assert "tokens" not in said.err
     with bridge.store() as store:
-        accepted = {event.file_name: event.message for event in store.events("accepted")}
+        accepted = {
+            event.file_name: event.message for event in store.recordings.list_events("accepted")
+        }
     assert accepted["tokens/1"].endswith(": taken out by hand")
 
 
@@ -221,7 +223,9 @@ def test_what_was_accepted_stays_accepted_as_work_is_done_again(
         id_ = connection.scalar(sa.text(first))
     take_out(bridge.location, table, id_)
     with bridge.store() as store:
-        assert store.accept_missing("Ann", "no backup", store.recording(1).received_at) > 0
+        assert (
+            store.upkeep.accept_missing("Ann", "no backup", store.recordings.get(1).received_at) > 0
+        )
     assert checked(bridge) == ()
     assert run(["--workspace", str(bridge.folder), "ingest", "--again", str(recording)]) in (0, 3)
     assert checked(bridge) == ()

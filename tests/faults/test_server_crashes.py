@@ -52,7 +52,7 @@ def until_through(workspace: Workspace, files: int, seconds: float = 120.0) -> N
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         with workspace.store() as store:
-            counts = store.stage_counts()
+            counts = store.recordings.stage_counts()
         if counts[Stage.DONE] + counts[Stage.REFUSED] == files:
             return
         time.sleep(0.2)

@@ -67,8 +67,8 @@ def one_case(fault: str, seed: int, folder: Path) -> Outcome:
             receive_all(flow)
             flow.drain()
             if number == good - 1:
-                held = len(flow.store.holds())
-        return Outcome(bool(flow.store.alerts()), held)
+                held = len(flow.store.recordings.list_holds())
+        return Outcome(bool(flow.store.alerts.list_all()), held)
 
 
 def _test(

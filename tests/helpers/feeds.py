@@ -54,18 +54,18 @@ def assert_all_done_once(feed: Feed) -> None:
     assert [path for path in workspace.spool.rglob("*") if path.is_file()] == []
     _assert_archive_holds(workspace.folder / "archive", set(names))
     with workspace.store() as store:
-        recordings = store.recordings()
+        recordings = store.recordings.list_all()
         assert len(recordings) == len(feed.files)
         assert {r.file.sha256: r.file.file_name for r in recordings} == names
         refused = {r.file.file_name for r in recordings if r.stage is Stage.REFUSED}
         done = {r.file.file_name for r in recordings if r.stage is Stage.DONE}
         assert (refused, done) == (feed.bad, set(feed.files) - feed.bad)
-        tests = [test.test.id for test in store.tests(3)]
+        tests = [test.test.id for test in store.tests.list_all(3)]
         assert tests == sorted(name.removesuffix(".modes.json") for name in done)
-        assert len(store.posteriors(3)) == len(tests)
-        assert [drift.test for drift in store.drifts(3)] == tests[1:]
-        assert len(store.watches(3)) == len(tests) - 1
-        assert store.events("duplicate") == ()
+        assert len(store.posteriors.list_all(3)) == len(tests)
+        assert [drift.test for drift in store.watch.list_drifts(3)] == tests[1:]
+        assert len(store.watch.list_all(3)) == len(tests) - 1
+        assert store.recordings.list_events("duplicate") == ()
     _assert_quarantine_holds(workspace.folder / "quarantine", feed)
 
 

@@ -88,5 +88,5 @@ def tension_kn(store: Store, hanger: int = 3) -> dict[str, float]:
     """The mean tension of each test, rounded to 1 N."""
     return {
         test.test.id: round(float(posterior.tension_n.mean()) / 1e3, 3)
-        for test, posterior in store.history(hanger)
+        for test, posterior in store.posteriors.history(hanger)
     }

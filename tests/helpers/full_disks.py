@@ -126,7 +126,7 @@ def _look(feed: Feed) -> None:
     with workspace.store() as store:
         assert check_store(store, quiet).troubles == ()
         assert check_archive(store, workspace.archive, quiet).troubles == ()
-        known = {each.file.file_name for each in store.recordings()}
+        known = {each.file.file_name for each in store.recordings.list_all()}
     lying = in_spool(workspace)
     for name, checksum in feed.checksums.items():
         assert name in known or checksum in lying, f"{name} is lost"

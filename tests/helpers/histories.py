@@ -22,10 +22,9 @@ from shm.store import (
     Store,
     Workspace,
 )
-from shm.store.archive_copies import copy_archive
 from shm.store.checking import archived_names
-from shm.store.retention import removable, remove
-from shm.store.tokens import Scope
+from shm.store.retention import copy_archive, removable, remove
+from shm.store.upkeep import Scope
 from shm.values import Fingerprint
 from tests.helpers import quick_update
 from tests.helpers.any_bar import take_any_bar
@@ -78,11 +77,11 @@ def _samples(workspace: Workspace, clock: Clock) -> None:
     with workspace.store() as store:
         for number in (1, 2):
             file = a_file(number, modified_at=clock())
-            recording = store.receive(file, clock()).recording
+            recording = store.recordings.receive(file, clock()).recording
             test = modelled_test(f"s{number}", workspace.bridge.hanger(3), day=number - 9)
             judged = Judged(file.sidecar_as, Fingerprint(f"{number:064x}", np.ones((1, 256)) / 16))
             found = [IdentifiedTest(test, frequency_response=a_response())]
-            store.identified(recording.id, found, LINEAGE, clock(), judged)
+            store.tests.save(recording.id, found, LINEAGE, clock(), judged)
     _work(workspace, clock)
 
 
@@ -93,10 +92,12 @@ def _held(workspace: Workspace, clock: Clock) -> None:
         put(workspace.spool / f"lost{number}.modes.json", document)
         _work(workspace, clock)
     with workspace.store() as store:
-        first, second, third, *_ = (hold.recording_id for hold in store.holds())
-        store.confirm(first, "Ann", "clock was dead", clock(), START + timedelta(days=70))
-        store.discard(second, "Ann", "of another bridge", clock())
-        store.again(third, Stage.IDENTIFIED, clock())
+        first, second, third, *_ = (hold.recording_id for hold in store.recordings.list_holds())
+        store.recordings.confirm(
+            first, "Ann", "clock was dead", clock(), START + timedelta(days=70)
+        )
+        store.recordings.discard(second, "Ann", "of another bridge", clock())
+        store.recordings.reprocess(third, Stage.IDENTIFIED, clock())
     _work(workspace, clock)
 
 
@@ -112,7 +113,7 @@ def _again(workspace: Workspace, clock: Clock) -> None:
     for name, stage in (("h3-60", Stage.WATCHED), ("h4-60", Stage.UPDATED)):
         with workspace.store() as store:
             clock.pass_by(60)
-            store.again(store.recording_named(name)[0], stage, clock())
+            store.recordings.reprocess(store.recordings.find(name)[0], stage, clock())
         _work(workspace, clock)
 
 
@@ -125,25 +126,25 @@ def _taken_out(workspace: Workspace, clock: Clock) -> None:
     with workspace.store() as store:
         for name in ("out2", "out1"):
             clock.pass_by(60)
-            store.withdraw(store.recording_named(name)[0], "Ann", "a slip", clock())
-        store.reinstate(store.recording_named("out2")[0], "Ann", "no slip", clock())
+            store.recordings.withdraw(store.recordings.find(name)[0], "Ann", "a slip", clock())
+        store.recordings.reinstate(store.recordings.find("out2")[0], "Ann", "no slip", clock())
     _work(workspace, clock)
 
 
 def _decide(store: Store, clock: Clock) -> None:
     """Acknowledges, adopts, drops that, sets a baseline anew: each a minute after the other."""
-    watched = [alert.id for alert in store.alerts() if ":held-" not in alert.alert.key]
+    watched = [alert.id for alert in store.alerts.list_all() if ":held-" not in alert.alert.key]
     for number in watched[:2]:
-        store.acknowledge(number, "engineer", "looked", clock())
+        store.alerts.acknowledge(number, "engineer", "looked", clock())
     for hanger in (3, 4):
-        store.add_diagnosis(hanger, a_diagnosis(), LINEAGE, clock())
-    before, baseline = store.selection(3), store.baseline(3)
+        store.posteriors.save_diagnosis(hanger, a_diagnosis(), LINEAGE, clock())
+    before, baseline = store.posteriors.selection(3), store.watch.baseline(3)
     assert before is not None
     assert baseline is not None
-    chosen = store.tests_of(baseline)
+    chosen = store.tests.of_baseline(baseline)
     effect = ("beam1", "point_mass", "everywhere", "a lamp", "engineer")
     clock.pass_by(60)
-    adopted = store.adopt(
+    adopted = store.posteriors.adopt(
         Adoption(3, _ADOPTED, *effect),
         a_posterior(_ADOPTED, tuple(test.test.id for test in chosen)),
         {"beam1": 0.4, _ADOPTED: 0.6},
@@ -152,23 +153,23 @@ def _decide(store: Store, clock: Clock) -> None:
         clock(),
     )
     clock.pass_by(60)
-    store.drop_adoption(adopted.id, "the lamp is gone", "engineer", clock())
+    store.posteriors.drop_adoption(adopted.id, "the lamp is gone", "engineer", clock())
     clock.pass_by(60)
-    newest, now = store.tests(3)[-1], store.baseline(3)
+    newest, now = store.tests.list_all(3)[-1], store.watch.baseline(3)
     assert now is not None
     joint = a_posterior("beam1", (newest.test.id,), seed=9)
     record = ("engineer", "new pin", newest.time)
-    store.rebaseline(now, joint, [newest], record, LINEAGE, clock())
+    store.watch.rebaseline(now, joint, [newest], record, LINEAGE, clock())
 
 
 def _keep(workspace: Workspace, store: Store, clock: Clock, folder: Path) -> None:
     for name in ("gauge", "office"):
-        store.create_token(name, Scope.READ, clock())
+        store.upkeep.create_token(name, Scope.READ, clock())
     for hanger in workspace.bridge.hangers:
-        store.keep_summaries(hanger)
+        store.posteriors.save_summaries(hanger)
     copies = Archive(folder / "copies")
     copy_archive(workspace.archive, copies, archived_names(store), quiet)
-    store.note_copies(copies, clock())
+    store.upkeep.note_copies(copies, clock())
     gone = removable(store, workspace.archive, clock(), quiet).removals[:1]
     remove(store, workspace.archive, gone, clock())
-    store.note_backup(folder / "may.db", clock())
+    store.upkeep.note_backup(folder / "may.db", clock())

@@ -60,7 +60,7 @@ def assert_nothing_lost_doubled_or_half_written(feed: Feed, undisturbed: Workspa
 def where_files_stand(workspace: Workspace, files: int) -> Standing:
     """How many files lie in the spool and how many at each stage: none less than were dropped."""
     with workspace.store() as store:
-        counts = store.stage_counts()
+        counts = store.recordings.stage_counts()
     in_spool = sum(not path.name.startswith(".") for path in workspace.spool.iterdir())
     assert in_spool + sum(counts.values()) >= files
     return in_spool, *counts.values()

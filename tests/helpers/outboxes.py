@@ -15,28 +15,31 @@ def make_baseline(workspace: Workspace) -> None:
     """The first test of hanger 3, with which later ones are compared."""
     with workspace.store() as store:
         (test,) = entered(store, [0])
-        store.selected(3, [test], Selection((a_posterior(),), (1.0,)), _LINEAGE, NOW)
+        store.posteriors.save_selection(
+            3, [test], Selection((a_posterior(),), (1.0,)), _LINEAGE, NOW
+        )
 
 
 def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[str]) -> None:
     """A test, its alert and the deliveries owed for it, for each number from 1 up."""
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         for test in entered(store, numbers):
             name = test.test.id
-            store.updated(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
+            store.posteriors.save(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
             alert = an_alert(f"hanger-3:{name}", name)
             assert (
-                store.watched(test, baseline, a_watched_test(name), alert, hooks, NOW) is not None
+                store.watch.save(test, baseline, a_watched_test(name), alert, hooks, NOW)
+                is not None
             )
 
 
 def entered(store: Store, numbers: Iterable[int]) -> list[StoredTest]:
     names = set()
     for number in numbers:
-        recording = store.receive(a_file(number), NOW).recording
+        recording = store.recordings.receive(a_file(number), NOW).recording
         test = a_test(f"t{number}", days=number / 10)
-        store.identified(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
+        store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
         names.add(test.id)
-    return [test for test in store.tests(3) if test.test.id in names]
+    return [test for test in store.tests.list_all(3) if test.test.id in names]

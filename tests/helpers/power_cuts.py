@@ -94,7 +94,7 @@ def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> 
             assert check_store(store, quiet).troubles == ()
             archived = check_archive(store, workspace.archive, quiet)
             assert archived.troubles == ()
-            known = {each.file.sha256 for each in store.recordings()}
+            known = {each.file.sha256 for each in store.recordings.list_all()}
             with store.reading() as connection:
                 count = connection.scalar(sa.select(sa.func.count()).select_from(steps))
         assert entered <= known, "what was entered is lost"
@@ -103,7 +103,7 @@ def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> 
         if goes_on:
             ingest(workspace)
             with workspace.store() as store:
-                stages = {each.file.sha256: each.stage for each in store.recordings()}
+                stages = {each.file.sha256: each.stage for each in store.recordings.list_all()}
                 assert landed <= stages.keys()
                 assert set(stages.values()) <= {Stage.DONE, Stage.REFUSED}
                 assert check_store(store, quiet).troubles == ()

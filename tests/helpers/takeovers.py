@@ -48,12 +48,12 @@ def kill_a_worker_then_the_active_daemon(folder: Path, store: str, files: int) -
 
 def done(workspace: Workspace) -> int:
     with workspace.store() as store:
-        return store.stage_counts()[Stage.DONE]
+        return store.recordings.stage_counts()[Stage.DONE]
 
 
 def ended(workspace: Workspace) -> int:
     with workspace.store() as store:
-        counts = store.stage_counts()
+        counts = store.recordings.stage_counts()
     return counts[Stage.DONE] + counts[Stage.REFUSED]
 
 

@@ -43,7 +43,7 @@ def served(
     over HTTPS with a certificate and its key.
     """
     with workspace.store() as store:
-        tokens = [store.create_token(scope, scope, utc_now()) for scope in Scope]
+        tokens = [store.upkeep.create_token(scope, scope, utc_now()) for scope in Scope]
     context = context_of(*certificate) if certificate else None
     server = make_server(make_app(workspace, address), Address(port=0), context)
     with socket.create_server(("127.0.0.1", 0)) as listening:

@@ -89,7 +89,7 @@ def _kill_one(busy: Path, rng: random.Random) -> bool:
 
 def stage_counts(workspace: Workspace) -> dict[Stage, int]:
     with workspace.store() as store:
-        return {stage: count for stage, count in store.stage_counts().items() if count}
+        return {stage: count for stage, count in store.recordings.stage_counts().items() if count}
 
 
 def _all_through(workspace: Workspace, files: int) -> bool:

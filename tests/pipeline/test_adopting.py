@@ -76,7 +76,7 @@ def adopted(workspace: Workspace, *effects: str, at: Sequence[str] = ()) -> Stor
 
 
 def models(store: Store) -> dict[str, str]:
-    return {test.test.id: posterior.model for test, posterior in store.history(3)}
+    return {test.test.id: posterior.model for test, posterior in store.posteriors.history(3)}
 
 
 def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace) -> None:
@@ -88,10 +88,10 @@ def test_the_next_test_uses_the_adopted_class_and_its_baseline(begun: Workspace)
     ingest(begun)
     with begun.store() as store:
         assert models(store) == dict.fromkeys(("t1", "t2", "t3"), MASS_MODEL)
-        drift = store.drifts(3)[-1]
+        drift = store.watch.list_drifts(3)[-1]
         assert (drift.test, drift.quantity) == ("t3", "tension")
         assert drift.shift_mean == pytest.approx(-0.2, abs=0.03)
-        baseline, selection = store.baseline(3), store.selection(3)
+        baseline, selection = store.watch.baseline(3), store.posteriors.selection(3)
         assert baseline is not None
         assert (baseline.posterior.tests, baseline.why) == (
             ("t1",),
@@ -107,13 +107,13 @@ def test_dropping_it_restores_class_and_baseline_for_the_next_test(begun: Worksp
     spool(begun, "t2", day=1)
     ingest(begun)
     with begun.store() as store:
-        store.drop_adoption(made.id, "taken off", "engineer", START)
+        store.posteriors.drop_adoption(made.id, "taken off", "engineer", START)
     spool(begun, "t3", day=2)
     ingest(begun)
     with begun.store() as store:
         assert models(store) == {"t1": "beam1", "t2": MASS_MODEL, "t3": "beam1"}
-        assert [drift.test for drift in store.drifts(3)] == ["t2", "t3"]
-        assert store.alerts() == ()
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["t2", "t3"]
+        assert store.alerts.list_all() == ()
         assert gap_watch(store, 3) is None
 
 
@@ -170,7 +170,7 @@ def test_a_gap_that_opens_again_is_one_alert(
     postman = Postman()
     ingest(begun, notifier=postman)
     with begun.store() as store:
-        (stored,) = store.alerts()
+        (stored,) = store.alerts.list_all()
         watch = gap_watch(store, 3)
     assert stored.alert.key.startswith("hanger-3:gap-up:baseline-")
     assert "1.00 % off the measured ones, 0.20 % when it was adopted" in stored.alert.message
@@ -188,7 +188,7 @@ def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
         spool(begun, f"t{number}", day=30 * number, tension=0.8)
     ingest(begun)
     with begun.store() as store:
-        (stored,) = store.alerts()
+        (stored,) = store.alerts.list_all()
     assert stored.alert.key.startswith(
         "hanger-3:beyond-threshold+sudden-change:tension-down:t3:gap-up:baseline-"
     )
@@ -234,7 +234,7 @@ def test_the_likeliest_place_and_the_baseline_come_from_the_diagnosis(begun: Wor
     pair = replace(MASS, effect="sag + effective_length", at="everywhere, transverse + both ends")
     found = replace(a_diagnosis(causes=(MASS, ends, pair)), baseline="beam2")
     with begun.store() as store:
-        stored = store.add_diagnosis(3, found, LINEAGE, START)
+        stored = store.posteriors.save_diagnosis(3, found, LINEAGE, START)
     made = adopted(begun, "effective_length")
     assert made.adoption.model == "beam2+effective_length@arch_end"
     assert made.adoption.diagnosis_id == stored.id
@@ -251,10 +251,10 @@ def test_what_single_tests_cannot_show_takes_its_size_from_the_diagnosis(
             test = write_test(begun.spool / "w.modes.json", begun, day=day, name=f"w{day}")
             put(begun.spool / "w.modes.json", _with_temperature(test, temperature))
             ingest(begun)
-        tests = store.tests(3)
+        tests = store.tests.list_all(3)
         with pytest.raises(BadInput, match="must come from a diagnosis"):
             adopted_name(["temperature_tension"], (), "beam1", hanger, None, tests)
-        diagnosis = store.add_diagnosis(3, a_diagnosis(("w1", "w2")), LINEAGE, START)
+        diagnosis = store.posteriors.save_diagnosis(3, a_diagnosis(("w1", "w2")), LINEAGE, START)
         name = adopted_name(["temperature_tension"], (), "", hanger, diagnosis, tests)
     estimate = WARMTH.parameters[0]
     model = build(str(name), hanger)
@@ -269,8 +269,8 @@ def test_what_single_tests_cannot_show_takes_its_size_from_the_diagnosis(
 def test_where_an_effect_sits_stays_as_diagnosed_and_its_size_is_free(begun: Workspace) -> None:
     hanger = begun.bridge.hanger(3)
     with begun.store() as store:
-        diagnosis = store.add_diagnosis(3, a_diagnosis(), LINEAGE, START)
-        tests = store.tests(3)
+        diagnosis = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, START)
+        tests = store.tests.list_all(3)
     name = adopted_name(["point_mass"], (), "", hanger, diagnosis, tests)
     assert str(name) == f"{MASS_MODEL}:x_m=3.31111..3.48889"
     elsewhere = replace(MASS, at="nowhere")
@@ -301,8 +301,8 @@ def test_each_effect_needs_its_place(begun: Workspace) -> None:
 def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
     adopted(begun, "bending_stiffness", at=["everywhere"])
     with begun.store() as store:
-        posteriors = {each.posterior.model: each for each in store.posteriors(3)}
-        test = store.tests(3)[0]
+        posteriors = {each.posterior.model: each for each in store.posteriors.list_all(3)}
+        test = store.tests.list_all(3)[0]
     assert posteriors.keys() == {STIFFNESS}
     lineage = posteriors[STIFFNESS].lineage
     assert lineage.input_sha256
@@ -328,7 +328,7 @@ def test_a_workspace_with_the_adoption_ingests_with_any_executor(tmp_path: Any) 
     ingest(workspace)
     made = adopted(workspace, "point_mass")
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert baseline.posterior.tests == ("t1", "t2")
         assert made.adoption.gap_before_percent == pytest.approx(2.0)

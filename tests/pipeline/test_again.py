@@ -18,8 +18,8 @@ def done(workspace: Workspace) -> Workspace:
 
 
 def do_again(flow: Flow, name: str, stage: Stage) -> None:
-    recording_id, test = flow.store.recording_named(name)
-    flow.store.again(recording_id, stage, flow.clock(), test)
+    recording_id, test = flow.store.recordings.find(name)
+    flow.store.recordings.reprocess(recording_id, stage, flow.clock(), test)
     flow.drain()
 
 
@@ -28,47 +28,49 @@ def test_a_test_done_again_gives_the_same_and_raises_no_second_alert(
     done: Workspace, stage: Stage
 ) -> None:
     with a_flow(done) as flow:
-        before = tension_kn(flow.store), repr(flow.store.watches(3)[-1].watched)
-        alerts = flow.store.alerts()
+        before = tension_kn(flow.store), repr(flow.store.watch.list_all(3)[-1].watched)
+        alerts = flow.store.alerts.list_all()
         do_again(flow, "t2", stage)
-        assert (tension_kn(flow.store), repr(flow.store.watches(3)[-1].watched)) == before
-        assert flow.store.alerts() == alerts
-        assert flow.store.stage_counts()[Stage.DONE] == 3
-        rows = flow.store.former_tests(flow.store.recording_named("t2")[0])
+        assert (tension_kn(flow.store), repr(flow.store.watch.list_all(3)[-1].watched)) == before
+        assert flow.store.alerts.list_all() == alerts
+        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
+        rows = flow.store.tests.list_former(flow.store.recordings.find("t2")[0])
         kept = (len(rows), sum(len(row.posteriors) for row in rows))
         assert kept == {"identified": (2, 2), "updated": (1, 2), "watched": (1, 1)}[stage]
 
 
 def test_the_test_of_the_baseline_done_again_leaves_the_baseline_alone(done: Workspace) -> None:
     with a_flow(done) as flow:
-        before, shifts = flow.store.baseline(3), flow.store.drifts(3)
+        before, shifts = flow.store.watch.baseline(3), flow.store.watch.list_drifts(3)
         do_again(flow, "t0", Stage.IDENTIFIED)
-        after = flow.store.baseline(3)
+        after = flow.store.watch.baseline(3)
         assert before is not None
         assert after is not None
         assert after.id == before.id
-        assert flow.store.drifts(3) == shifts
-        assert flow.store.stage_counts()[Stage.DONE] == 3
-        assert [test.test.id for test, _ in flow.store.history(3)] == ["t0", "t1", "t2"]
+        assert flow.store.watch.list_drifts(3) == shifts
+        assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
+        assert [test.test.id for test, _ in flow.store.posteriors.history(3)] == ["t0", "t1", "t2"]
 
 
 def test_a_test_that_is_watched_while_the_baselines_own_is_done_again_is_watched_as_ever(
     done: Workspace,
 ) -> None:
     with a_flow(done) as flow:
-        shifts = flow.store.drifts(3)
-        flow.store.again(flow.store.recording_named("t0")[0], Stage.IDENTIFIED, flow.clock())
+        shifts = flow.store.watch.list_drifts(3)
+        flow.store.recordings.reprocess(
+            flow.store.recordings.find("t0")[0], Stage.IDENTIFIED, flow.clock()
+        )
         do_again(flow, "t2", Stage.WATCHED)
-        assert flow.store.drifts(3) == shifts
+        assert flow.store.watch.list_drifts(3) == shifts
 
 
 def test_a_result_of_work_that_was_sent_back_meanwhile_is_not_kept(done: Workspace) -> None:
     with a_flow(done) as flow:
         store = flow.store
-        recording_id, _ = store.recording_named("t2")
-        test = store.tests(3)[-1]
-        store.again(recording_id, Stage.UPDATED, flow.clock(), "t2")
-        store.again(recording_id, Stage.IDENTIFIED, flow.clock())
-        store.updated(test, store.posterior(3, "t1"), test.lineage, flow.clock())
-        (row,) = store.former_tests(recording_id)
+        recording_id, _ = store.recordings.find("t2")
+        test = store.tests.list_all(3)[-1]
+        store.recordings.reprocess(recording_id, Stage.UPDATED, flow.clock(), "t2")
+        store.recordings.reprocess(recording_id, Stage.IDENTIFIED, flow.clock())
+        store.posteriors.save(test, store.posteriors.get(3, "t1"), test.lineage, flow.clock())
+        (row,) = store.tests.list_former(recording_id)
         assert len(row.posteriors) == 1

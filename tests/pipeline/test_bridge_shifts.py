@@ -25,17 +25,17 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def identified(store: Store, hanger: int, number: int, temperature_c: float) -> StoredTest:
-    recording = store.receive(a_file(100 * hanger + number), NOW).recording
+    recording = store.recordings.receive(a_file(100 * hanger + number), NOW).recording
     made = a_test(f"t{number}", days=number, hanger=hanger, temperature_c=temperature_c)
-    store.identified(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
-    return store.test_named(hanger, made.id)
+    store.tests.save(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
+    return store.tests.named(hanger, made.id)
 
 
 def begun(store: Store, hanger: int, temperature_c: float) -> Baseline:
     first = identified(store, hanger, 1, temperature_c)
     ranked = Selection((a_posterior(tests=(first.test.id,)),), (1.0,))
-    store.selected(hanger, [first], ranked, LINEAGE, NOW)
-    baseline = store.baseline(hanger)
+    store.posteriors.save_selection(hanger, [first], ranked, LINEAGE, NOW)
+    baseline = store.watch.baseline(hanger)
     assert baseline is not None
     return baseline
 
@@ -43,12 +43,12 @@ def begun(store: Store, hanger: int, temperature_c: float) -> Baseline:
 def watched(store: Store, baseline: Baseline, number: int, shift_mean: float) -> None:
     test = identified(store, baseline.hanger, number, 11.5 + WARMER_K)
     name = test.test.id
-    store.updated(test, a_posterior(tests=(name,), seed=number), LINEAGE, NOW)
+    store.posteriors.save(test, a_posterior(tests=(name,), seed=number), LINEAGE, NOW)
     drift = replace(a_drift(name), hanger=test.hanger, time=test.time, shift_mean=shift_mean)
     found = replace(
         a_watched_test(name), drifts=(drift,), time=test.time, temperature_c=test.test.temperature_c
     )
-    store.watched(test, baseline, found, None, (), NOW)
+    store.watch.save(test, baseline, found, None, (), NOW)
 
 
 def test_the_change_of_temperature_is_that_from_the_baselines_tests(store: Store) -> None:

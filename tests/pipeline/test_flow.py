@@ -23,7 +23,8 @@ from shm.errors import ShmError, StoreBusy, StoreError, UsageError, WorkerDied
 from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
-from shm.store import DeliveryState, Stage, Store, Workspace
+from shm.store import DeliveryState, Stage, Workspace
+from shm.store.stored_tests import Tests
 from shm.values import AddedMass, ModalTest, Posterior
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.workspaces import START, make_workspace, put, write_loss, write_test
@@ -35,7 +36,9 @@ def spool(workspace: Workspace, name: str, **values: float) -> None:
 
 def stages(workspace: Workspace) -> dict[str, Stage]:
     with workspace.store() as store:
-        return {recording.file.file_name: recording.stage for recording in store.recordings()}
+        return {
+            recording.file.file_name: recording.stage for recording in store.recordings.list_all()
+        }
 
 
 @pytest.mark.usefixtures("real_sampler")
@@ -49,14 +52,14 @@ def test_files_go_from_the_spool_through_all_stages(workspace: Workspace) -> Non
         tensions = tension_kn(store)
         assert tensions["t1"] == pytest.approx(711, rel=0.01)
         assert tensions["t2"] == pytest.approx(711 * 1.01, rel=0.01)
-        assert [drift.test for drift in store.drifts(3)] == ["t2"]
-        (drift,) = store.drifts(3)
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["t2"]
+        (drift,) = store.watch.list_drifts(3)
         assert drift.baseline == pytest.approx(711e3, rel=0.01)
         # A percent in one test is no change yet.
         assert 0 <= drift.shift_mean < 0.01
         assert drift.shift_sd > 0
-        assert store.alerts() == ()
-        assert store.baseline(3) is not None
+        assert store.alerts.list_all() == ()
+        assert store.watch.baseline(3) is not None
 
 
 def test_the_earliest_of_the_waiting_tests_makes_the_baseline(workspace: Workspace) -> None:
@@ -64,10 +67,10 @@ def test_the_earliest_of_the_waiting_tests_makes_the_baseline(workspace: Workspa
         spool(workspace, name, day=day)
     ingest(workspace)
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert baseline.posterior.tests == ("b",)
-        assert [drift.test for drift in store.drifts(3)] == ["c", "a"]
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["c", "a"]
 
 
 def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
@@ -88,7 +91,7 @@ def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
     spool(workspace, "later", day=1)
     ingest(workspace, lanes=3)
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert baseline.posterior.tests == ("earliest",)
 
@@ -113,8 +116,8 @@ def test_tests_are_watched_in_the_order_of_their_times(
         spool(workspace, f"t{number}", day=30 * number, tension=0.8)
     ingest(workspace, lanes=3)
     with workspace.store() as store:
-        assert [drift.test for drift in store.drifts(3)] == ["t1", "t2", "t3"]
-        assert [stored.alert.test for stored in store.alerts()] == ["t2"]
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["t1", "t2", "t3"]
+        assert [stored.alert.test for stored in store.alerts.list_all()] == ["t2"]
 
 
 def test_several_first_tests_make_the_baseline_together(tmp_path: Path) -> None:
@@ -128,10 +131,10 @@ def test_several_first_tests_make_the_baseline_together(tmp_path: Path) -> None:
     ingest(workspace)
     assert set(stages(workspace).values()) == {Stage.DONE}
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert baseline.posterior.tests == ("t1", "t2", "t3")
-        assert [drift.test for drift in store.drifts(3)] == ["t4"]
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["t4"]
 
 
 def test_each_hanger_has_its_own_baseline_and_selected_class(tmp_path: Path) -> None:
@@ -142,9 +145,9 @@ def test_each_hanger_has_its_own_baseline_and_selected_class(tmp_path: Path) -> 
     spool(workspace, "four", hanger=4, tension=0.9)
     ingest(workspace)
     with workspace.store() as store:
-        assert set(store.selected_models()) == {3, 4}
+        assert set(store.posteriors.selected_models()) == {3, 4}
         for hanger in (3, 4):
-            selection = store.selection(hanger)
+            selection = store.posteriors.selection(hanger)
             assert selection is not None
             assert {p.model for p in selection.selection.posteriors} == {"beam1", "beam2"}
             assert sum(selection.selection.probabilities) == pytest.approx(1)
@@ -157,14 +160,14 @@ def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_test_that_calls_
     postman = Postman()
     ingest(workspace, notifier=postman, lanes=3)
     with workspace.store() as store:
-        (stored,) = store.alerts()
+        (stored,) = store.alerts.list_all()
         assert stored.alert.test == "t2"
         assert stored.alert.key == (
             "hanger-3:beyond-threshold+sudden-change:tension-down:t2:baseline-1"
         )
         assert postman.told == [("mail", stored.alert.key)]
-        assert [each.state for each in store.deliveries()] == [DeliveryState.DELIVERED]
-        assert len(store.drifts(3)) == 3
+        assert [each.state for each in store.alerts.list_deliveries()] == [DeliveryState.DELIVERED]
+        assert len(store.watch.list_drifts(3)) == 3
 
 
 def test_without_a_notifier_alerts_wait_in_the_outbox(workspace: Workspace) -> None:
@@ -186,11 +189,11 @@ def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(tmp_path:
     with a_flow(workspace, clock=clock, notifier=postman) as flow:
         receive_all(flow)
         flow.drain()
-        while waiting := flow.store.deliveries(DeliveryState.WAITING):
+        while waiting := flow.store.alerts.list_deliveries(DeliveryState.WAITING):
             waits.append((waiting[0].next_attempt_at - clock()).total_seconds())
             clock.pass_by(waits[-1])
             flow.drain()
-        (delivery,) = flow.store.deliveries()
+        (delivery,) = flow.store.alerts.list_deliveries()
     assert waits == [10.0, 20.0]
     assert (delivery.state, delivery.attempts) == (DeliveryState.GIVEN_UP, 3)
     assert delivery.last_error == "no answer"
@@ -205,7 +208,7 @@ def test_a_hook_that_recovers_is_told(workspace: Workspace) -> None:
         flow.drain()
         clock.pass_by(60)
         flow.drain()
-        (delivery,) = flow.store.deliveries()
+        (delivery,) = flow.store.alerts.list_deliveries()
     assert (delivery.state, delivery.attempts) == (DeliveryState.DELIVERED, 2)
     assert len(postman.told) == 2
 
@@ -220,10 +223,10 @@ def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
     with a_flow(workspace, clock=clock, notifier=postman) as flow:
         receive_all(flow)
         flow.drain()
-        assert flow.store.deliveries(DeliveryState.WAITING)
+        assert flow.store.alerts.list_deliveries(DeliveryState.WAITING)
         clock.pass_by(-ahead)
         flow.drain()
-        (delivery,) = flow.store.deliveries()
+        (delivery,) = flow.store.alerts.list_deliveries()
     assert delivery.state is DeliveryState.DELIVERED
 
 
@@ -233,7 +236,7 @@ def test_a_hook_that_is_no_longer_described_fails_and_says_so(workspace: Workspa
     bare = replace(workspace, bridge=replace(workspace.bridge, hooks=()))
     ingest(bare, notifier=Postman())
     with workspace.store() as store:
-        (delivery,) = store.deliveries()
+        (delivery,) = store.alerts.list_deliveries()
     assert delivery.attempts == 1
     assert "no hook mail" in delivery.last_error
 
@@ -248,8 +251,11 @@ def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Wo
     assert list(workspace.spool.iterdir()) == []
     assert len(stages(workspace)) == 1
     with workspace.store() as store:
-        assert len(store.tests()) == 1
-        assert [event.kind for event in store.events()] == ["duplicate", "duplicate"]
+        assert len(store.tests.list_all()) == 1
+        assert [event.kind for event in store.recordings.list_events()] == [
+            "duplicate",
+            "duplicate",
+        ]
 
 
 def test_later_tests_start_from_the_baseline_whichever_was_computed_before(
@@ -266,12 +272,12 @@ def test_later_tests_start_from_the_baseline_whichever_was_computed_before(
         spool(workspace, name, day=day)
         ingest(workspace)
     with workspace.store() as store:
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert len(known_samples) == 2
         for samples in known_samples:
             np.testing.assert_array_equal(samples, baseline.posterior.samples)
-        ways = {test.test.id: posterior.method for test, posterior in store.history(3)}
+        ways = {test.test.id: posterior.method for test, posterior in store.posteriors.history(3)}
     assert ways == {"first": "tmcmc", "second": "re-weighted", "third": "re-weighted"}
 
 
@@ -288,7 +294,7 @@ def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
                 if lanes == 1:
                     flow.drain()
             flow.drain()
-            history = flow.store.history(3)
+            history = flow.store.posteriors.history(3)
             found.append({test.test.id: posterior.samples for test, posterior in history})
     assert found[0].keys() == found[1].keys() == {"0", "a", "b", "c"}
     for name, samples in found[0].items():
@@ -312,9 +318,11 @@ def test_a_flow_ended_after_any_turn_goes_on_where_it_stood(workspace: Workspace
     assert stages(workspace) == stages(reference)
     with workspace.store() as store, reference.store() as expected:
         assert tension_kn(store) == tension_kn(expected)
-        assert store.drifts() == expected.drifts()
-        assert [a.alert for a in store.alerts()] == [a.alert for a in expected.alerts()]
-        assert [a.alert.test for a in store.alerts()] == ["t2"]
+        assert store.watch.list_drifts() == expected.watch.list_drifts()
+        assert [a.alert for a in store.alerts.list_all()] == [
+            a.alert for a in expected.alerts.list_all()
+        ]
+        assert [a.alert.test for a in store.alerts.list_all()] == ["t2"]
 
 
 def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
@@ -337,7 +345,7 @@ def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(
     assert any(record.exc_info for record in caplog.records)
     with workspace.store() as store:
         assert list(tension_kn(store)) == ["t1", "t3"]
-        (refused,) = store.recordings(Stage.REFUSED)
+        (refused,) = store.recordings.list_all(Stage.REFUSED)
         assert workspace.archive.holds(refused.file)
 
 
@@ -519,8 +527,10 @@ def test_a_recording_that_moves_on_is_no_suspect_any_more(workspace: Workspace) 
         drain_patiently(flow, clock)
         clock.pass_by(1.0)
         assert set(stages(workspace).values()) == {Stage.DONE}
-        assert flow.store.deaths() == {}
-        assert [event.kind for event in flow.store.events()][1:] == ["worker killed"] * 3
+        assert flow.store.recordings.deaths() == {}
+        assert [event.kind for event in flow.store.recordings.list_events()][1:] == [
+            "worker killed"
+        ] * 3
 
 
 def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
@@ -535,7 +545,7 @@ def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
     with a_flow(workspace, clock=clock) as flow:
         receive_all(flow)
         assert sum(drain_patiently(flow, clock)) < 60
-        (refused,) = flow.store.recordings(Stage.REFUSED)
+        (refused,) = flow.store.recordings.list_all(Stage.REFUSED)
     assert refused.reason is not None
     assert "needs more memory than one step is given" in refused.reason["message"]
 
@@ -566,14 +576,14 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spool(workspace, "t1")
-    keep, busy = Store.identified, [True]
+    keep, busy = Tests.save, [True]
 
     def busy_once(self, *args):  # type: ignore[no-untyped-def]
         if busy and busy.pop():
             raise StoreBusy("held", retry_after_s=1.0)
         keep(self, *args)
 
-    monkeypatch.setattr(Store, "identified", busy_once)
+    monkeypatch.setattr(Tests, "save", busy_once)
     with a_flow(workspace) as flow:
         receive_all(flow)
         with pytest.raises(StoreBusy):
@@ -588,7 +598,7 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
     def refuse(self, *args):  # type: ignore[no-untyped-def]
         raise StoreError("a value is out of range.")
 
-    monkeypatch.setattr(Store, "identified", refuse)
+    monkeypatch.setattr(Tests, "save", refuse)
     spool(workspace, "t1")
     ingest(workspace)
     assert set(stages(workspace).values()) == {Stage.REFUSED}
@@ -604,8 +614,8 @@ def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(
     ingest(workspace)
     assert stages(workspace) == {"good.modes.json": Stage.DONE, "x.modes.json": Stage.REFUSED}
     with workspace.store() as store:
-        assert [test.test.id for test in store.tests()] == ["good"]
-        (refused,) = store.recordings(Stage.REFUSED)
+        assert [test.test.id for test in store.tests.list_all()] == ["good"]
+        (refused,) = store.recordings.list_all(Stage.REFUSED)
         assert refused.reason is not None
         assert "heavy" in refused.reason["message"]
 
@@ -631,7 +641,7 @@ def test_a_refused_test_does_not_stop_the_others_of_its_file(
     assert set(stages(workspace).values()) == {Stage.REFUSED}
     with workspace.store() as store:
         assert list(tension_kn(store)) == ["first", "third"]
-        assert [drift.test for drift in store.drifts(3)] == ["third"]
+        assert [drift.test for drift in store.watch.list_drifts(3)] == ["third"]
 
 
 def test_tests_of_a_hanger_taken_out_of_the_description_wait(tmp_path: Path) -> None:
@@ -673,7 +683,9 @@ def test_a_result_says_from_what_and_how_it_was_made(
         spool(workspace, "t1")
         ingest(workspace)
         with workspace.store() as store:
-            found.append((store.tests(3)[0].lineage, store.posteriors(3)[0].lineage))
+            found.append(
+                (store.tests.list_all(3)[0].lineage, store.posteriors.list_all(3)[0].lineage)
+            )
     (test, posterior), (other_test, other_posterior) = found
     assert (test.input_sha256 == other_test.input_sha256) is same_input
     assert (test.settings_sha256 == other_test.settings_sha256) is same_settings

@@ -55,7 +55,7 @@ def held(workspace: Workspace) -> Workspace:
 
 
 def counted(store: Store) -> list[str]:
-    return [test.test.id for test in store.tests(3)]
+    return [test.test.id for test in store.tests.list_all(3)]
 
 
 def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
@@ -64,7 +64,7 @@ def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
     postman = Postman()
     ingest(held, notifier=postman)
     with held.store() as store:
-        first, second = (stored.alert for stored in store.alerts())
+        first, second = (stored.alert for stored in store.alerts.list_all())
         assert first.kinds == second.kinds == ("held",)
         assert first.message.startswith("Hanger 3 may have lost 10 % of its tension: one held test")
         assert "2 held tests agree" in second.message
@@ -76,17 +76,17 @@ def test_two_tests_of_1970_with_a_loss_tell_of_it(held: Workspace) -> None:
 def test_what_is_held_counts_in_nothing(held: Workspace) -> None:
     with held.store() as store:
         assert counted(store) == ["good"]
-        assert store.stage_counts()[Stage.HELD] == 1
-        assert store.drifts(3) == ()
-        assert [test.test.id for test, _ in store.history(3)] == ["good"]
-        assert [row.name for row in store.test_rows(3)] == ["good"]
-        assert store.latest_tests()[3].tests == 1
-        assert len(store.trend(held.bridge.hanger(3))) == 1
-        assert store.oldest_waiting() is None
-        assert store.waiting_tests() == ()
+        assert store.recordings.stage_counts()[Stage.HELD] == 1
+        assert store.watch.list_drifts(3) == ()
+        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["good"]
+        assert [row.name for row in store.tests.list_rows(3)] == ["good"]
+        assert store.tests.latest()[3].tests == 1
+        assert len(store.posteriors.trend(held.bridge.hanger(3))) == 1
+        assert store.recordings.oldest_waiting() is None
+        assert store.tests.list_waiting() == ()
         with pytest.raises(NothingThere):
-            store.test_named(3, "lost")
-        (hold,) = store.holds()
+            store.tests.named(3, "lost")
+        (hold,) = store.recordings.list_holds()
         assert (hold.recording_id, hold.hanger, hold.decision) == (2, 3, None)
         assert [doubt.check for doubt in hold.doubts] == ["clock before the bridge"]
 
@@ -95,8 +95,8 @@ def test_a_first_test_that_is_held_makes_no_baseline(workspace: Workspace) -> No
     spool(workspace, "first", EPOCH)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.baseline(3) is None
-        assert store.stage_counts()[Stage.HELD] == 1
+        assert store.watch.baseline(3) is None
+        assert store.recordings.stage_counts()[Stage.HELD] == 1
 
 
 def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
@@ -104,44 +104,44 @@ def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
 ) -> None:
     with a_flow(held) as flow:
         at = flow.clock()
-        hold = flow.store.confirm(2, "Ann", "clock was dead", at)
+        hold = flow.store.recordings.confirm(2, "Ann", "clock was dead", at)
         assert (hold.decision, hold.who, hold.why) == (Decision.CONFIRMED, "Ann", "clock was dead")
         flow.drain()
-        assert flow.store.recording(2).stage is Stage.DONE
-        _, test = flow.store.tests(3)
-        assert test.time == flow.store.recording(2).received_at
+        assert flow.store.recordings.get(2).stage is Stage.DONE
+        _, test = flow.store.tests.list_all(3)
+        assert test.time == flow.store.recordings.get(2).received_at
         assert test.test.time is None
         assert "confirmed by Ann" in test.notes[-1]
-        assert [drift.test for drift in flow.store.drifts(3)] == ["lost"]
-        assert flow.store.holds() == ()
-        (notice,) = flow.store.alerts()
+        assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["lost"]
+        assert flow.store.recordings.list_holds() == ()
+        (notice,) = flow.store.alerts.list_all()
         assert notice.acknowledgement is not None
         assert notice.acknowledgement.who == "Ann"
 
 
 def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.confirm(2, "Ann", "", flow.clock(), day(30))
+        flow.store.recordings.confirm(2, "Ann", "", flow.clock(), day(30))
         flow.drain()
-        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
-        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
+        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
-        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
-        assert flow.store.stage_counts()[Stage.HELD] == 0
+        assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
+        assert flow.store.recordings.stage_counts()[Stage.HELD] == 0
         with pytest.raises(UsageError, match="not held: it was confirmed by Ann"):
-            flow.store.confirm(2, "Bob", "", flow.clock())
+            flow.store.recordings.confirm(2, "Bob", "", flow.clock())
 
 
 def test_a_time_yet_to_come_is_given_to_no_test(held: Workspace) -> None:
     with a_flow(held) as flow, pytest.raises(UsageError, match="yet to come"):
-        flow.store.confirm(2, "Ann", "", flow.clock(), day(9000))
+        flow.store.recordings.confirm(2, "Ann", "", flow.clock(), day(9000))
 
 
 def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.discard(2, "Ann", "wrong hanger", flow.clock())
+        flow.store.recordings.discard(2, "Ann", "wrong hanger", flow.clock())
         flow.drain()
-        recording = flow.store.recording(2)
+        recording = flow.store.recordings.get(2)
         assert recording.stage is Stage.REFUSED
         assert recording.reason is not None
         assert recording.reason["message"] == (
@@ -150,55 +150,55 @@ def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
         assert "`shm ingest --confirm 2 --why TEXT`" in recording.reason["remedy"]
         assert held.archive.holds(recording.file)
         assert counted(flow.store) == ["good"]
-        assert flow.store.holds() == ()
+        assert flow.store.recordings.list_holds() == ()
 
 
 def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> None:
     """It was held again, and asked again, each time that the crew sent its folder."""
     with a_flow(held) as flow:
-        flow.store.discard(2, "Ann", "of another bridge", flow.clock())
+        flow.store.recordings.discard(2, "Ann", "of another bridge", flow.clock())
         spool(held, "lost", EPOCH, tension=0.9)
         receipt = flow.receive(held.spool / "lost.modes.json")
         flow.drain()
         assert receipt.outcome is Outcome.DISCARDED
-        assert flow.store.recording(2).stage is Stage.REFUSED
-        assert len(flow.store.alerts()) == 1
+        assert flow.store.recordings.get(2).stage is Stage.REFUSED
+        assert len(flow.store.alerts.list_all()) == 1
         assert list(held.spool.iterdir()) == []
         with pytest.raises(UsageError, match=r"was discarded on .* because: of another bridge"):
-            flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+            flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
 
 
 def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.discard(2, "Ann", "", flow.clock())
+        flow.store.recordings.discard(2, "Ann", "", flow.clock())
         put(held.spool / "lost.modes.toml", "temperature_c = 12.0\n")
         spool(held, "lost", EPOCH, tension=0.9)
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
         flow.drain()
-        assert flow.store.recording(2).stage is Stage.HELD
+        assert flow.store.recordings.get(2).stage is Stage.HELD
 
 
 def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.discard(2, "Ann", "", flow.clock())
-        flow.store.refuse(2, {"message": "no rate."}, flow.clock())
+        flow.store.recordings.discard(2, "Ann", "", flow.clock())
+        flow.store.recordings.refuse(2, {"message": "no rate."}, flow.clock())
         spool(held, "lost", EPOCH, tension=0.9)
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
 
 
 def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.discard(2, "Ann", "", flow.clock())
-        hold = flow.store.reinstate(2, "Bob", "it was right", flow.clock(), day(30))
+        flow.store.recordings.discard(2, "Ann", "", flow.clock())
+        hold = flow.store.recordings.reinstate(2, "Bob", "it was right", flow.clock(), day(30))
         flow.drain()
         assert (hold.decision, hold.who) == (Decision.REINSTATED, "Bob")
-        recording = flow.store.recording(2)
+        recording = flow.store.recordings.get(2)
         assert (recording.stage, recording.reason) == (Stage.DONE, None)
-        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
-        assert [drift.test for drift in flow.store.drifts(3)] == ["lost"]
-        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
+        assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["lost"]
+        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
-        assert [test.time for test in flow.store.tests(3)] == [day(0), day(30)]
+        assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         assert check_store(flow.store, quiet).troubles == ()
 
 
@@ -215,7 +215,7 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
     """Nobody could take out the part that had come before its whole."""
     with a_flow(counting) as flow:
         store = flow.store
-        made = store.withdraw(3, "Ann", "of hanger 4", flow.clock())
+        made = store.recordings.withdraw(3, "Ann", "of hanger 4", flow.clock())
         assert (made.hold.decision, made.of_baseline, made.watched_again) == (
             Decision.WITHDRAWN,
             (),
@@ -223,35 +223,43 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         )
         flow.drain()
         assert counted(store) == ["t0", "t1", "t3"]
-        assert [watch.watched.test for watch in store.watches(3)] == ["t1", "t3"]
-        assert [watch.watched.change.called for watch in store.watches(3)] == [False, False]
-        assert {drift.test for drift in store.drifts(3)} == {"t1", "t3"}
-        assert [test.test.id for test, _ in store.history(3)] == ["t0", "t1", "t3"]
-        assert len(store.posteriors(3)) == len(store.trend(counting.bridge.hanger(3))) == 3
+        assert [watch.watched.test for watch in store.watch.list_all(3)] == ["t1", "t3"]
+        assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [False, False]
+        assert {drift.test for drift in store.watch.list_drifts(3)} == {"t1", "t3"}
+        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t0", "t1", "t3"]
+        assert (
+            len(store.posteriors.list_all(3))
+            == len(store.posteriors.trend(counting.bridge.hanger(3)))
+            == 3
+        )
         with pytest.raises(NothingThere):
-            store.posterior(3, "t2")
-        recording = store.recording(3)
+            store.posteriors.get(3, "t2")
+        recording = store.recordings.get(3)
         assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
         assert check_store(store, quiet).troubles == ()
         with pytest.raises(UsageError, match="does not count: it is refused"):
-            store.withdraw(3, "Ann", "", flow.clock())
-        store.reinstate(3, "Ann", "it was of 3", flow.clock())
+            store.recordings.withdraw(3, "Ann", "", flow.clock())
+        store.recordings.reinstate(3, "Ann", "it was of 3", flow.clock())
         flow.drain()
         assert counted(store) == ["t0", "t1", "t2", "t3"]
-        assert [watch.watched.change.called for watch in store.watches(3)] == [False, False, True]
+        assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [
+            False,
+            False,
+            True,
+        ]
         assert check_store(store, quiet).troubles == ()
         with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
-            store.reinstate(3, "Ann", "", flow.clock())
+            store.recordings.reinstate(3, "Ann", "", flow.clock())
 
 
 def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_shown(
     counting: Workspace,
 ) -> None:
     with counting.store() as store:
-        made = store.withdraw(1, "Ann", "a part", START)
+        made = store.recordings.withdraw(1, "Ann", "a part", START)
         assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 3)
-        assert store.baseline(3) is not None
-        assert len(store.posteriors(3)) == 3
+        assert store.watch.baseline(3) is not None
+        assert len(store.posteriors.list_all(3)) == 3
 
 
 def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace) -> None:
@@ -261,14 +269,14 @@ def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace)
     ingest(workspace)
     with a_flow(workspace) as flow:
         store = flow.store
-        store.withdraw(1, "Ann", "a slip", flow.clock(), "b")
+        store.recordings.withdraw(1, "Ann", "a slip", flow.clock(), "b")
         flow.drain()
-        assert (counted(store), store.recording(1).stage) == (["a", "c"], Stage.DONE)
-        store.again(1, Stage.IDENTIFIED, flow.clock())
+        assert (counted(store), store.recordings.get(1).stage) == (["a", "c"], Stage.DONE)
+        store.recordings.reprocess(1, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert counted(store) == ["a", "c"]
         assert check_store(store, quiet).troubles == ()
-        store.reinstate(1, "Ann", "no slip", flow.clock(), test="b")
+        store.recordings.reinstate(1, "Ann", "no slip", flow.clock(), test="b")
         flow.drain()
         assert counted(store) == ["a", "b", "c"]
         assert check_store(store, quiet).troubles == ()
@@ -283,21 +291,21 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
     write(whole, workspace.spool / "whole.npz")
     ingest(workspace)
     with a_flow(workspace) as flow:
-        (hold,) = flow.store.holds()
+        (hold,) = flow.store.recordings.list_holds()
         assert "it holds all of part.npz (recording 1), 67 % of its own samples" in hold.message
         assert (
             "`shm ingest --discard 1 --why TEXT`, then `shm ingest --confirm 2 --why TEXT`"
             in hold.message
         )
         assert ".." not in hold.message
-        flow.store.withdraw(1, "Ann", "a part", flow.clock())
-        flow.store.confirm(2, "Ann", "the whole", flow.clock())
+        flow.store.recordings.withdraw(1, "Ann", "a part", flow.clock())
+        flow.store.recordings.confirm(2, "Ann", "the whole", flow.clock())
         flow.drain()
         assert counted(flow.store) == ["whole"]
         write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
         receive_all(flow)
         flow.drain()
-        (hold,) = flow.store.holds()
+        (hold,) = flow.store.recordings.list_holds()
         assert "a part of whole.npz (recording 2), 67 % of that one, sent again" in hold.message
 
 
@@ -311,11 +319,11 @@ def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:
         receive_all(flow)
         flow.drain()
         assert counted(flow.store) == ["a", "c"]
-        assert [drift.test for drift in flow.store.drifts(3)] == ["c"]
-        assert flow.store.recording(1).stage is Stage.HELD
-        flow.store.confirm(1, "Ann", "", flow.clock())
+        assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["c"]
+        assert flow.store.recordings.get(1).stage is Stage.HELD
+        flow.store.recordings.confirm(1, "Ann", "", flow.clock())
         flow.drain()
-        assert flow.store.recording(1).stage is Stage.DONE
+        assert flow.store.recordings.get(1).stage is Stage.DONE
         assert counted(flow.store) == ["a", "c", "b"]
 
 
@@ -326,7 +334,7 @@ def test_a_held_test_that_is_killed_on_the_way_is_told_of_once(workspace: Worksp
     for _ in range(3):  # each time a process of its own
         ingest(workspace)
     with workspace.store() as store:
-        assert len(store.alerts()) == len(store.holds()) == 1
+        assert len(store.alerts.list_all()) == len(store.recordings.list_holds()) == 1
 
 
 @pytest.mark.parametrize(
@@ -343,7 +351,7 @@ def test_a_time_that_cannot_be_is_held(workspace: Workspace, time: datetime, che
     spool(workspace, "first", time)
     ingest(workspace)
     with workspace.store() as store:
-        (hold,) = store.holds()
+        (hold,) = store.recordings.list_holds()
         assert [doubt.check for doubt in hold.doubts] == [check]
         assert hold.time_unknown
 
@@ -361,7 +369,7 @@ def test_what_may_be_passes(workspace: Workspace, time: datetime | None) -> None
     spool(workspace, "other", time)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.stage_counts()[Stage.DONE] == 2
+        assert store.recordings.stage_counts()[Stage.DONE] == 2
 
 
 def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> None:
@@ -373,7 +381,7 @@ def test_a_time_before_the_bridge_was_built_is_held(workspace: Workspace) -> Non
     ingest(workspace.reopened())
     with workspace.store() as store:
         assert counted(store) == ["after"]
-        assert "The bridge was built on 1998-06-01." in store.holds()[0].message
+        assert "The bridge was built on 1998-06-01." in store.recordings.list_holds()[0].message
 
 
 def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> None:
@@ -388,7 +396,7 @@ def test_a_stuck_clock_is_held_and_a_mere_date_is_not(workspace: Workspace) -> N
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "c", "d"]
-        (hold,) = store.holds()
+        (hold,) = store.recordings.list_holds()
         assert [doubt.check for doubt in hold.doubts] == [
             "clock stuck",
             "clock before the baseline",
@@ -405,7 +413,7 @@ def test_a_loss_dated_before_the_baseline_is_held_and_an_old_test_is_not(
         ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["old", "a"]
-        (hold,) = store.holds()
+        (hold,) = store.recordings.list_holds()
         assert [doubt.check for doubt in hold.doubts] == ["clock before the baseline"]
 
 
@@ -417,24 +425,24 @@ def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> Non
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a"]
-        assert "copy" in [doubt.check for doubt in store.holds()[0].doubts]
+        assert "copy" in [doubt.check for doubt in store.recordings.list_holds()[0].doubts]
 
 
 def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.again(2, Stage.IDENTIFIED, flow.clock())
+        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
-        assert len(flow.store.holds()) == 1
-        former, _ = flow.store.alerts()
+        assert len(flow.store.recordings.list_holds()) == 1
+        former, _ = flow.store.alerts.list_all()
         assert former.acknowledgement is not None
 
 
 def test_what_is_not_there_cannot_be_confirmed(held: Workspace) -> None:
     with held.store() as store:
         with pytest.raises(NothingThere, match="no recording 9"):
-            store.confirm(9, "Ann", "", START)
+            store.recordings.confirm(9, "Ann", "", START)
         with pytest.raises(UsageError, match="recording 1 is not held"):
-            store.discard(1, "Ann", "", START)
+            store.recordings.discard(1, "Ann", "", START)
 
 
 def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> None:
@@ -442,7 +450,7 @@ def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> 
     with a_flow(held) as flow:
         receipt = flow.receive(held.spool / "lost.modes.json")
         assert receipt.outcome is Outcome.DUPLICATE
-        assert flow.store.recording(2).stage is Stage.HELD
+        assert flow.store.recordings.get(2).stage is Stage.HELD
 
 
 def a_recording(seed: int = 1) -> Recording:
@@ -465,8 +473,12 @@ def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Wor
     ingest(workspace)
     with workspace.store() as store:
         assert counted(store) == ["a", "e"]
-        assert [hold.file_name for hold in store.holds()] == ["b.uff", "c.csv", "d.h5"]
-        for hold in store.holds():
+        assert [hold.file_name for hold in store.recordings.list_holds()] == [
+            "b.uff",
+            "c.csv",
+            "d.h5",
+        ]
+        for hold in store.recordings.list_holds():
             assert "copy" in [doubt.check for doubt in hold.doubts]
             assert "again" in hold.message
 
@@ -477,17 +489,17 @@ def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace
     sidecar = (workspace.spool / "a.toml").read_text()
     ingest(workspace)
     with workspace.store() as store:
-        (before,) = store.tests(3)
+        (before,) = store.tests.list_all(3)
     put(workspace.spool / "a.toml", sidecar.replace("2026-05-01", "2026-05-09"))
     put(workspace.spool / "a.uff", raw)
     with a_flow(workspace) as flow:
         receipt = flow.receive(workspace.spool / "a.uff")
         assert receipt.outcome is Outcome.REDESCRIBED
         flow.drain()
-        (after,) = flow.store.tests(3)
+        (after,) = flow.store.tests.list_all(3)
         assert after.time == before.time + timedelta(days=8)
         assert after.lineage.input_sha256 != before.lineage.input_sha256
-        former, _ = flow.store.former_tests(1)
+        former, _ = flow.store.tests.list_former(1)
         assert former.superseded_at is not None
         assert list(workspace.spool.iterdir()) == []
 
@@ -499,8 +511,8 @@ def test_a_broken_sidecar_says_that_the_test_counts_no_more(workspace: Workspace
     write_test(workspace.spool / "a.modes.json", workspace)
     ingest(workspace)
     with workspace.store() as store:
-        recording = store.recording(1)
-        assert (recording.stage, store.tests(3)) == (Stage.REFUSED, ())
+        recording = store.recordings.get(1)
+        assert (recording.stage, store.tests.list_all(3)) == (Stage.REFUSED, ())
         assert "counts no more" in recording.reason["remedy"]
 
 
@@ -510,14 +522,14 @@ def test_a_corrected_sidecar_ends_a_hold(workspace: Workspace) -> None:
     sidecar = (workspace.spool / "a.toml").read_text()
     ingest(workspace)
     with workspace.store() as store:
-        assert store.stage_counts()[Stage.HELD] == 1
+        assert store.recordings.stage_counts()[Stage.HELD] == 1
     put(workspace.spool / "a.toml", sidecar.replace("1970-01-01", "2026-05-09"))
     put(workspace.spool / "a.uff", raw)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.holds() == ()
-        assert store.recording(1).stage is Stage.DONE
-        (notice,) = store.alerts()
+        assert store.recordings.list_holds() == ()
+        assert store.recordings.get(1).stage is Stage.DONE
+        (notice,) = store.alerts.list_all()
         assert notice.acknowledgement is not None
 
 
@@ -532,7 +544,7 @@ def test_a_counted_and_a_held_test_that_agree_say_so_in_either_order(
     spool(workspace, "held", EPOCH, tension=0.9)
     ingest(workspace)
     with workspace.store() as store:
-        (notice,) = (stored.alert for stored in store.alerts())
+        (notice,) = (stored.alert for stored in store.alerts.list_all())
         assert notice.kinds == ("held",)
         assert "of its tension: 2 tests agree, 1 of them held. Repeat" in notice.message
 
@@ -541,12 +553,12 @@ def test_a_counted_test_that_agrees_with_a_held_one_raises_an_alert(held: Worksp
     spool(held, "counted", day(10), tension=0.9)
     ingest(held)
     with held.store() as store:
-        notice, alert = (stored.alert for stored in store.alerts())
+        notice, alert = (stored.alert for stored in store.alerts.list_all())
         assert notice.kinds == ("held",)
         assert alert.kinds == ("beyond threshold",)
         assert alert.test == "counted"
         assert "Tests lost (held for its clock) and counted both read beyond" in alert.message
-        assert [test.test.id for test in store.tests(3)] == ["good", "counted"]
+        assert [test.test.id for test in store.tests.list_all(3)] == ["good", "counted"]
         assert check_store(store, quiet).troubles == ()
 
 
@@ -556,7 +568,7 @@ def test_a_loss_that_is_told_by_two_tests_is_not_told_by_the_third(workspace: Wo
         spool(workspace, f"t{number}", time, tension=0.9 if number else 1.0)
         ingest(workspace)
     with workspace.store() as store:
-        assert [stored.alert.test for stored in store.alerts()] == ["t2"]
+        assert [stored.alert.test for stored in store.alerts.list_all()] == ["t2"]
 
 
 def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Workspace) -> None:
@@ -564,7 +576,7 @@ def test_two_tests_of_a_loss_in_the_wrong_order_raise_an_alert(workspace: Worksp
         spool(workspace, name, day(when), tension=tension)
         ingest(workspace)
     with workspace.store() as store:
-        (alert,) = (stored.alert for stored in store.alerts())
+        (alert,) = (stored.alert for stored in store.alerts.list_all())
         assert alert.test == "earlier"
         assert "Tests later and earlier both read beyond its threshold" in alert.message
 
@@ -590,10 +602,10 @@ def test_a_copy_of_a_loss_confirms_no_loss(workspace: Workspace) -> None:
     write(replace(one, channels=noisy, time=day(60)), workspace.spool / "c.npz")
     ingest(workspace)
     with workspace.store() as store:
-        (notice,) = (stored.alert for stored in store.alerts())
+        (notice,) = (stored.alert for stored in store.alerts.list_all())
         assert notice.kinds == ("held",)
         assert "it holds the samples of b.npz (recording 2) again" in notice.message
         assert "--confirm 3" in notice.message
-        assert [test.test.id for test in store.tests(3)] == ["a", "b"]
-        store.confirm(3, "Ann", "another hit", day(61))
-        assert store.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]
+        assert [test.test.id for test in store.tests.list_all(3)] == ["a", "b"]
+        store.recordings.confirm(3, "Ann", "another hit", day(61))
+        assert store.recordings.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]

@@ -11,7 +11,8 @@ import pytest
 from shm.errors import BadInput, ShmError
 from shm.pipeline import intake
 from shm.pipeline.intake import Sharing, receive
-from shm.store import Outcome, Receipt, Stage, Store, Workspace
+from shm.store import Outcome, Receipt, Stage, Workspace
+from shm.store.stored_recordings import Recordings
 from tests.helpers.workspaces import START, put
 
 
@@ -93,7 +94,13 @@ def test_a_copy_with_the_same_dates_is_still_noticed(workspace: Workspace, tmp_p
 
 @pytest.mark.parametrize(
     ("owner", "verb"),
-    [(Store, "receive"), (intake, "_remove"), (Path, "unlink"), (os, "fsync"), (Path, "rename")],
+    [
+        (Recordings, "receive"),
+        (intake, "_remove"),
+        (Path, "unlink"),
+        (os, "fsync"),
+        (Path, "rename"),
+    ],
 )
 def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, owner: object, verb: str
@@ -115,8 +122,8 @@ def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     assert files_in(workspace.spool) == []
     assert len(files_in(workspace.archive.folder)) == 2
     with workspace.store() as store:
-        assert len(store.recordings()) == 1
-        assert store.events() == ()
+        assert len(store.recordings.list_all()) == 1
+        assert store.recordings.list_events() == ()
 
 
 def test_a_receipt_cut_short_between_the_two_removals_is_finished(
@@ -145,7 +152,7 @@ def test_a_file_that_vanishes_is_left_for_later(workspace: Workspace) -> None:
     with pytest.raises((ShmError, FileNotFoundError)):
         take(workspace, "gone.csv")
     with workspace.store() as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
 
 
 def test_a_file_swapped_for_a_link_after_the_scan_sends_nothing_in(
@@ -209,15 +216,15 @@ def test_what_came_under_the_same_names_since_it_was_read_stays(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put(workspace.spool / "h3.csv", "first\n")
-    enter = Store.receive
+    enter = Recordings.receive
 
-    def enter_while_more_comes(self: Store, *args: object) -> Receipt:
+    def enter_while_more_comes(self: Recordings, *args: object) -> Receipt:
         put(workspace.spool / "h3.csv", "second\n")
         put(workspace.spool / "h3.toml", "hanger = 3\n")
         return enter(self, *args)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patched:
-        patched.setattr(Store, "receive", enter_while_more_comes)
+        patched.setattr(Recordings, "receive", enter_while_more_comes)
         assert take(workspace, "h3.csv").outcome is Outcome.NEW
     assert sorted(path.name for path in files_in(workspace.spool)) == ["h3.csv", "h3.toml"]
     second = take(workspace, "h3.csv")

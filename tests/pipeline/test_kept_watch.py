@@ -35,7 +35,7 @@ def add(workspace: Workspace, day: int) -> None:
 
 def said(workspace: Workspace) -> list[str]:
     with workspace.store() as store:
-        return [repr(each.watched) for each in store.watches(3)]
+        return [repr(each.watched) for each in store.watch.list_all(3)]
 
 
 def change_state(workspace: Workspace, **values: object) -> None:

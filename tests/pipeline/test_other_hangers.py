@@ -54,8 +54,8 @@ def test_each_hanger_is_served_by_the_classes_that_apply_to_it(tmp_path: Path) -
         write_test(workspace.spool / f"t{number}.modes.json", workspace, hanger=number)
     ingest(workspace)
     with workspace.store() as store:
-        assert store.stage_counts()[Stage.DONE] == 2
-        found = {number: store.selection(number) for number in (3, 4)}
+        assert store.recordings.stage_counts()[Stage.DONE] == 2
+        found = {number: store.posteriors.selection(number) for number in (3, 4)}
     names = {n: [p.model for p in each.selection.posteriors] for n, each in found.items() if each}
     assert (sorted(names[3]), names[4]) == (["bare", "beam1"], ["beam1"])
 

@@ -75,12 +75,12 @@ def test_later_tests_are_compared_with_it_and_earlier_figures_stay(
     history: Workspace, hints: list[Posterior]
 ) -> None:
     with history.store() as store:
-        before = store.drifts(3)
+        before = store.watch.list_drifts(3)
     anew(history, 31)
     spool(history, 35, 0.9)
     ingest(history)
     with history.store() as store:
-        after = store.drifts(3)
+        after = store.watch.list_drifts(3)
         lately = [drift for drift in after if drift.test == "t35" and drift.quantity == "tension"]
     assert after[: len(before)] == before
     assert next(drift.shift_mean for drift in before if drift.test == "t32") < -0.08
@@ -98,7 +98,7 @@ def test_a_test_still_on_its_way_is_a_later_one(history: Workspace, hints: list[
     with a_flow(history, clock=Clock()) as flow:
         receive_all(flow)
     with history.store() as store:
-        assert store.stage_counts()[Stage.RECEIVED] == 1
+        assert store.recordings.stage_counts()[Stage.RECEIVED] == 1
     assert anew(history, 31).posterior.tests == ("t31", "t32")
 
 

@@ -31,13 +31,13 @@ def test_a_recording_gives_the_tension_that_was_planted(tmp_path: Path, suffix: 
     ingest(workspace)
     assert list(workspace.spool.iterdir()) == []
     with workspace.store() as store:
-        (stored,) = store.recordings()
+        (stored,) = store.recordings.list_all()
         assert (stored.stage, stored.hanger) == (Stage.DONE, 3)
-        (test,) = store.tests(3)
+        (test,) = store.tests.list_all(3)
         assert (test.test.id, test.time) == ("hanger3", START)
-        low, high = np.quantile(store.posterior(3).tension_n, [0.005, 0.995])
+        low, high = np.quantile(store.posteriors.get(3).tension_n, [0.005, 0.995])
         assert low < 690e3 < high
         assert (high - low) / 690e3 < 0.1
-        response = store.frequency_response(test)
+        response = store.tests.frequency_response(test)
         assert response is not None
         assert len(response.points) == 4

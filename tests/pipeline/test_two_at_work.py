@@ -34,12 +34,15 @@ def outcome(workspace: Workspace) -> object:
     """All that must not double: stages reached, results, alerts, what was owed to hooks."""
     with workspace.store() as store:
         return (
-            [[step.stage for step in store.steps(each.id)] for each in store.recordings()],
+            [
+                [step.stage for step in store.recordings.list_steps(each.id)]
+                for each in store.recordings.list_all()
+            ],
             tension_kn(store),
-            len(store.drifts(3)),
-            [stored.alert.key for stored in store.alerts()],
-            [(delivery.hook, delivery.state) for delivery in store.deliveries()],
-            Counter(event.kind for event in store.events()),
+            len(store.watch.list_drifts(3)),
+            [stored.alert.key for stored in store.alerts.list_all()],
+            [(delivery.hook, delivery.state) for delivery in store.alerts.list_deliveries()],
+            Counter(event.kind for event in store.recordings.list_events()),
         )
 
 
@@ -79,6 +82,6 @@ def test_what_another_has_done_is_not_refused_for_failing_here(
             assert begun(failing)
         able.drain()
         failing.drain()
-        (recording,) = able.store.recordings()
+        (recording,) = able.store.recordings.list_all()
     assert recording.stage is Stage.DONE
     assert list(workspace.quarantine.folder.iterdir()) == []

@@ -40,8 +40,8 @@ def fill(store: Store) -> None:
     """Two tests with results, one refused file, one twice, an alert that was acknowledged, a
     dropped adoption, a baseline set anew, what is held."""
     for number in (1, 2, 3):
-        store.receive(a_file(number), NOW)
-    store.receive(a_file(1, arrival="again"), NOW)
+        store.recordings.receive(a_file(number), NOW)
+    store.recordings.receive(a_file(1, arrival="again"), NOW)
     for number in (1, 2):
         found = IdentifiedTest(
             a_test(f"t{number}", number),
@@ -50,28 +50,30 @@ def fill(store: Store) -> None:
             quality=(a_check(),),
             set_aside=(a_foreign_mode(),),
         )
-        store.identified(number, [found], LINEAGE, NOW)
-    store.refuse(3, {"message": "no sampling rate.", "sha256": "3"}, NOW)
-    first, second = store.tests(3)
+        store.tests.save(number, [found], LINEAGE, NOW)
+    store.recordings.refuse(3, {"message": "no sampling rate.", "sha256": "3"}, NOW)
+    first, second = store.tests.list_all(3)
     posteriors = (a_posterior("beam1"), a_posterior("beam2"))
-    store.selected(3, [first], Selection(posteriors, (0.9, 0.1)), LINEAGE, NOW)
-    store.updated(second, a_posterior("beam1", ("t2",), seed=8), LINEAGE, NOW)
-    baseline = store.baseline(3)
+    store.posteriors.save_selection(3, [first], Selection(posteriors, (0.9, 0.1)), LINEAGE, NOW)
+    store.posteriors.save(second, a_posterior("beam1", ("t2",), seed=8), LINEAGE, NOW)
+    baseline = store.watch.baseline(3)
     assert baseline is not None
     alert = replace(an_alert(), kinds=("beyond threshold",), change=a_change())
-    store.watched(second, baseline, a_watched_test(), alert, ["mail"], NOW)
-    store.acknowledge(1, "engineer", "looked at the pin", NOW)
-    store.add_diagnosis(3, a_diagnosis(), LINEAGE, NOW)
-    before = store.selection(3)
+    store.watch.save(second, baseline, a_watched_test(), alert, ["mail"], NOW)
+    store.alerts.acknowledge(1, "engineer", "looked at the pin", NOW)
+    store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, NOW)
+    before = store.posteriors.selection(3)
     assert before is not None
     adoption = Adoption(3, ADOPTED, "beam1", "point_mass", "everywhere", "a lamp", "engineer")
     probabilities = {"beam1": 0.5, "beam2": 0.1, ADOPTED: 0.4}
     posterior = a_posterior(ADOPTED)
-    made = store.adopt(adoption, posterior, probabilities, (before, [first]), LINEAGE, NOW)
-    store.drop_adoption(made.id, "the lamp is gone", "engineer", NOW)
+    made = store.posteriors.adopt(
+        adoption, posterior, probabilities, (before, [first]), LINEAGE, NOW
+    )
+    store.posteriors.drop_adoption(made.id, "the lamp is gone", "engineer", NOW)
     record = ("engineer", "new pin", second.time)
     joint = a_posterior("beam1", ("t2",), seed=9)
-    store.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
+    store.watch.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
     _update_again(store)
     _hold(store)
 
@@ -79,30 +81,30 @@ def fill(store: Store) -> None:
 def _hold(store: Store) -> None:
     """A test with a wrong clock that a person has confirmed, and a copy of it that waits."""
     for number, check in ((5, "clock before the bridge"), (6, "copy")):
-        recording = store.receive(a_file(number, modified_at=NOW), NOW).recording
+        recording = store.recordings.receive(a_file(number, modified_at=NOW), NOW).recording
         doubt = Doubt(check, "its time cannot be that", "Confirm it", "No clock was there.", True)
         held = HeldTest(0, f"t{number}", (doubt,), -0.1)
         notice = replace(an_alert("", f"t{number}"), hanger=5, drifts=(), kinds=("held",))
         print_ = Fingerprint(f"{number:064x}", np.ones((1, 256)) / 16)
         judged = Judged(None, print_, (held,), notice, ["mail"])
         found = [IdentifiedTest(a_test(f"t{number}", number, hanger=5))]
-        store.identified(recording.id, found, LINEAGE, NOW, judged)
+        store.tests.save(recording.id, found, LINEAGE, NOW, judged)
     later = NOW + timedelta(days=9)
-    store.confirm(5, "engineer", "battery was flat", later, later)
+    store.recordings.confirm(5, "engineer", "battery was flat", later, later)
 
 
 def _update_again(store: Store) -> None:
     """A test of its own file is updated and watched twice: what it had first is superseded."""
-    number = store.receive(a_file(4), NOW).recording.id
-    store.identified(number, [IdentifiedTest(a_test("t4", 4))], LINEAGE, NOW)
-    baseline = store.baseline(3)
+    number = store.recordings.receive(a_file(4), NOW).recording.id
+    store.tests.save(number, [IdentifiedTest(a_test("t4", 4))], LINEAGE, NOW)
+    baseline = store.watch.baseline(3)
     assert baseline is not None
     for seed in (10, 11):
-        third = store.tests(3)[-1]
-        store.updated(third, a_posterior("beam1", ("t4",), seed=seed), LINEAGE, NOW)
-        store.watched(third, baseline, a_watched_test("t4"), None, [], NOW)
+        third = store.tests.list_all(3)[-1]
+        store.posteriors.save(third, a_posterior("beam1", ("t4",), seed=seed), LINEAGE, NOW)
+        store.watch.save(third, baseline, a_watched_test("t4"), None, [], NOW)
         if seed == 10:
-            store.again(number, Stage.UPDATED, NOW)
+            store.recordings.reprocess(number, Stage.UPDATED, NOW)
 
 
 def main() -> None:

@@ -31,21 +31,21 @@ MASS = "beam1+point_mass@everywhere"
 def watched(store: Store) -> list[StoredTest]:
     """Four tests a day apart: the first made the baseline, the second raised an alert."""
     for number in range(4):
-        recording = store.receive(a_file(number), NOW).recording
+        recording = store.recordings.receive(a_file(number), NOW).recording
         found = IdentifiedTest(a_test(f"t{number}", days=number))
-        store.identified(recording.id, [found], LINEAGE, NOW)
-    first, *later = store.tests()
-    store.selected(3, [first], Selection((a_posterior(),), (1.0,)), LINEAGE, NOW)
+        store.tests.save(recording.id, [found], LINEAGE, NOW)
+    first, *later = store.tests.list_all()
+    store.posteriors.save_selection(3, [first], Selection((a_posterior(),), (1.0,)), LINEAGE, NOW)
     for test in later:
         name = test.test.id
         alert = an_alert(test="t1") if name == "t1" else None
-        store.updated(test, a_posterior(tests=(name,)), LINEAGE, NOW)
-        store.watched(test, baseline(store), a_watched_test(name), alert, ["mail"], NOW)
+        store.posteriors.save(test, a_posterior(tests=(name,)), LINEAGE, NOW)
+        store.watch.save(test, baseline(store), a_watched_test(name), alert, ["mail"], NOW)
     return [first, *later]
 
 
 def baseline(store: Store, time: datetime | None = None) -> Baseline:
-    found = store.baseline(3, time=time)
+    found = store.watch.baseline(3, time=time)
     assert found is not None
     return found
 
@@ -54,7 +54,7 @@ def anew(store: Store, chosen: list[StoredTest], model: str = "beam1") -> Baseli
     names = tuple(test.test.id for test in chosen)
     record = ("engineer", "new pin", chosen[0].time)
     posterior = a_posterior(model, names, seed=9)
-    return store.rebaseline(baseline(store), posterior, chosen, record, LINEAGE, LATER)
+    return store.watch.rebaseline(baseline(store), posterior, chosen, record, LINEAGE, LATER)
 
 
 def rows(store: Store) -> list[int]:
@@ -66,11 +66,11 @@ def rows(store: Store) -> list[int]:
 
 
 def adopted(store: Store, first: StoredTest) -> int:
-    before = store.selection(3)
+    before = store.posteriors.selection(3)
     assert before is not None
     made = Adoption(3, MASS, "beam1", "point_mass", "everywhere", "a lamp", "engineer")
     probabilities = {"beam1": 0.5, MASS: 0.5}
-    return store.adopt(
+    return store.posteriors.adopt(
         made, a_posterior(MASS, ("t0",)), probabilities, (before, [first]), LINEAGE, NOW
     ).id
 
@@ -81,31 +81,31 @@ def adopted(store: Store, first: StoredTest) -> int:
 def test_an_alert_is_open_until_somebody_takes_note(
     store: Store, watched: list[StoredTest]
 ) -> None:
-    (raised,) = store.alerts()
+    (raised,) = store.alerts.list_all()
     assert raised.acknowledgement is None
-    noted = store.acknowledge(raised.id, "Jansen", "pin replaced", LATER)
+    noted = store.alerts.acknowledge(raised.id, "Jansen", "pin replaced", LATER)
     assert noted.acknowledgement == Acknowledgement(raised.id, "Jansen", "pin replaced", LATER)
-    assert store.alerts() == store.alerts(3) == (noted,)
+    assert store.alerts.list_all() == store.alerts.list_all(3) == (noted,)
     assert noted.alert == raised.alert
 
 
 def test_taking_note_stops_no_delivery(store: Store, watched: list[StoredTest]) -> None:
-    store.acknowledge(1, "Jansen", "pin replaced", LATER)
-    assert [each.hook for each in store.due_deliveries(LATER, 10)] == ["mail"]
+    store.alerts.acknowledge(1, "Jansen", "pin replaced", LATER)
+    assert [each.hook for each in store.alerts.list_due_deliveries(LATER, 10)] == ["mail"]
 
 
 def test_an_alert_is_acknowledged_once(store: Store, watched: list[StoredTest]) -> None:
-    store.acknowledge(1, "Jansen", "pin replaced", LATER)
+    store.alerts.acknowledge(1, "Jansen", "pin replaced", LATER)
     with pytest.raises(UsageError, match="by Jansen on 2026-05-31 already"):
-        store.acknowledge(1, "Smit", "me too", LATER)
-    (stored,) = store.alerts()
+        store.alerts.acknowledge(1, "Smit", "me too", LATER)
+    (stored,) = store.alerts.list_all()
     assert stored.acknowledgement is not None
     assert stored.acknowledgement.who == "Jansen"
 
 
 def test_an_unknown_alert_is_said_to_be_so(store: Store, watched: list[StoredTest]) -> None:
     with pytest.raises(NothingThere, match="no alert 7"):
-        store.acknowledge(7, "Jansen", "pin replaced", LATER)
+        store.alerts.acknowledge(7, "Jansen", "pin replaced", LATER)
 
 
 # ---------------------------------------------------------------- baselines
@@ -125,19 +125,19 @@ def test_a_baseline_set_anew_is_in_force_with_who_when_why_and_since(
 def test_what_was_compared_with_the_old_baseline_stays(
     store: Store, watched: list[StoredTest]
 ) -> None:
-    before = store.drifts(3), store.alerts(3)
+    before = store.watch.list_drifts(3), store.alerts.list_all(3)
     anew(store, watched[2:])
-    assert (store.drifts(3), store.alerts(3)) == before
+    assert (store.watch.list_drifts(3), store.alerts.list_all(3)) == before
 
 
 def test_the_tests_of_a_baseline_set_anew_keep_their_own_posteriors(
     store: Store, watched: list[StoredTest]
 ) -> None:
-    before = [posterior.tests for _, posterior in store.history(3)]
+    before = [posterior.tests for _, posterior in store.posteriors.history(3)]
     anew(store, watched[2:])
-    assert [posterior.tests for _, posterior in store.history(3)] == before
-    assert store.posterior(3).tests == store.posterior_of(watched[3]).tests == ("t3",)
-    assert len(store.posteriors(3)) == 4
+    assert [posterior.tests for _, posterior in store.posteriors.history(3)] == before
+    assert store.posteriors.get(3).tests == store.posteriors.of_test(watched[3]).tests == ("t3",)
+    assert len(store.posteriors.list_all(3)) == 4
 
 
 def test_a_test_of_before_that_day_belongs_to_the_baseline_before(
@@ -164,7 +164,7 @@ def test_a_baseline_computed_while_another_came_in_is_refused_whole(
     anew(store, watched[2:])
     held, record = rows(store), ("Smit", "late", watched[3].time)
     with pytest.raises(StoreBusy):
-        store.rebaseline(before, a_posterior(), watched[3:], record, LINEAGE, LATER)
+        store.watch.rebaseline(before, a_posterior(), watched[3:], record, LINEAGE, LATER)
     assert rows(store) == held
 
 
@@ -175,7 +175,7 @@ def test_a_baseline_of_an_adopted_class_goes_when_the_adoption_is_dropped(
     adoption = adopted(store, watched[0])
     made = anew(store, watched[2:], MASS)
     assert baseline(store).id == made.id
-    store.drop_adoption(adoption, "the lamp is gone", "engineer", LATER)
+    store.posteriors.drop_adoption(adoption, "the lamp is gone", "engineer", LATER)
     assert baseline(store).id == first.id
     assert anew(store, watched[3:]).id == baseline(store).id
 
@@ -183,18 +183,18 @@ def test_a_baseline_of_an_adopted_class_goes_when_the_adoption_is_dropped(
 def test_a_baseline_cut_short_leaves_nothing_behind(
     store: Store, watched: list[StoredTest], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from shm.store import acknowledging
+    from shm.store import stored_watch
 
     held = rows(store)
     for verb in ("insert_posterior", "insert_baseline"):
-        keep = getattr(acknowledging, verb)
+        keep = getattr(stored_watch, verb)
 
         def cut(*arguments, keep=keep):  # type: ignore[no-untyped-def]
             keep(*arguments)
             raise sqlite3.OperationalError("cut short")
 
         with monkeypatch.context() as patched:
-            patched.setattr(acknowledging, verb, cut)
+            patched.setattr(stored_watch, verb, cut)
             with pytest.raises(sqlite3.OperationalError):
                 anew(store, watched[2:])
         assert rows(store) == held

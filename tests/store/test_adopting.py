@@ -26,33 +26,33 @@ PROBABILITIES = {"beam2": 0.5, "beam1": 0.2, MASS: 0.3, STIFF: 0.1}
 def filled(store: Store) -> Store:
     """Two tests: the first made the baseline in beam2, the second was updated."""
     for number in (1, 2):
-        recording = store.receive(a_file(number), NOW).recording
+        recording = store.recordings.receive(a_file(number), NOW).recording
         found = IdentifiedTest(a_test(f"t{number}", days=number))
-        store.identified(recording.id, [found], LINEAGE, NOW)
-    first, second = store.tests(3)
+        store.tests.save(recording.id, [found], LINEAGE, NOW)
+    first, second = store.tests.list_all(3)
     posteriors = (a_posterior("beam2"), a_posterior("beam1"))
-    store.selected(3, [first], Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
-    store.updated(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
+    store.posteriors.save_selection(3, [first], Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
+    store.posteriors.save(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
     return store
 
 
 def adopted(store: Store, model: str = MASS, why: str = "a lamp at 3.4 m") -> StoredAdoption:
-    before = store.selection(3)
+    before = store.posteriors.selection(3)
     assert before is not None
     made = Adoption(3, model, "beam1", "point_mass", "everywhere", why, "engineer", 2.3, 0.6)
-    chosen = [test for test in store.tests(3) if test.test.id == "t1"]
+    chosen = [test for test in store.tests.list_all(3) if test.test.id == "t1"]
     basis = (before, chosen)
-    return store.adopt(made, a_posterior(model), PROBABILITIES, basis, LINEAGE, NOW)
+    return store.posteriors.adopt(made, a_posterior(model), PROBABILITIES, basis, LINEAGE, NOW)
 
 
 def baseline(store: Store, model: str | None = None) -> Baseline:
-    found = store.baseline(3, model)
+    found = store.watch.baseline(3, model)
     assert found is not None
     return found
 
 
 def history(store: Store) -> list[tuple[str, str]]:
-    return [(test.test.id, posterior.model) for test, posterior in store.history(3)]
+    return [(test.test.id, posterior.model) for test, posterior in store.posteriors.history(3)]
 
 
 def rows(store: Store) -> list[int]:
@@ -65,31 +65,31 @@ def rows(store: Store) -> list[int]:
 
 
 def test_a_diagnosis_comes_back_as_it_was_and_the_newest_holds(store: Store) -> None:
-    assert store.latest_diagnosis(3) is None
-    store.add_diagnosis(3, a_diagnosis(("t0",)), LINEAGE, NOW)
+    assert store.posteriors.latest_diagnosis(3) is None
+    store.posteriors.save_diagnosis(3, a_diagnosis(("t0",)), LINEAGE, NOW)
     later = NOW + timedelta(days=1)
-    made = store.add_diagnosis(3, a_diagnosis(), LINEAGE, later)
-    found = store.latest_diagnosis(3)
+    made = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, later)
+    found = store.posteriors.latest_diagnosis(3)
     assert found is not None
     assert repr(found.diagnosis) == repr(a_diagnosis())  # NaN differs from itself
     assert (found.id, found.diagnosed_at, found.lineage) == (made.id, later, LINEAGE)
-    assert store.latest_diagnosis(4) is None
+    assert store.posteriors.latest_diagnosis(4) is None
 
 
 def test_an_adopted_class_is_in_force_with_a_baseline_of_the_same_tests(filled: Store) -> None:
     made = adopted(filled)
-    assert filled.selected_models() == {3: MASS}
+    assert filled.posteriors.selected_models() == {3: MASS}
     found = baseline(filled)
     assert (found.posterior.model, found.posterior.tests, found.who) == (MASS, ("t1",), "engineer")
     assert found.why == f"adopted {MASS}: a lamp at 3.4 m"
-    assert filled.adoptions(3) == (made,)
+    assert filled.posteriors.list_adoptions(3) == (made,)
     assert made.adoption.gap_percent == 0.6
     assert history(filled) == [("t1", MASS), ("t2", "beam2")]
 
 
 def test_the_selection_on_record_stays_in_the_order_of_probability(filled: Store) -> None:
     adopted(filled)
-    selection = filled.selection(3)
+    selection = filled.posteriors.selection(3)
     assert selection is not None
     assert selection.model == MASS
     assert [each.model for each in selection.selection.posteriors] == ["beam2", MASS, "beam1"]
@@ -100,43 +100,43 @@ def test_a_test_updated_in_the_class_before_finds_the_baseline_of_that_class(
     filled: Store,
 ) -> None:
     adopted(filled)
-    second = filled.tests(3)[1]
+    second = filled.tests.list_all(3)[1]
     assert second.stage is Stage.UPDATED
-    assert filled.posterior_of(second).model == "beam2"
+    assert filled.posteriors.of_test(second).model == "beam2"
     assert baseline(filled, "beam2").posterior.model == "beam2"
 
 
 def test_dropping_an_adoption_restores_what_was_in_force(filled: Store) -> None:
-    before = filled.selection(3)
+    before = filled.posteriors.selection(3)
     made = adopted(filled)
-    dropped = filled.drop_adoption(made.id, "taken off", "inspector", NOW)
+    dropped = filled.posteriors.drop_adoption(made.id, "taken off", "inspector", NOW)
     assert (dropped.undone_at, dropped.undone_why, dropped.undone_who) == (
         NOW, "taken off", "inspector",
     )  # fmt: skip
-    after = filled.selection(3)
+    after = filled.posteriors.selection(3)
     assert before is not None
     assert after is not None
     assert (after.id, after.model) == (before.id, "beam2")
     assert baseline(filled).posterior.model == "beam2"
     assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
-    assert filled.adoptions() == ()
-    assert filled.adoptions(undone=True) == (dropped,)
+    assert filled.posteriors.list_adoptions() == ()
+    assert filled.posteriors.list_adoptions(undone=True) == (dropped,)
 
 
 def test_of_two_adoptions_the_last_in_force_counts(filled: Store) -> None:
     first, second = adopted(filled), adopted(filled, STIFF)
-    assert filled.selected_models() == {3: STIFF}
-    filled.drop_adoption(first.id, "no", "engineer", NOW)
-    assert filled.selected_models() == {3: STIFF}
-    filled.drop_adoption(second.id, "no", "engineer", NOW)
-    assert filled.selected_models() == {3: "beam2"}
+    assert filled.posteriors.selected_models() == {3: STIFF}
+    filled.posteriors.drop_adoption(first.id, "no", "engineer", NOW)
+    assert filled.posteriors.selected_models() == {3: STIFF}
+    filled.posteriors.drop_adoption(second.id, "no", "engineer", NOW)
+    assert filled.posteriors.selected_models() == {3: "beam2"}
     assert history(filled) == [("t1", "beam2"), ("t2", "beam2")]
 
 
 def test_what_was_dropped_can_be_adopted_again(filled: Store) -> None:
-    filled.drop_adoption(adopted(filled).id, "no", "engineer", NOW)
+    filled.posteriors.drop_adoption(adopted(filled).id, "no", "engineer", NOW)
     again = adopted(filled, why="it is back")
-    assert filled.adoptions() == (again,)
+    assert filled.posteriors.list_adoptions() == (again,)
     assert baseline(filled).why.endswith("it is back")
 
 
@@ -149,14 +149,14 @@ def test_adopting_twice_is_refused(filled: Store) -> None:
 def test_an_adoption_computed_from_a_selection_no_longer_in_force_is_refused_whole(
     filled: Store,
 ) -> None:
-    before = filled.selection(3)
+    before = filled.posteriors.selection(3)
     assert before is not None
     adopted(filled)
     held = rows(filled)
-    made = replace(filled.adoptions()[0].adoption, model=STIFF)
-    late = (before, filled.tests(3)[:1])
+    made = replace(filled.posteriors.list_adoptions()[0].adoption, model=STIFF)
+    late = (before, filled.tests.list_all(3)[:1])
     with pytest.raises(StoreBusy):
-        filled.adopt(made, a_posterior(STIFF), PROBABILITIES, late, LINEAGE, NOW)
+        filled.posteriors.adopt(made, a_posterior(STIFF), PROBABILITIES, late, LINEAGE, NOW)
     assert rows(filled) == held
 
 
@@ -164,31 +164,31 @@ def test_an_adoption_cut_short_leaves_nothing_behind(
     filled: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As by a full disk or a kill between any two of its rows: all or nothing."""
-    from shm.store import adopting
+    from shm.store import stored_posteriors
 
     held = rows(filled)
     for verb in ("insert_posterior", "insert_selection", "insert_baseline", "insert"):
-        keep = getattr(adopting, verb)
+        keep = getattr(stored_posteriors, verb)
 
         def cut(*arguments, keep=keep):  # type: ignore[no-untyped-def]
             keep(*arguments)
             raise sqlite3.OperationalError("cut short")
 
         with monkeypatch.context() as patched:
-            patched.setattr(adopting, verb, cut)
+            patched.setattr(stored_posteriors, verb, cut)
             with pytest.raises(sqlite3.OperationalError):
                 adopted(filled)
         assert rows(filled) == held
-        assert filled.selected_models() == {3: "beam2"}
+        assert filled.posteriors.selected_models() == {3: "beam2"}
 
 
 def test_dropping_what_is_not_there_says_so(filled: Store) -> None:
     with pytest.raises(NothingThere, match="no adoption 7"):
-        filled.drop_adoption(7, "no", "engineer", NOW)
+        filled.posteriors.drop_adoption(7, "no", "engineer", NOW)
     made = adopted(filled)
-    filled.drop_adoption(made.id, "no", "engineer", NOW)
+    filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
     with pytest.raises(UsageError, match="already"):
-        filled.drop_adoption(made.id, "no", "engineer", NOW)
+        filled.posteriors.drop_adoption(made.id, "no", "engineer", NOW)
 
 
 def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
@@ -198,5 +198,5 @@ def test_a_name_of_two_effects_with_ranges_fits(filled: Store) -> None:
     )
     PROBABILITIES[long] = 0.9
     adopted(filled, long)
-    assert filled.selected_models() == {3: long}
+    assert filled.posteriors.selected_models() == {3: long}
     assert selections.c.model.type.length > len(long)  # type: ignore[attr-defined]

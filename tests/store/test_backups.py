@@ -37,7 +37,7 @@ def test_a_backup_is_consistent_while_others_write(
 ) -> None:
     monkeypatch.setattr(backups, "_PAGES_AT_ONCE", 1)
     fill(file_store)
-    before = file_store.stage_counts()
+    before = file_store.recordings.stage_counts()
     numbers = iter(range(100, 200))
     told: list[float] = []
 
@@ -45,14 +45,16 @@ def test_a_backup_is_consistent_while_others_write(
         if label == "copying pages":
             told.append(fraction)
         if len(told) < 40:
-            writer = threading.Thread(target=file_store.receive, args=(a_file(next(numbers)), NOW))
+            writer = threading.Thread(
+                target=file_store.recordings.receive, args=(a_file(next(numbers)), NOW)
+            )
             writer.start()
             writer.join()
 
     back_up(file_store, tmp_path / "backup.db", write_meanwhile)
     assert told == sorted(told)  # it did not begin anew
     with Store.open(tmp_path / "backup.db") as backup:
-        assert backup.stage_counts() == before
+        assert backup.recordings.stage_counts() == before
         assert check_store(backup, quiet).troubles == ()
 
 
@@ -69,7 +71,7 @@ def test_a_restore_overwrites_nothing_unless_told_and_then_keeps_the_old(
     file, kept = tmp_path / "backup.db", tmp_path / "kept.db"
     back_up(filled, file, quiet)
     first = held(filled)
-    filled.receive(a_file(8), NOW)
+    filled.recordings.receive(a_file(8), NOW)
     second = held(filled)
     with pytest.raises(UsageError, match="--replace"):
         restore(location, file, kept, quiet)
@@ -87,7 +89,7 @@ def test_a_backup_of_an_older_schema_restores(server: str, released: Path, tmp_p
     restore(server, released, tmp_path / "kept.db", quiet)
     assert released.read_bytes() == content
     with Store.open(server) as store:
-        assert [test.test.id for test in store.tests(3)][:2] == ["t1", "t2"]
+        assert [test.test.id for test in store.tests.list_all(3)][:2] == ["t1", "t2"]
 
 
 def test_a_damaged_store_is_moved_aside_by_a_restore_that_may_replace(

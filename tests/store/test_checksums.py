@@ -10,8 +10,9 @@ import sqlalchemy as sa
 
 from shm.errors import DamagedRow
 from shm.store import Store
-from shm.store.checking import check_store, damaged_among
+from shm.store.checking import check_store
 from shm.store.checksums import plain_table
+from shm.store.damage import damaged_among
 from shm.store.tables import metadata, tokens
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import change, flipped
@@ -63,22 +64,22 @@ def test_a_row_that_something_else_wrote_is_named(filled: Store) -> None:
 
 
 def test_a_damaged_response_does_not_hide_its_test(filled: Store) -> None:
-    first = filled.tests(3)[0]
-    assert filled.frequency_response(first) is not None
+    first = filled.tests.list_all(3)[0]
+    assert filled.tests.frequency_response(first) is not None
     with filled.engine.begin() as connection:
         here = sa.update(plain_table("tests")).where(sa.column("id") == first.id)
         connection.execute(here.values(frequency_response=b"rotten"))
-    assert filled.test(first.id).test == first.test
+    assert filled.tests.get(first.id).test == first.test
     with pytest.raises(DamagedRow, match=r"row 1 of tests of hanger 3 is damaged.*--again"):
-        filled.frequency_response(first)
+        filled.tests.frequency_response(first)
 
 
 def test_a_changed_digit_is_refused_where_it_is_read(filled: Store) -> None:
     change(_location(filled), "tests", "document", 1, lambda text: text.replace("5.8", "5.9"))
     with pytest.raises(DamagedRow) as caught:
-        filled.test(1)
+        filled.tests.get(1)
     assert (caught.value.table, caught.value.id, caught.value.hanger) == ("tests", 1, 3)
-    assert filled.test(2).test.id == "t2"
+    assert filled.tests.get(2).test.id == "t2"
 
 
 def _location(store: Store) -> Any:
@@ -91,6 +92,6 @@ def _location(store: Store) -> Any:
 def test_a_time_that_is_none_holds_up_no_other_row(file_store: Store) -> None:
     fill(file_store)
     change(_location(file_store), "recordings", "received_at", 2, lambda _: "no time")
-    assert [each.id for each in file_store.recordings()] == [1, 3, 4, 5, 6]
+    assert [each.id for each in file_store.recordings.list_all()] == [1, 3, 4, 5, 6]
     (found,) = check_store(file_store, quiet).damaged
     assert (found.table, found.id) == ("recordings", 2)

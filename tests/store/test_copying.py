@@ -27,18 +27,18 @@ def test_a_copy_holds_the_same_in_either_kind_and_is_numbered_on(
     with Store.open(empty) as copy:
         assert held(copy) == copied
         assert np.array_equal(latest_tension_n(copy), latest_tension_n(filled))
-        newest = copy.recordings()[-1].id
-        assert copy.receive(a_file(9), NOW).recording.id == newest + 1
+        newest = copy.recordings.list_all()[-1].id
+        assert copy.recordings.receive(a_file(9), NOW).recording.id == newest + 1
 
 
 def latest_tension_n(store: Store) -> np.ndarray:
-    return store.history(3)[-1][1].tension_n
+    return store.posteriors.history(3)[-1][1].tension_n
 
 
 def test_a_copy_goes_only_into_an_empty_store(file_store: Store, empty: str | Path) -> None:
     fill(file_store)
     with Store.create(empty) as other:
-        other.receive(a_file(7), NOW)
+        other.recordings.receive(a_file(7), NOW)
         before = held(other)
         with pytest.raises(UsageError, match="rows already"):
             copy_store(file_store, empty, quiet)

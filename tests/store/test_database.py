@@ -21,7 +21,7 @@ def test_many_writers_never_find_the_store_locked(store: Store) -> None:
     def write(first: int) -> None:
         try:
             for number in range(first, first + 25):
-                store.receive(a_file(number), NOW)
+                store.recordings.receive(a_file(number), NOW)
         except StoreError as error:
             failures.append(str(error))
 
@@ -31,7 +31,7 @@ def test_many_writers_never_find_the_store_locked(store: Store) -> None:
     for thread in threads:
         thread.join()
     assert failures == []
-    assert store.stage_counts()[Stage.RECEIVED] == 100
+    assert store.recordings.stage_counts()[Stage.RECEIVED] == 100
 
 
 def test_a_store_held_by_another_process_is_busy_and_says_when_to_return(
@@ -42,19 +42,19 @@ def test_a_store_held_by_another_process_is_busy_and_says_when_to_return(
         holder = sqlite3.connect(tmp_path / "shm.db", isolation_level=None)
         holder.execute("BEGIN IMMEDIATE")
         with pytest.raises(StoreBusy) as caught:
-            store.receive(a_file(1), NOW)
+            store.recordings.receive(a_file(1), NOW)
         assert caught.value.retry_after_s == 1.0
-        assert store.recordings() == ()  # reading goes on meanwhile
+        assert store.recordings.list_all() == ()  # reading goes on meanwhile
         holder.execute("ROLLBACK")
         holder.close()
-        store.receive(a_file(1), NOW)
+        store.recordings.receive(a_file(1), NOW)
 
 
 def test_a_full_disk_is_told_and_waited_for(file_store: Store) -> None:
     with file_store.engine.connect() as connection:
         connection.exec_driver_sql("PRAGMA max_page_count = 1")
     with pytest.raises(StoreError, match="disk is full") as caught:
-        file_store.receive(a_file(1, file_name="x" * 100_000), NOW)
+        file_store.recordings.receive(a_file(1, file_name="x" * 100_000), NOW)
     assert caught.value.retry_after_s == 60.0
     assert "Free some space" in str(caught.value)
 
@@ -63,7 +63,7 @@ def test_a_store_that_cannot_be_written_says_what_to_do(file_store: Store) -> No
     with file_store.engine.connect() as connection:
         connection.exec_driver_sql("PRAGMA query_only = 1")
     with pytest.raises(StoreError, match="cannot be written"):
-        file_store.receive(a_file(1), NOW)
+        file_store.recordings.receive(a_file(1), NOW)
 
 
 def test_a_transaction_is_all_or_nothing(store: Store) -> None:
@@ -78,7 +78,7 @@ def test_a_transaction_is_all_or_nothing(store: Store) -> None:
 
     with pytest.raises(RuntimeError):
         insert_and_fail()
-    assert store.selected_models() == {}
+    assert store.posteriors.selected_models() == {}
 
 
 def test_a_reference_to_nothing_is_refused(store: Store) -> None:

@@ -15,159 +15,161 @@ REASON = {"message": "no sampling rate.", "remedy": "Give it.", "sha256": "1"}
 
 
 def test_a_received_file_is_entered_as_it_came(store: Store) -> None:
-    receipt = store.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
+    receipt = store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
     assert receipt.outcome is Outcome.NEW
-    stored = store.recording(receipt.recording.id)
+    stored = store.recordings.get(receipt.recording.id)
     assert stored == receipt.recording
     assert stored.file == a_file(1, sidecar_as="11/1.toml")
     assert (stored.received_at, stored.stage, stored.hanger) == (NOW, Stage.RECEIVED, None)
-    assert store.recording_of(a_file(1).sha256) == stored
-    assert store.recording_of("f" * 64) is None
+    assert store.recordings.with_checksum(a_file(1).sha256) == stored
+    assert store.recordings.with_checksum("f" * 64) is None
 
 
 def test_the_same_bytes_dropped_again_are_noticed_and_not_entered(store: Store) -> None:
-    first = store.receive(a_file(1), NOW).recording
-    again = store.receive(a_file(1, file_name="copy.csv", arrival="other"), NOW)
+    first = store.recordings.receive(a_file(1), NOW).recording
+    again = store.recordings.receive(a_file(1, file_name="copy.csv", arrival="other"), NOW)
     assert again.outcome is Outcome.DUPLICATE
-    assert store.recordings() == (first,)
-    (event,) = store.events("duplicate")
+    assert store.recordings.list_all() == (first,)
+    (event,) = store.recordings.list_events("duplicate")
     assert (event.file_name, event.recording_id) == ("copy.csv", first.id)
     assert "h3-1.csv" in event.message
     assert "sidecar" not in event.message
 
 
 def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Store) -> None:
-    first = store.receive(a_file(1, sidecar_as="11/1.toml"), NOW).recording.id
+    first = store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW).recording.id
     found = [IdentifiedTest(a_test())]
-    store.identified(first, found, LINEAGE, NOW, Judged("11/1.toml"))
+    store.tests.save(first, found, LINEAGE, NOW, Judged("11/1.toml"))
     described = a_file(1, arrival="other", sidecar_as="22/2.toml")
-    again = store.receive(described, NOW)
+    again = store.recordings.receive(described, NOW)
     assert again.outcome is Outcome.REDESCRIBED
     assert again.recording.file.sidecar_as == "22/2.toml"
     assert again.recording.stage is Stage.RECEIVED
-    assert store.tests(3) == ()
-    assert len(store.former_tests(first)) == 1
-    assert "another sidecar" in store.events("redescribed")[0].message
-    assert store.receive(described, NOW).outcome is Outcome.RESUMED
+    assert store.tests.list_all(3) == ()
+    assert len(store.tests.list_former(first)) == 1
+    assert "another sidecar" in store.recordings.list_events("redescribed")[0].message
+    assert store.recordings.receive(described, NOW).outcome is Outcome.RESUMED
     late = Judged("11/1.toml")  # what was begun with the sidecar of before
-    store.identified(first, found, LINEAGE, NOW, late)
-    assert store.recording(first).stage is Stage.RECEIVED
+    store.tests.save(first, found, LINEAGE, NOW, late)
+    assert store.recordings.get(first).stage is Stage.RECEIVED
 
 
 def test_a_duplicate_without_a_sidecar_changes_nothing(store: Store) -> None:
-    store.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
-    bare = store.receive(a_file(1, arrival="other"), NOW)
+    store.recordings.receive(a_file(1, sidecar_as="11/1.toml"), NOW)
+    bare = store.recordings.receive(a_file(1, arrival="other"), NOW)
     assert bare.outcome is Outcome.DUPLICATE
     assert bare.recording.file.sidecar_as == "11/1.toml"
 
 
 def test_a_receipt_cut_short_by_a_crash_is_no_duplicate(store: Store) -> None:
-    store.receive(a_file(1), NOW)
-    assert store.receive(a_file(1), NOW).outcome is Outcome.RESUMED
-    assert store.events() == ()
-    assert len(store.recordings()) == 1
+    store.recordings.receive(a_file(1), NOW)
+    assert store.recordings.receive(a_file(1), NOW).outcome is Outcome.RESUMED
+    assert store.recordings.list_events() == ()
+    assert len(store.recordings.list_all()) == 1
 
 
 def test_a_refused_file_keeps_its_reason(store: Store) -> None:
-    recording = store.receive(a_file(1), NOW).recording
-    store.refuse(recording.id, REASON, NOW)
-    stored = store.recording(recording.id)
+    recording = store.recordings.receive(a_file(1), NOW).recording
+    store.recordings.refuse(recording.id, REASON, NOW)
+    stored = store.recordings.get(recording.id)
     assert stored.stage is Stage.REFUSED
     assert stored.reason == REASON
-    assert store.events("refused")[0].message == "no sampling rate."
+    assert store.recordings.list_events("refused")[0].message == "no sampling rate."
 
 
 def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) -> None:
     """Two processes at the same step: the second neither doubles nor undoes what the first did."""
-    first, second = (store.receive(a_file(number), NOW).recording.id for number in (1, 2))
+    first, second = (
+        store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2)
+    )
     for _ in range(2):
-        store.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
-    assert len(store.events("refused")) == 1
-    assert [step.stage for step in store.steps(first)].count(Stage.REFUSED) == 1
-    store.identified(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
-    (test,) = store.tests()
-    assert not store.waits(second, Stage.RECEIVED)
-    store.refuse(second, REASON, NOW, stage=Stage.RECEIVED)
-    store.refuse(second, REASON, NOW, [test.id], stage=Stage.UPDATED)
-    assert store.recording(second).stage is Stage.IDENTIFIED
-    assert store.waits(second, Stage.IDENTIFIED, [test.id])
-    store.refuse(second, REASON, NOW, [test.id], stage=Stage.IDENTIFIED)
-    assert store.recording(second).stage is Stage.REFUSED
-    assert not store.waits(second, Stage.IDENTIFIED, [test.id])
+        store.recordings.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
+    assert len(store.recordings.list_events("refused")) == 1
+    assert [step.stage for step in store.recordings.list_steps(first)].count(Stage.REFUSED) == 1
+    store.tests.save(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
+    (test,) = store.tests.list_all()
+    assert not store.recordings.is_waiting(second, Stage.RECEIVED)
+    store.recordings.refuse(second, REASON, NOW, stage=Stage.RECEIVED)
+    store.recordings.refuse(second, REASON, NOW, [test.id], stage=Stage.UPDATED)
+    assert store.recordings.get(second).stage is Stage.IDENTIFIED
+    assert store.recordings.is_waiting(second, Stage.IDENTIFIED, [test.id])
+    store.recordings.refuse(second, REASON, NOW, [test.id], stage=Stage.IDENTIFIED)
+    assert store.recordings.get(second).stage is Stage.REFUSED
+    assert not store.recordings.is_waiting(second, Stage.IDENTIFIED, [test.id])
 
 
 def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> None:
-    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2)]
+    ids = [store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2)]
     for number in ids:
-        store.identified(number, [IdentifiedTest(a_test(f"t{number}"))], LINEAGE, NOW)
-    tests = [test.id for test in store.tests()]
+        store.tests.save(number, [IdentifiedTest(a_test(f"t{number}"))], LINEAGE, NOW)
+    tests = [test.id for test in store.tests.list_all()]
     for number in ids:
-        store.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
+        store.recordings.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
     for number in ids:
-        stages = [step.stage for step in store.steps(number)]
+        stages = [step.stage for step in store.recordings.list_steps(number)]
         assert stages.count(Stage.REFUSED) == 2  # the file and its test
 
 
 def test_a_refused_file_dropped_again_is_tried_again(store: Store) -> None:
-    recording = store.receive(a_file(1), NOW).recording
-    store.refuse(recording.id, REASON, NOW)
+    recording = store.recordings.receive(a_file(1), NOW).recording
+    store.recordings.refuse(recording.id, REASON, NOW)
     mended = a_file(1, arrival="later", sidecar_as="22/2.toml")
-    receipt = store.receive(mended, NOW + timedelta(days=1))
+    receipt = store.recordings.receive(mended, NOW + timedelta(days=1))
     assert receipt.outcome is Outcome.REOPENED
     assert receipt.recording.file == mended
     assert receipt.recording.stage is Stage.RECEIVED
     assert receipt.recording.reason is None
-    assert [event.kind for event in store.events()] == ["refused", "reopened"]
+    assert [event.kind for event in store.recordings.list_events()] == ["refused", "reopened"]
 
 
 def test_the_spool_entry_of_a_refused_file_left_by_a_crash_is_not_tried_again(
     store: Store,
 ) -> None:
-    recording = store.receive(a_file(1), NOW).recording
-    store.refuse(recording.id, REASON, NOW)
-    assert store.receive(a_file(1), NOW).outcome is Outcome.RESUMED
-    assert store.recording(recording.id).stage is Stage.REFUSED
+    recording = store.recordings.receive(a_file(1), NOW).recording
+    store.recordings.refuse(recording.id, REASON, NOW)
+    assert store.recordings.receive(a_file(1), NOW).outcome is Outcome.RESUMED
+    assert store.recordings.get(recording.id).stage is Stage.REFUSED
 
 
 def test_trying_again_drops_refused_tests_and_keeps_those_that_have_results(store: Store) -> None:
-    recording = store.receive(a_file(1), NOW).recording
+    recording = store.recordings.receive(a_file(1), NOW).recording
     found = [IdentifiedTest(a_test("good"), 0), IdentifiedTest(a_test("bad"), 1)]
-    store.identified(recording.id, found, LINEAGE, NOW)
-    good, bad = store.tests()
-    store.refuse(recording.id, REASON, NOW, [bad.id])
-    assert [test.test.id for test in store.tests()] == ["good"]
-    store.receive(a_file(1, arrival="later"), NOW)
-    store.identified(recording.id, found, LINEAGE, NOW)
-    assert [test.test.id for test in store.tests()] == ["good", "bad"]
-    assert store.tests()[0].id == good.id
+    store.tests.save(recording.id, found, LINEAGE, NOW)
+    good, bad = store.tests.list_all()
+    store.recordings.refuse(recording.id, REASON, NOW, [bad.id])
+    assert [test.test.id for test in store.tests.list_all()] == ["good"]
+    store.recordings.receive(a_file(1, arrival="later"), NOW)
+    store.tests.save(recording.id, found, LINEAGE, NOW)
+    assert [test.test.id for test in store.tests.list_all()] == ["good", "bad"]
+    assert store.tests.list_all()[0].id == good.id
 
 
 def test_waiting_files_come_in_order_and_without_those_held_back(store: Store) -> None:
-    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2, 3, 4)]
-    store.refuse(ids[0], REASON, NOW)
-    waiting = store.waiting_recordings(2, excluding=[ids[1]])
+    ids = [store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2, 3, 4)]
+    store.recordings.refuse(ids[0], REASON, NOW)
+    waiting = store.recordings.list_waiting(2, excluding=[ids[1]])
     assert [recording.id for recording in waiting] == ids[2:]
 
 
 def test_every_stage_is_counted(store: Store) -> None:
-    ids = [store.receive(a_file(number), NOW).recording.id for number in (1, 2)]
-    store.refuse(ids[0], REASON, NOW)
-    counts = store.stage_counts()
+    ids = [store.recordings.receive(a_file(number), NOW).recording.id for number in (1, 2)]
+    store.recordings.refuse(ids[0], REASON, NOW)
+    counts = store.recordings.stage_counts()
     assert counts == {**dict.fromkeys(Stage, 0), Stage.RECEIVED: 1, Stage.REFUSED: 1}
-    assert [recording.id for recording in store.recordings(Stage.REFUSED)] == ids[:1]
+    assert [recording.id for recording in store.recordings.list_all(Stage.REFUSED)] == ids[:1]
 
 
 def test_an_unknown_recording_is_nothing_there(store: Store) -> None:
     with pytest.raises(NothingThere, match="no recording 9"):
-        store.recording(9)
+        store.recordings.get(9)
 
 
 def test_the_events_of_one_recording_or_name_are_read_alone(store: Store) -> None:
     """Each refusal read all events of the store to find those of its own recording."""
     for number in (1, 2):
         for arrival in ("first", "again"):
-            store.receive(a_file(number, arrival=arrival), NOW)
-    assert len(store.events("duplicate")) == 2
-    (own,) = store.events("duplicate", recording_id=2)
+            store.recordings.receive(a_file(number, arrival=arrival), NOW)
+    assert len(store.recordings.list_events("duplicate")) == 2
+    (own,) = store.recordings.list_events("duplicate", recording_id=2)
     assert own.recording_id == 2
-    assert [each.recording_id for each in store.events(file_name="h3-1.csv")] == [1]
+    assert [each.recording_id for each in store.recordings.list_events(file_name="h3-1.csv")] == [1]

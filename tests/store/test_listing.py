@@ -39,21 +39,21 @@ LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
 
 def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
-    recording = store.receive(a_file(number), NOW).recording
+    recording = store.recordings.receive(a_file(number), NOW).recording
     made = a_test(f"t{number}", days=number, hanger=hanger)
-    store.identified(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
-    return next(test for test in store.tests() if test.recording_id == recording.id)
+    store.tests.save(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
+    return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
 
 
 def with_baseline(store: Store, number: int = 1, hanger: int = 3) -> Baseline:
     first = identified(store, number, hanger)
     posterior = a_posterior("beam1", (first.test.id,))
-    store.selected(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    store.posteriors.save_selection(hanger, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
     return baseline_of(store, hanger)
 
 
 def baseline_of(store: Store, hanger: int = 3) -> Baseline:
-    baseline = store.baseline(hanger)
+    baseline = store.watch.baseline(hanger)
     assert baseline is not None
     return baseline
 
@@ -61,10 +61,10 @@ def baseline_of(store: Store, hanger: int = 3) -> Baseline:
 def watched(store: Store, baseline: Baseline, number: int, evidence_years: float = 1.0) -> None:
     test = identified(store, number, baseline.hanger)
     name = test.test.id
-    store.updated(test, a_posterior("beam1", (name,), seed=number), LINEAGE, NOW)
+    store.posteriors.save(test, a_posterior("beam1", (name,), seed=number), LINEAGE, NOW)
     found = replace(a_watched_test(name), change=a_change(evidence_years=evidence_years))
     alert = replace(an_alert(), key=f"alert {number}", hanger=baseline.hanger, test=name)
-    store.watched(test, baseline, replace(found, time=test.time), alert, ["mail"], NOW)
+    store.watch.save(test, baseline, replace(found, time=test.time), alert, ["mail"], NOW)
 
 
 @contextmanager
@@ -87,20 +87,20 @@ def latest_of_each(watches: tuple[StoredWatch, ...]) -> dict[int, int]:
 def test_tests_are_listed_page_by_page_newest_first(store: Store) -> None:
     for number in (1, 3, 2):
         identified(store, number)
-    first = store.test_rows(3, limit=2)
-    second = store.test_rows(3, limit=2, before=first[-1].id)
+    first = store.tests.list_rows(3, limit=2)
+    second = store.tests.list_rows(3, limit=2, before=first[-1].id)
     assert [row.name for row in (*first, *second)] == ["t3", "t2", "t1"]
-    assert store.test_rows(3, before=second[-1].id) == store.test_rows(4) == ()
-    stored = store.test_named(3, "t3")
+    assert store.tests.list_rows(3, before=second[-1].id) == store.tests.list_rows(4) == ()
+    stored = store.tests.named(3, "t3")
     assert (first[0].id, first[0].time, first[0].stage) == (stored.id, stored.time, stored.stage)
 
 
 def test_tests_at_one_time_are_on_one_page_each(file_store: Store) -> None:
-    recording = file_store.receive(a_file(1), NOW).recording
+    recording = file_store.recordings.receive(a_file(1), NOW).recording
     same = [IdentifiedTest(a_test(f"t{i}"), position=i) for i in range(5)]
-    file_store.identified(recording.id, same, LINEAGE, NOW)
+    file_store.tests.save(recording.id, same, LINEAGE, NOW)
     seen: list[TestRow] = []
-    while page := file_store.test_rows(3, 2, seen[-1].id if seen else None):
+    while page := file_store.tests.list_rows(3, 2, seen[-1].id if seen else None):
         seen += page
     assert [row.name for row in seen] == ["t4", "t3", "t2", "t1", "t0"]
 
@@ -109,7 +109,7 @@ def test_a_test_is_found_by_its_name_and_what_is_beside_it(store: Store) -> None
     for number in (1, 2, 3):
         identified(store, number)
     identified(store, 4, hanger=5)
-    names = [store.beside(store.test_named(3, f"t{number}")) for number in (1, 2, 3)]
+    names = [store.tests.beside(store.tests.named(3, f"t{number}")) for number in (1, 2, 3)]
     assert names == [(None, "t2"), ("t1", "t3"), ("t2", None)]
 
 
@@ -117,19 +117,19 @@ def test_a_name_that_is_not_there_names_the_latest(file_store: Store) -> None:
     for number in range(1, 6):
         identified(file_store, number)
     with pytest.raises(NothingThere, match="no test t9 of hanger 3") as caught:
-        file_store.test_named(3, "t9")
+        file_store.tests.named(3, "t9")
     assert caught.value.remedy == "The latest: t3, t4, t5."
     with pytest.raises(NothingThere, match="none"):
-        file_store.test_named(4, "t1")
+        file_store.tests.named(4, "t1")
 
 
 def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:
     first, second = identified(file_store, 1), identified(file_store, 2)
-    file_store.again(first.recording_id, Stage.IDENTIFIED, NOW)
-    file_store.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
-    assert file_store.test_rows(3) == ()
+    file_store.recordings.reprocess(first.recording_id, Stage.IDENTIFIED, NOW)
+    file_store.recordings.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
+    assert file_store.tests.list_rows(3) == ()
     with pytest.raises(NothingThere):
-        file_store.test_named(3, "t1")
+        file_store.tests.named(3, "t1")
 
 
 def test_the_latest_watches_are_those_of_each_hanger_in_few_questions(store: Store) -> None:
@@ -137,11 +137,11 @@ def test_the_latest_watches_are_those_of_each_hanger_in_few_questions(store: Sto
         baseline = with_baseline(store, 10 * hanger, hanger)
         for number in (1, 2):
             watched(store, baseline, 10 * hanger + number)
-    expected = latest_of_each(store.watches())
+    expected = latest_of_each(store.watch.list_all())
     with questions(store) as asked:
-        found = store.latest_watches()
+        found = store.watch.latest()
     assert {hanger: each.id for hanger, each in found.items()} == expected
-    assert found[3].watched.drifts == store.watches(3)[-1].watched.drifts != ()
+    assert found[3].watched.drifts == store.watch.list_all(3)[-1].watched.drifts != ()
     assert sum("SELECT" in text for text in asked) == 3
 
 
@@ -149,13 +149,17 @@ def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Stor
     baseline = with_baseline(file_store)
     watched(file_store, baseline, 2)
     record = ("engineer", "new pin", NOW + timedelta(days=2))
-    chosen = [file_store.test_named(3, "t2")]
+    chosen = [file_store.tests.named(3, "t2")]
     posterior = a_posterior("beam1", ("t2",))
-    file_store.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
-    assert file_store.latest_watches() == {}
-    assert file_store.called_watches(3) == file_store.telling_watches(baseline_of(file_store)) == ()
-    assert file_store.called_changes() == {}
-    told = file_store.telling_watches(baseline)
+    file_store.watch.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
+    assert file_store.watch.latest() == {}
+    assert (
+        file_store.watch.list_detected(3)
+        == file_store.watch.list_detected_and_latest(baseline_of(file_store))
+        == ()
+    )
+    assert file_store.watch.detected_changes() == {}
+    told = file_store.watch.list_detected_and_latest(baseline)
     assert [each.watched.test for each in told] == ["t2"]
 
 
@@ -165,20 +169,26 @@ def test_only_called_changes_are_listed_as_called(store: Store) -> None:
         watched(store, baseline, number, evidence_years)
     other = with_baseline(store, 5, hanger=4)
     watched(store, other, 6, 1.0)
-    called = [each for each in store.watches() if each.watched.change.called]
+    called = [each for each in store.watch.list_all() if each.watched.change.called]
     assert [each.watched.test for each in called] == ["t3", "t4"]
-    assert [each.id for each in store.called_watches(3)] == [each.id for each in called]
-    assert store.called_changes() == {3: tuple(each.watched.change for each in called)}
-    assert store.called_watches(4) == ()
+    assert [each.id for each in store.watch.list_detected(3)] == [each.id for each in called]
+    assert store.watch.detected_changes() == {3: tuple(each.watched.change for each in called)}
+    assert store.watch.list_detected(4) == ()
 
 
 def test_calls_and_the_latest_watch_tell_what_there_is_to_tell(store: Store) -> None:
     baseline = with_baseline(store)
     for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 1.0), (5, 1.0)):
         watched(store, baseline, number, evidence_years)
-    found = [(each.id, each.watched.test) for each in store.telling_watches(baseline)]
+    found = [
+        (each.id, each.watched.test) for each in store.watch.list_detected_and_latest(baseline)
+    ]
     assert found == [(2, "t3"), (4, "t5")]
-    assert store.telling_watches(baseline)[-1].watched.drifts == store.drifts(3, "t5") != ()
+    assert (
+        store.watch.list_detected_and_latest(baseline)[-1].watched.drifts
+        == store.watch.list_drifts(3, "t5")
+        != ()
+    )
 
 
 def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
@@ -186,10 +196,10 @@ def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
         baseline = with_baseline(store, 10 * hanger, hanger)
         for number in range(1, hanger):
             watched(store, baseline, 10 * hanger + number)
-    assert store.open_alert_counts() == {3: 2, 4: 3}
-    for alert in store.alerts(3):
-        store.acknowledge(alert.id, "engineer", "seen", NOW)
-    assert store.open_alert_counts() == {4: 3}
+    assert store.alerts.open_counts() == {3: 2, 4: 3}
+    for alert in store.alerts.list_all(3):
+        store.alerts.acknowledge(alert.id, "engineer", "seen", NOW)
+    assert store.alerts.open_counts() == {4: 3}
 
 
 def raise_alerts(store: Store) -> None:
@@ -206,45 +216,45 @@ def numbers(rows: tuple[AlertRow, ...]) -> list[int]:
 
 def test_alerts_are_listed_page_by_page_newest_first(store: Store) -> None:
     raise_alerts(store)
-    first = store.alert_rows(limit=4)
-    second = store.alert_rows(limit=4, before=first[-1].id)
+    first = store.alerts.list_rows(limit=4)
+    second = store.alerts.list_rows(limit=4, before=first[-1].id)
     assert numbers((*first, *second)) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alert_rows()) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alert_rows(3, limit=2)) == [4, 3]
-    assert store.alert_rows(5) == store.alert_rows(before=1) == ()
+    assert numbers(store.alerts.list_rows()) == [6, 5, 4, 3, 2, 1]
+    assert numbers(store.alerts.list_rows(3, limit=2)) == [4, 3]
+    assert store.alerts.list_rows(5) == store.alerts.list_rows(before=1) == ()
 
 
 def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
     raise_alerts(store)
     for days, alert in enumerate((4, 1, 5)):
-        store.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
-    assert numbers(store.alert_rows(is_open=True)) == [6, 3, 2]
-    assert numbers(store.alert_rows(3, is_open=True, before=3)) == [2]
-    assert numbers(store.alert_rows(is_open=False)) == [5, 1, 4]
-    assert numbers(store.alert_rows(is_open=False, limit=1, before=5)) == [1]
-    assert numbers(store.alert_rows(is_open=False, before=1)) == [4]
+        store.alerts.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
+    assert numbers(store.alerts.list_rows(is_open=True)) == [6, 3, 2]
+    assert numbers(store.alerts.list_rows(3, is_open=True, before=3)) == [2]
+    assert numbers(store.alerts.list_rows(is_open=False)) == [5, 1, 4]
+    assert numbers(store.alerts.list_rows(is_open=False, limit=1, before=5)) == [1]
+    assert numbers(store.alerts.list_rows(is_open=False, before=1)) == [4]
 
 
 def test_a_row_says_what_the_alert_says_and_who_was_told(store: Store) -> None:
     raise_alerts(store)
-    noted = store.acknowledge(2, "engineer", "seen", NOW)
-    (delivery,) = (each for each in store.deliveries() if each.alert == noted.alert)
-    store.delivery_failed(delivery, "no power", NOW, NOW)
-    (owed,) = (each for each in store.deliveries() if each.alert == noted.alert)
-    row = store.alert_row(2)
+    noted = store.alerts.acknowledge(2, "engineer", "seen", NOW)
+    (delivery,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
+    store.alerts.save_failure(delivery, "no power", NOW, NOW)
+    (owed,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
+    row = store.alerts.row(2)
     alert = noted.alert
     assert (row.hanger, row.test, row.kinds) == (alert.hanger, alert.test, alert.kinds)
     assert (row.raised_at, row.message) == (noted.raised_at, alert.message)
     assert row.acknowledgement == noted.acknowledgement
     assert row.deliveries == (DeliveryRow("mail", owed.state, 1, "no power"),)
-    assert row in store.alert_rows(3)
-    assert replace(row, id=1) != store.alert_row(1)
+    assert row in store.alerts.list_rows(3)
+    assert replace(row, id=1) != store.alerts.row(1)
     with pytest.raises(NothingThere, match="no alert 9"):
-        store.alert_row(9)
+        store.alerts.row(9)
 
 
 def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:
-    happened = filled.hanger_events(3)
+    happened = filled.alerts.list_hanger_events(3)
     assert [event.at for event in happened] == sorted(event.at for event in happened)
     kinds = sorted(event.kind for event in happened)
     assert kinds == sorted([*[EventKind.BASELINE] * 3, *set(EventKind) - {EventKind.BASELINE}])
@@ -253,6 +263,6 @@ def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) ->
     assert (dropped.who, dropped.why) == ("engineer", "the lamp is gone")
     assert (noted.who, noted.why) == ("engineer", "looked at the pin")
     raised = by_kind[EventKind.ALERT]
-    assert (raised.who, raised.why) == ("", filled.alerts(3)[0].alert.message)
-    assert filled.hanger_events(4) == ()
-    assert filled.hanger_events(3, NOW + timedelta(days=400)) == ()
+    assert (raised.who, raised.why) == ("", filled.alerts.list_all(3)[0].alert.message)
+    assert filled.alerts.list_hanger_events(4) == ()
+    assert filled.alerts.list_hanger_events(3, NOW + timedelta(days=400)) == ()

@@ -17,7 +17,7 @@ from shm.store import (
     Stage,
     Store,
     StoredTest,
-    holding,
+    stored_tests,
 )
 from shm.store.blobs import unpack
 from shm.values import AddedMass, Fingerprint, Posterior, Selection
@@ -35,16 +35,16 @@ LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 
 
 def identified(store: Store, number: int, *found: IdentifiedTest) -> tuple[StoredTest, ...]:
-    recording = store.receive(a_file(number), NOW).recording
+    recording = store.recordings.receive(a_file(number), NOW).recording
     items = found or (IdentifiedTest(a_test(f"t{number}", days=number)),)
-    store.identified(recording.id, items, LINEAGE, NOW)
-    return tuple(test for test in store.tests() if test.recording_id == recording.id)
+    store.tests.save(recording.id, items, LINEAGE, NOW)
+    return tuple(test for test in store.tests.list_all() if test.recording_id == recording.id)
 
 
 def baseline_of_two_models(store: Store, *tests: StoredTest) -> None:
     names = tuple(test.test.id for test in tests)
     posteriors = (a_posterior("beam2", names), a_posterior("beam1", names))
-    store.selected(3, tests, Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
+    store.posteriors.save_selection(3, tests, Selection(posteriors, (0.8, 0.2)), LINEAGE, NOW)
 
 
 def assert_same(found: Posterior, expected: Posterior) -> None:
@@ -66,7 +66,7 @@ def test_a_test_comes_back_as_it_was(store: Store) -> None:
     )
     assert stored.lineage == LINEAGE
     assert stored.key == f"{a_file(1).sha256}/0"
-    assert store.recording(stored.recording_id).hanger == 3
+    assert store.recordings.get(stored.recording_id).hanger == 3
 
 
 def test_the_quality_of_a_test_comes_back_with_what_was_set_aside(store: Store) -> None:
@@ -86,7 +86,7 @@ def test_a_test_without_time_stands_at_its_receipt_and_stays_without(store: Stor
 def test_a_frequency_response_comes_back_in_single_precision(store: Store) -> None:
     response = a_response()
     (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
-    found = store.frequency_response(stored)
+    found = store.tests.frequency_response(stored)
     assert found is not None
     assert repr(found.points) == repr(response.points)
     np.testing.assert_array_equal(found.frequency_hz, response.frequency_hz)
@@ -100,44 +100,44 @@ def test_a_frequency_response_comes_back_in_single_precision(store: Store) -> No
 def test_a_response_of_unknown_coherence_stays_so(store: Store) -> None:
     response = replace(a_response(), coherence=None)
     (stored,) = identified(store, 1, IdentifiedTest(a_test(), 0, response))
-    found = store.frequency_response(stored)
+    found = store.tests.frequency_response(stored)
     assert found is not None
     assert found.coherence is None
 
 
 def test_modes_given_by_a_file_have_no_frequency_response(store: Store) -> None:
     (stored,) = identified(store, 1)
-    assert store.frequency_response(stored) is None
+    assert store.tests.frequency_response(stored) is None
 
 
 def test_two_files_may_call_their_tests_the_same(store: Store) -> None:
     identified(store, 1, IdentifiedTest(a_test("t1")))
     identified(store, 2, IdentifiedTest(a_test("t1")), IdentifiedTest(a_test("t2"), 1))
     suffix = a_file(2).sha256[:8]
-    assert [test.test.id for test in store.tests(3)] == ["t1", f"t1-{suffix}-0", "t2"]
+    assert [test.test.id for test in store.tests.list_all(3)] == ["t1", f"t1-{suffix}-0", "t2"]
 
 
 def test_identifying_a_file_again_changes_nothing(store: Store) -> None:
     (stored,) = identified(store, 1)
     for position in (0, 1):
         again = [IdentifiedTest(a_test("other"), position)]
-        store.identified(stored.recording_id, again, LINEAGE, NOW)
-    assert [test.test.id for test in store.tests()] == ["t1"]
+        store.tests.save(stored.recording_id, again, LINEAGE, NOW)
+    assert [test.test.id for test in store.tests.list_all()] == ["t1"]
 
 
 def test_the_most_probable_class_is_selected_and_its_posterior_the_baseline(store: Store) -> None:
     (first,) = identified(store, 1)
     baseline_of_two_models(store, first)
-    selection = store.selection(3)
+    selection = store.posteriors.selection(3)
     assert selection is not None
     assert selection.selection.selected.model == "beam2"
     assert selection.selection.probabilities == (0.8, 0.2)
-    assert store.selected_models() == {3: "beam2"}
-    baseline = store.baseline(3)
+    assert store.posteriors.selected_models() == {3: "beam2"}
+    baseline = store.watch.baseline(3)
     assert baseline is not None
     assert_same(baseline.posterior, a_posterior("beam2"))
-    assert store.test(first.id).stage is Stage.WATCHED
-    assert store.recording(first.recording_id).stage is Stage.DONE
+    assert store.tests.get(first.id).stage is Stage.WATCHED
+    assert store.recordings.get(first.recording_id).stage is Stage.DONE
 
 
 def test_a_second_first_selection_is_not_kept(store: Store) -> None:
@@ -145,17 +145,17 @@ def test_a_second_first_selection_is_not_kept(store: Store) -> None:
     (second,) = identified(store, 2)
     baseline_of_two_models(store, first)
     baseline_of_two_models(store, second)
-    assert len(store.posteriors(3)) == 1
-    assert store.test(second.id).stage is Stage.IDENTIFIED
+    assert len(store.posteriors.list_all(3)) == 1
+    assert store.tests.get(second.id).stage is Stage.IDENTIFIED
 
 
 def test_several_tests_may_make_one_baseline(store: Store) -> None:
     tests = (*identified(store, 1), *identified(store, 2))
     baseline_of_two_models(store, *tests)
-    history = store.history(3)
+    history = store.posteriors.history(3)
     assert [test.test.id for test, _ in history] == ["t1", "t2"]
     assert {posterior.tests for _, posterior in history} == {("t1", "t2")}
-    assert store.posteriors(3)[0].time == NOW + timedelta(days=2)
+    assert store.posteriors.list_all(3)[0].time == NOW + timedelta(days=2)
 
 
 def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
@@ -163,14 +163,14 @@ def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
     (second,) = identified(store, 2)
     baseline_of_two_models(store, first)
     posterior = a_posterior("beam2", ("t2",), seed=2**32 - 1)
-    store.updated(second, posterior, LINEAGE, NOW)
-    assert_same(store.posterior(3), posterior)
-    assert_same(store.posterior(3, "t2"), posterior)
-    assert_same(store.posterior_of(second), posterior)
-    assert store.posterior(3, "t1").model == "beam2"
-    assert store.posteriors(3)[-1].lineage == LINEAGE
-    assert store.test(second.id).stage is Stage.UPDATED
-    assert store.recording(second.recording_id).stage is Stage.UPDATED
+    store.posteriors.save(second, posterior, LINEAGE, NOW)
+    assert_same(store.posteriors.get(3), posterior)
+    assert_same(store.posteriors.get(3, "t2"), posterior)
+    assert_same(store.posteriors.of_test(second), posterior)
+    assert store.posteriors.get(3, "t1").model == "beam2"
+    assert store.posteriors.list_all(3)[-1].lineage == LINEAGE
+    assert store.tests.get(second.id).stage is Stage.UPDATED
+    assert store.recordings.get(second.recording_id).stage is Stage.UPDATED
 
 
 def test_updating_a_test_again_changes_nothing(store: Store) -> None:
@@ -178,37 +178,37 @@ def test_updating_a_test_again_changes_nothing(store: Store) -> None:
     (second,) = identified(store, 2)
     baseline_of_two_models(store, first)
     for seed in (1, 2):
-        store.updated(second, a_posterior("beam2", ("t2",), seed=seed), LINEAGE, NOW)
-    assert store.posterior(3, "t2").seed == 1
+        store.posteriors.save(second, a_posterior("beam2", ("t2",), seed=seed), LINEAGE, NOW)
+    assert store.posteriors.get(3, "t2").seed == 1
 
 
 def test_a_recording_stands_where_its_last_test_stands(store: Store) -> None:
     first, second = identified(store, 1, IdentifiedTest(a_test()), IdentifiedTest(a_test("t2"), 1))
     baseline_of_two_models(store, first)
-    assert store.recording(first.recording_id).stage is Stage.IDENTIFIED
-    store.updated(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
-    assert store.recording(first.recording_id).stage is Stage.UPDATED
+    assert store.recordings.get(first.recording_id).stage is Stage.IDENTIFIED
+    store.posteriors.save(second, a_posterior("beam2", ("t2",)), LINEAGE, NOW)
+    assert store.recordings.get(first.recording_id).stage is Stage.UPDATED
 
 
 def test_waiting_tests_come_by_hanger_and_time_whatever_their_arrival(store: Store) -> None:
     for number, (hanger, days) in enumerate([(4, 1), (3, 5), (3, 2)], start=1):
         identified(store, number, IdentifiedTest(a_test(f"t{number}", days, hanger=hanger)))
-    waiting = store.waiting_tests()
+    waiting = store.tests.list_waiting()
     assert [(test.hanger, test.id) for test in waiting] == [(3, 3), (3, 2), (4, 1)]
-    first = store.waiting_tests(1)
+    first = store.tests.list_waiting(1)
     assert [(test.hanger, test.id) for test in first] == [(3, 3), (4, 1)]
-    others = store.waiting_tests(1, excluding=[first[0].recording_id])
+    others = store.tests.list_waiting(1, excluding=[first[0].recording_id])
     assert [(test.hanger, test.id) for test in others] == [(3, 2), (4, 1)]
 
 
 @pytest.mark.parametrize("test", [None, "t1"])
 def test_what_was_never_updated_is_nothing_there(store: Store, test: str | None) -> None:
     with pytest.raises(NothingThere, match="no posterior of hanger 3"):
-        store.posterior(3, test)
-    assert store.selection(3) is None
-    assert store.baseline(3) is None
+        store.posteriors.get(3, test)
+    assert store.posteriors.selection(3) is None
+    assert store.watch.baseline(3) is None
     with pytest.raises(NothingThere):
-        store.test(1)
+        store.tests.get(1)
 
 
 def test_a_pickled_blob_is_not_read() -> None:
@@ -226,11 +226,11 @@ def test_samples_are_compared_with_the_earliest_first_and_always_with_the_same_n
     """A copy of a copy is one of the original, which is named."""
     prints = [Fingerprint(f"{n:064x}", np.zeros((1, 32), dtype=np.int16)) for n in range(5)]
     for number, print_ in enumerate(prints, 1):
-        recording = store.receive(a_file(number), NOW).recording
+        recording = store.recordings.receive(a_file(number), NOW).recording
         items = [IdentifiedTest(a_test(f"t{number}", days=number))]
-        store.identified(recording.id, items, LINEAGE, NOW, Judged(None, print_))
-    known = [each.fingerprint.digest for each in store.known_samples(5, 3, prints[4])]
+        store.tests.save(recording.id, items, LINEAGE, NOW, Judged(None, print_))
+    known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[4])]
     assert known == [each.digest for each in prints[:4]]
-    monkeypatch.setattr(holding, "_MOST_COMPARED", 2)
-    known = [each.fingerprint.digest for each in store.known_samples(5, 3, prints[0])]
+    monkeypatch.setattr(stored_tests, "_MOST_COMPARED", 2)
+    known = [each.fingerprint.digest for each in store.tests.known_samples(5, 3, prints[0])]
     assert known == [prints[0].digest, prints[3].digest]

@@ -13,10 +13,10 @@ from shm.documents import dump
 from shm.errors import NothingThere, StoreError
 from shm.pipeline.intake import receive
 from shm.store import Archive, Store, StoredRecording, Workspace
-from shm.store.archive_copies import copy_archive
 from shm.store.checking import archived_names, check_archive
 from shm.store.retention import (
     Retention,
+    copy_archive,
     empty_quarantine,
     expendable,
     fetch,
@@ -63,13 +63,13 @@ def take_in(
         (workspace.spool / f"{name}.toml").write_text(sidecar)
     recording = receive(workspace.spool / f"{name}.csv", workspace, store, at).recording
     if through:
-        store.refuse(recording.id, {"message": "no", "remedy": "none"}, at)
-    return store.recording(recording.id)
+        store.recordings.refuse(recording.id, {"message": "no", "remedy": "none"}, at)
+    return store.recordings.get(recording.id)
 
 
 def back_up(workspace: Workspace, store: Store, copies: Archive) -> None:
     copy_archive(workspace.archive, copies, archived_names(store), quiet)
-    store.note_copies(copies, OLD)
+    store.upkeep.note_copies(copies, OLD)
 
 
 def found(workspace: Workspace, store: Store) -> Retention:
@@ -94,8 +94,8 @@ def test_an_old_file_with_a_whole_copy_goes_and_its_row_stays(
     assert prune(workspace, store) == len("contents of old") + len("hanger = 3\n")
     assert files_of(workspace.archive.folder) == [Path(str(young.file.archived_as)).name]
     assert len(files_of(copies.folder)) == 3
-    assert store.recording(old.id) == old
-    assert store.removed_to() == {old.id: str(copies.folder)}
+    assert store.recordings.get(old.id) == old
+    assert store.upkeep.removed_to() == {old.id: str(copies.folder)}
     assert found(workspace, store) == Retention((), {})
 
 
@@ -141,7 +141,7 @@ def test_the_archive_itself_is_no_copy_of_it(
         place = folder / str(old.file.archived_as)
         place.parent.mkdir(parents=True)
         os.link(workspace.archive.folder / str(old.file.archived_as), place)
-    assert store.note_copies(Archive(folder), OLD) == 1
+    assert store.upkeep.note_copies(Archive(folder), OLD) == 1
     assert found(workspace, store) == Retention((), {"no noted copy is whole": 1})
 
 
@@ -154,7 +154,7 @@ def test_a_copy_that_vanishes_between_the_look_and_the_removal_saves_the_file(
     (copies.folder / str(old.file.archived_as)).unlink()
     assert remove(store, workspace.archive, removals, NOW) == 0
     assert workspace.archive.holds(old.file)
-    assert store.removed_to() == {}
+    assert store.upkeep.removed_to() == {}
 
 
 def test_what_is_not_through_stays(workspace: Workspace, store: Store, copies: Archive) -> None:

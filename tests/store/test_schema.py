@@ -56,17 +56,20 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
         assert compare_metadata(context, metadata) == []
         assert changed_objects(context.connection) == ()
         context.connection.close()
-        assert store.stage_counts()[Stage.DONE] >= 2
-        assert store.stage_counts()[Stage.REFUSED] == 1
-        assert [test.test.id for test in store.tests(3)][:2] == ["t1", "t2"]
-        (_, first), (_, second) = store.history(3)[:2]
+        assert store.recordings.stage_counts()[Stage.DONE] >= 2
+        assert store.recordings.stage_counts()[Stage.REFUSED] == 1
+        assert [test.test.id for test in store.tests.list_all(3)][:2] == ["t1", "t2"]
+        (_, first), (_, second) = store.posteriors.history(3)[:2]
         assert first.tension_n.mean() == pytest.approx(711e3, rel=0.02)
-        assert second.model == store.selected_models()[3] == "beam1"
-        assert store.baseline(3) is not None
-        assert {drift.quantity for drift in store.drifts(3)} == {"tension"}
-        assert store.alerts()[0].alert.key == "hanger-3:tension-down"
-        assert {delivery.hook for delivery in store.deliveries()} == {"mail"}
-        assert [event.kind for event in store.events()][:2] == ["duplicate", "refused"]
+        assert second.model == store.posteriors.selected_models()[3] == "beam1"
+        assert store.watch.baseline(3) is not None
+        assert {drift.quantity for drift in store.watch.list_drifts(3)} == {"tension"}
+        assert store.alerts.list_all()[0].alert.key == "hanger-3:tension-down"
+        assert {delivery.hook for delivery in store.alerts.list_deliveries()} == {"mail"}
+        assert [event.kind for event in store.recordings.list_events()][:2] == [
+            "duplicate",
+            "refused",
+        ]
 
 
 def test_a_database_of_before_the_watch_has_alerts_open_and_its_first_baseline(
@@ -76,11 +79,11 @@ def test_a_database_of_before_the_watch_has_alerts_open_and_its_first_baseline(
     shutil.copyfile(RELEASED[2], path)
     Store.upgrade(path)
     with Store.open(path) as store:
-        (stored,) = store.alerts()
+        (stored,) = store.alerts.list_all()
         assert (stored.alert.kinds, stored.alert.change) == ((), None)
         assert stored.acknowledgement is None
-        assert store.watches() == ()
-        baseline = store.baseline(3)
+        assert store.watch.list_all() == ()
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.since, baseline.posterior.tests) == (None, ("t1",))
 
@@ -90,14 +93,14 @@ def test_the_watch_of_a_released_database_is_kept(tmp_path: Path) -> None:
     shutil.copyfile(RELEASED[3], path)
     Store.upgrade(path)
     with Store.open(path) as store:
-        (stored,) = store.alerts()
+        (stored,) = store.alerts.list_all()
         assert stored.alert.kinds == ("beyond threshold",)
         assert stored.alert.change == a_change()
         assert stored.acknowledgement == Acknowledgement(1, "engineer", "looked at the pin", NOW)
-        watch = store.watches(3)[0]
+        watch = store.watch.list_all(3)[0]
         assert watch.watched.change == a_change()
         assert [drift.quantity for drift in watch.watched.drifts] == ["tension"]
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.why, baseline.posterior.tests) == ("new pin", ("t2",))
 
@@ -107,14 +110,14 @@ def test_of_a_database_of_before_the_steps_what_can_be_told_is_noted(tmp_path: P
     shutil.copyfile(RELEASED[3], path)
     Store.upgrade(path)
     with Store.open(path) as store:
-        steps = store.steps(1)
+        steps = store.recordings.list_steps(1)
         assert [(step.stage, step.test, step.version) for step in steps] == [
             ("received", None, None),
             ("identified", "t1", "0.1.0"),
         ]
-        baseline = store.baseline(3)
+        baseline = store.watch.baseline(3)
         assert baseline is not None
-        assert [test.test.id for test in store.tests_of(baseline)] == ["t2"]
+        assert [test.test.id for test in store.tests.of_baseline(baseline)] == ["t2"]
 
 
 def test_what_was_superseded_is_kept_with_its_lineage(tmp_path: Path) -> None:
@@ -122,9 +125,9 @@ def test_what_was_superseded_is_kept_with_its_lineage(tmp_path: Path) -> None:
     shutil.copyfile(RELEASED[4], path)
     Store.upgrade(path)
     with Store.open(path) as store:
-        (test,) = store.former_tests(4)
+        (test,) = store.tests.list_former(4)
         assert [made.superseded_at for made in test.posteriors] == [NOW, None]
-        assert store.posterior(3, "t4").seed == 11
+        assert store.posteriors.get(3, "t4").seed == 11
 
 
 def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> None:
@@ -132,16 +135,16 @@ def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> N
     shutil.copyfile(RELEASED[6], path)
     Store.upgrade(path)
     with Store.open(path) as store:
-        confirmed = store.latest_hold(5)
+        confirmed = store.recordings.latest_hold(5)
         assert confirmed is not None
         assert (confirmed.decision, confirmed.who) == (Decision.CONFIRMED, "engineer")
         assert confirmed.time == confirmed.decided_at == NOW + timedelta(days=9)
-        (waits,) = store.holds()
+        (waits,) = store.recordings.list_holds()
         assert [(test.name, test.tension_shift) for test in waits.tests] == [("t6", -0.1)]
         assert [doubt.check for doubt in waits.doubts] == ["copy"]
-        known = store.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
+        known = store.tests.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
         assert [each.fingerprint.shapes.shape for each in known] == [(1, 256)] * 2
-        assert store.recording(5).file.modified_at == NOW
+        assert store.recordings.get(5).file.modified_at == NOW
 
 
 @pytest.mark.parametrize("version", ["0000", None])

@@ -31,7 +31,7 @@ def test_the_same_file_received_by_many_at_once_is_entered_once(store: Store) ->
     outcomes: list[Outcome] = []
 
     def receive(number: int) -> None:
-        receipt = store.receive(a_file(1, arrival=f"entry-{number}"), NOW)
+        receipt = store.recordings.receive(a_file(1, arrival=f"entry-{number}"), NOW)
         outcomes.append(receipt.outcome)
 
     threads = [threading.Thread(target=receive, args=(number,)) for number in range(8)]
@@ -46,9 +46,9 @@ def test_a_reader_sees_one_moment(store: Store) -> None:
     count = sa.text("SELECT count(*) FROM recordings")
     with store.reading() as connection:
         assert connection.scalar(count) == 0
-        store.receive(a_file(1), NOW)
+        store.recordings.receive(a_file(1), NOW)
         assert connection.scalar(count) == 0
-    assert store.stage_counts()[Stage.RECEIVED] == 1
+    assert store.recordings.stage_counts()[Stage.RECEIVED] == 1
 
 
 def test_a_reader_cannot_write(server_store: Store) -> None:
@@ -67,19 +67,19 @@ def test_a_writer_that_holds_on_keeps_others_waiting_and_then_busy(
     monkeypatch.setattr(database, "BUSY_SECONDS", 0.05)
     with server_store.writing():
         with pytest.raises(StoreBusy) as caught:
-            server_store.receive(a_file(1), NOW)
+            server_store.recordings.receive(a_file(1), NOW)
         assert caught.value.retry_after_s == 1.0
-        assert server_store.recordings() == ()  # reading goes on meanwhile
-    server_store.receive(a_file(1), NOW)
+        assert server_store.recordings.list_all() == ()  # reading goes on meanwhile
+    server_store.recordings.receive(a_file(1), NOW)
 
 
 def test_a_connection_lost_between_verbs_is_not_even_noticed(
     server: str, server_store: Store, postgresql: Databases
 ) -> None:
-    server_store.receive(a_file(1), NOW)
+    server_store.recordings.receive(a_file(1), NOW)
     assert postgresql.cut_connections(server) >= 1
-    server_store.receive(a_file(2), NOW)
-    assert len(server_store.recordings()) == 2
+    server_store.recordings.receive(a_file(2), NOW)
+    assert len(server_store.recordings.list_all()) == 2
 
 
 def test_a_connection_lost_within_a_verb_undoes_it_and_says_when_to_return(
@@ -94,7 +94,7 @@ def test_a_connection_lost_within_a_verb_undoes_it_and_says_when_to_return(
     with pytest.raises(StoreError) as caught:
         lose_it()
     assert caught.value.retry_after_s == 5.0
-    assert server_store.receive(a_file(1), NOW).outcome is Outcome.NEW
+    assert server_store.recordings.receive(a_file(1), NOW).outcome is Outcome.NEW
 
 
 def test_a_server_that_is_down_is_waited_for_and_its_password_not_told() -> None:
@@ -117,9 +117,9 @@ def test_who_may_not_write_is_told_so(server: str, postgresql: Databases) -> Non
     name = str(url_of(server).database)
     postgresql.run("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader", server)
     with Store.open(postgresql.url(name, user="reader")) as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
         with pytest.raises(StoreError, match="Give this user write access"):
-            store.receive(a_file(1), NOW)
+            store.recordings.receive(a_file(1), NOW)
 
 
 def test_waiting_does_not_make_a_user_or_a_database(postgresql: Databases) -> None:
@@ -134,7 +134,7 @@ def test_a_database_without_tables_says_how_to_make_them(unready: str) -> None:
         Store.open(unready)
     Store.upgrade(unready)
     with Store.open(unready) as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
 
 
 def test_an_upgrade_that_fails_on_a_server_leaves_nothing_half_done(
@@ -183,11 +183,11 @@ def test_a_workspace_keeps_its_store_where_the_environment_says(
     workspace = make_workspace(tmp_path / "bridge")
     assert not workspace.database.exists()
     with workspace.lock() as lock, workspace.store() as store:
-        store.receive(a_file(1), NOW)
+        store.recordings.receive(a_file(1), NOW)
         assert lock.held()
     assert "hush" not in repr(workspace)
     with Store.open(unready) as store:
-        assert len(store.recordings()) == 1
+        assert len(store.recordings.list_all()) == 1
 
 
 def test_a_password_in_the_description_is_refused(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_a_store_may_be_a_file_elsewhere(tmp_path: Path) -> None:
     make_workspace(tmp_path / "bridge", settings={"store": "../arch.db"})
     assert (tmp_path / "arch.db").is_file()
     with Workspace.open(tmp_path / "bridge").store() as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

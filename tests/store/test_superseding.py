@@ -16,16 +16,16 @@ LATER = NOW + timedelta(days=400)
 
 
 def identified(store: Store, number: int, lineage: Lineage = OLD, name: str = "") -> StoredTest:
-    recording = store.receive(a_file(number), NOW).recording
+    recording = store.recordings.receive(a_file(number), NOW).recording
     item = IdentifiedTest(a_test(name or f"t{number}", days=number))
-    store.identified(recording.id, [item], lineage, NOW)
-    return next(test for test in store.tests() if test.recording_id == recording.id)
+    store.tests.save(recording.id, [item], lineage, NOW)
+    return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
 
 
 def with_baseline(store: Store) -> Baseline:
     first = identified(store, 1)
-    store.selected(3, [first], Selection((a_posterior(),), (1.0,)), OLD, NOW)
-    baseline = store.baseline(3)
+    store.posteriors.save_selection(3, [first], Selection((a_posterior(),), (1.0,)), OLD, NOW)
+    baseline = store.watch.baseline(3)
     assert baseline is not None
     return baseline
 
@@ -33,36 +33,36 @@ def with_baseline(store: Store) -> Baseline:
 def watched(store: Store, test: StoredTest, baseline: Baseline, seed: int = 1) -> None:
     name = test.test.id
     lineage = OLD if seed == 1 else NEW
-    store.updated(test, a_posterior("beam1", (name,), seed=seed), lineage, NOW)
+    store.posteriors.save(test, a_posterior("beam1", (name,), seed=seed), lineage, NOW)
     state = KeptWatch("a key", test.time, b"state")
-    store.watched(test, baseline, a_watched_test(name), None, [], NOW, state)
+    store.watch.save(test, baseline, a_watched_test(name), None, [], NOW, state)
 
 
 def test_identifying_again_keeps_the_old_result_beside_the_new_one(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    rerun = store.again(second.recording_id, Stage.IDENTIFIED, LATER)
+    rerun = store.recordings.reprocess(second.recording_id, Stage.IDENTIFIED, LATER)
     assert (rerun.tests, rerun.posteriors, rerun.watches, rerun.of_baseline) == (("t2",), 1, 1, ())
     assert rerun.recording.stage is Stage.RECEIVED
-    assert [test.test.id for test in store.tests(3)] == ["t1"]
-    assert store.waiting_tests() == ()
-    assert [test.test.id for test, _ in store.history(3)] == ["t1"]
-    assert (store.drifts(3), store.watches(3)) == ((), ())
+    assert [test.test.id for test in store.tests.list_all(3)] == ["t1"]
+    assert store.tests.list_waiting() == ()
+    assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t1"]
+    assert (store.watch.list_drifts(3), store.watch.list_all(3)) == ((), ())
 
     again = identified(store, 2, NEW)
     assert again.test.id == "t2"
     assert again.id != second.id
     watched(store, again, baseline, seed=2)
-    former, present = store.former_tests(again.recording_id)
+    former, present = store.tests.list_former(again.recording_id)
     assert (former.superseded_at, present.superseded_at) == (LATER, None)
     assert (former.lineage, present.lineage) == (OLD, NEW)
     assert [made.superseded_at for made in former.posteriors] == [LATER]
     assert [made.lineage.version for made in present.posteriors] == ["0.2.0"]
-    assert store.posterior(3, "t2").seed == 2
-    assert len(store.posteriors(3)) == 2
-    assert [drift.test for drift in store.drifts(3)] == ["t2"]
-    assert store.events("again")[0].recording_id == second.recording_id
+    assert store.posteriors.get(3, "t2").seed == 2
+    assert len(store.posteriors.list_all(3)) == 2
+    assert [drift.test for drift in store.watch.list_drifts(3)] == ["t2"]
+    assert store.recordings.list_events("again")[0].recording_id == second.recording_id
 
 
 @pytest.mark.parametrize(
@@ -75,37 +75,37 @@ def test_a_test_is_sent_back_to_the_stage_before(
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    rerun = store.again(second.recording_id, stage, LATER, "t2")
+    rerun = store.recordings.reprocess(second.recording_id, stage, LATER, "t2")
     assert (rerun.posteriors, rerun.watches) == (posteriors, 1)
-    assert store.test(second.id).stage is stands
+    assert store.tests.get(second.id).stage is stands
     assert rerun.recording.stage is stands
-    assert [test.id for test in store.waiting_tests()] == [second.id]
+    assert [test.id for test in store.tests.list_waiting()] == [second.id]
     if stage is Stage.UPDATED:
-        store.updated(second, a_posterior("beam1", ("t2",), seed=2), NEW, LATER)
-    store.watched(second, baseline, a_watched_test("t2"), None, [], LATER)
-    assert len(store.watches(3)) == len(store.drifts(3)) == 1
-    assert store.recording(second.recording_id).stage is Stage.DONE
+        store.posteriors.save(second, a_posterior("beam1", ("t2",), seed=2), NEW, LATER)
+    store.watch.save(second, baseline, a_watched_test("t2"), None, [], LATER)
+    assert len(store.watch.list_all(3)) == len(store.watch.list_drifts(3)) == 1
+    assert store.recordings.get(second.recording_id).stage is Stage.DONE
 
 
 def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) -> None:
     baseline = with_baseline(store)
-    first = store.tests(3)[0]
-    rerun = store.again(first.recording_id, Stage.IDENTIFIED, LATER)
+    first = store.tests.list_all(3)[0]
+    rerun = store.recordings.reprocess(first.recording_id, Stage.IDENTIFIED, LATER)
     assert (rerun.of_baseline, rerun.posteriors) == (("t1",), 0)
     anew = identified(store, 1, NEW)
-    store.updated(anew, a_posterior(seed=2), NEW, LATER, to_watch=False)
-    assert store.test(anew.id).stage is Stage.WATCHED
-    kept = store.baseline(3)
+    store.posteriors.save(anew, a_posterior(seed=2), NEW, LATER, to_watch=False)
+    assert store.tests.get(anew.id).stage is Stage.WATCHED
+    kept = store.watch.baseline(3)
     assert kept is not None
     assert kept.id == baseline.id
-    assert [test.id for test in store.tests_of(kept)] == [first.id]
-    assert [posterior.seed for _, posterior in store.history(3)] == [2]
+    assert [test.id for test in store.tests.of_baseline(kept)] == [first.id]
+    assert [posterior.seed for _, posterior in store.posteriors.history(3)] == [2]
 
 
 def test_a_test_of_a_changed_name_keeps_it(store: Store) -> None:
     identified(store, 1, name="t")
     second = identified(store, 2, name="t")
-    store.again(second.recording_id, Stage.IDENTIFIED, LATER)
+    store.recordings.reprocess(second.recording_id, Stage.IDENTIFIED, LATER)
     assert identified(store, 2, name="t").test.id == second.test.id != "t"
 
 
@@ -113,63 +113,65 @@ def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: St
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    assert store.kept_watch(baseline) == KeptWatch("a key", second.time, b"state")
-    store.again(second.recording_id, Stage.WATCHED, LATER)
-    assert store.kept_watch(baseline) is None
+    assert store.watch.state(baseline) == KeptWatch("a key", second.time, b"state")
+    store.recordings.reprocess(second.recording_id, Stage.WATCHED, LATER)
+    assert store.watch.state(baseline) is None
 
 
 def test_a_refused_file_may_be_tried_again(store: Store) -> None:
-    recording = store.receive(a_file(1), NOW).recording
-    store.refuse(recording.id, {"message": "no rate."}, NOW)
-    assert store.again(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
-    assert [each.id for each in store.waiting_recordings(5)] == [recording.id]
+    recording = store.recordings.receive(a_file(1), NOW).recording
+    store.recordings.refuse(recording.id, {"message": "no rate."}, NOW)
+    assert (
+        store.recordings.reprocess(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
+    )
+    assert [each.id for each in store.recordings.list_waiting(5)] == [recording.id]
 
 
 @pytest.mark.parametrize("stage", [Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED])
 def test_what_has_not_come_so_far_cannot_be_done_again(store: Store, stage: Stage) -> None:
-    recording = store.receive(a_file(1), NOW).recording
+    recording = store.recordings.receive(a_file(1), NOW).recording
     with pytest.raises(UsageError, match="not come so far"):
-        store.again(recording.id, stage, LATER)
-    assert store.events() == ()
+        store.recordings.reprocess(recording.id, stage, LATER)
+    assert store.recordings.list_events() == ()
 
 
 def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Store) -> None:
     test = identified(store, 1)
-    assert store.recording_named("1") == (test.recording_id, None)
-    assert store.recording_named("t1") == (test.recording_id, "t1")
+    assert store.recordings.find("1") == (test.recording_id, None)
+    assert store.recordings.find("t1") == (test.recording_id, "t1")
     with pytest.raises(NothingThere, match="no recording and no test 't9'"):
-        store.recording_named("t9")
-    recording = store.receive(a_file(2), NOW).recording
-    store.identified(recording.id, [IdentifiedTest(a_test("t1", hanger=4))], OLD, NOW)
+        store.recordings.find("t9")
+    recording = store.recordings.receive(a_file(2), NOW).recording
+    store.tests.save(recording.id, [IdentifiedTest(a_test("t1", hanger=4))], OLD, NOW)
     with pytest.raises(UsageError, match="2 hangers"):
-        store.recording_named("t1")
+        store.recordings.find("t1")
 
 
 def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
     """With another sidecar, as a duplicate, or after its refusal: `--of` lost the old name."""
     test = identified(store, 1)  # of h3-1.csv
     sent = a_file(1, file_name="crew/new.uff", arrival="again", sidecar_as="22/2.toml")
-    recording = store.receive(sent, LATER).recording
+    recording = store.recordings.receive(sent, LATER).recording
     assert recording.file.file_name == "crew/new.uff"
-    store.identified(recording.id, [IdentifiedTest(a_test("new"))], NEW, LATER)
-    store.receive(a_file(1, file_name="copy.csv", arrival="third"), LATER)
+    store.tests.save(recording.id, [IdentifiedTest(a_test("new"))], NEW, LATER)
+    store.recordings.receive(a_file(1, file_name="copy.csv", arrival="third"), LATER)
     names = ("t1", "h3-1.csv", "h3-1", "crew/new.uff", "new.uff", "copy", "copy.csv")
-    assert {store.recording_named(name) for name in names} == {(test.recording_id, None)}
-    assert store.recording_named("new") == (test.recording_id, "new")
-    assert store.names_of(recording.id) == ("crew/new.uff", "h3-1.csv", "copy.csv")
+    assert {store.recordings.find(name) for name in names} == {(test.recording_id, None)}
+    assert store.recordings.find("new") == (test.recording_id, "new")
+    assert store.recordings.names_of(recording.id) == ("crew/new.uff", "h3-1.csv", "copy.csv")
     with pytest.raises(NothingThere):
-        store.recording_named("h3")
-    refused = store.receive(a_file(2), NOW).recording
-    store.refuse(refused.id, {"message": "no rate."}, NOW)
-    store.receive(a_file(2, file_name="retry.csv", arrival="again"), LATER)
-    assert store.recording_named("h3-2") == store.recording_named("retry") == (refused.id, None)
+        store.recordings.find("h3")
+    refused = store.recordings.receive(a_file(2), NOW).recording
+    store.recordings.refuse(refused.id, {"message": "no rate."}, NOW)
+    store.recordings.receive(a_file(2, file_name="retry.csv", arrival="again"), LATER)
+    assert store.recordings.find("h3-2") == store.recordings.find("retry") == (refused.id, None)
 
 
 def test_a_name_that_several_files_had_is_told_with_their_numbers(store: Store) -> None:
     for number in (1, 2):
-        store.receive(a_file(number, file_name="same.csv"), NOW)
+        store.recordings.receive(a_file(number, file_name="same.csv"), NOW)
     with pytest.raises(UsageError, match="2 recordings were called 'same'") as caught:
-        store.recording_named("same")
+        store.recordings.find("same")
     assert "1, 2" in caught.value.remedy
 
 
@@ -177,20 +179,20 @@ def test_a_row_finds_its_recording(store: Store) -> None:
     baseline = with_baseline(store)
     watched(store, second := identified(store, 2), baseline)
     rows = (f"tests/{second.id}", "watches/1", "drifts/1", "posteriors/2")
-    assert {store.recording_named(row) for row in rows} == {(second.recording_id, None)}
+    assert {store.recordings.find(row) for row in rows} == {(second.recording_id, None)}
     for row in ("watches/9", "alerts/1", "watches/x"):
         with pytest.raises(NothingThere):
-            store.recording_named(row)
+            store.recordings.find(row)
 
 
 def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)
-    store.updated(second, a_posterior("beam1", ("t2",)), OLD, NOW)
-    store.watched(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
-    for delivery in store.deliveries():
-        store.delivered(delivery, LATER)
-    steps = store.steps(second.recording_id)
+    store.posteriors.save(second, a_posterior("beam1", ("t2",)), OLD, NOW)
+    store.watch.save(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
+    for delivery in store.alerts.list_deliveries():
+        store.alerts.save_delivery(delivery, LATER)
+    steps = store.recordings.list_steps(second.recording_id)
     assert [step.stage for step in steps if step.test is None] == [
         "archived", "received", "identified", "updated", "done"
     ]  # fmt: skip
@@ -201,6 +203,8 @@ def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
 
 def test_a_refusal_is_a_step_of_the_file_and_of_its_tests(store: Store) -> None:
     test = identified(store, 1)
-    store.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
-    refused = [s.test for s in store.steps(test.recording_id) if s.stage == Stage.REFUSED]
+    store.recordings.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
+    refused = [
+        s.test for s in store.recordings.list_steps(test.recording_id) if s.stage == Stage.REFUSED
+    ]
     assert refused == [None, "t1"]

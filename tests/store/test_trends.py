@@ -42,28 +42,28 @@ def a_sprung(test: str, tension: float = 1.0) -> Posterior:
 
 
 def identified(store: Store, number: int, hanger: int = 3) -> StoredTest:
-    recording = store.receive(a_file(number), NOW).recording
+    recording = store.recordings.receive(a_file(number), NOW).recording
     made = a_test(f"t{number}", days=number, hanger=hanger)
-    store.identified(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
-    return next(test for test in store.tests() if test.recording_id == recording.id)
+    store.tests.save(recording.id, [IdentifiedTest(made)], LINEAGE, NOW)
+    return next(test for test in store.tests.list_all() if test.recording_id == recording.id)
 
 
 def begun(store: Store, number: int = 1, hanger: int = 3) -> StoredTest:
     """The first test of a hanger: two classes compete, the sprung one is selected."""
     first = identified(store, number, hanger)
     ranked = (a_sprung(first.test.id), a_posterior("beam1", (first.test.id,)))
-    store.selected(hanger, [first], Selection(ranked, (0.9, 0.1)), LINEAGE, NOW)
+    store.posteriors.save_selection(hanger, [first], Selection(ranked, (0.9, 0.1)), LINEAGE, NOW)
     return first
 
 
 def updated(store: Store, number: int, tension: float, hanger: int = 3) -> StoredTest:
     test = identified(store, number, hanger)
-    store.updated(test, a_sprung(test.test.id, tension), LINEAGE, NOW)
+    store.posteriors.save(test, a_sprung(test.test.id, tension), LINEAGE, NOW)
     return test
 
 
 def from_history(store: Store, hanger: Hanger) -> list[Told]:
-    found = store.selection(hanger.id)
+    found = store.posteriors.selection(hanger.id)
     selection = found.selection if found else None
     return [
         (
@@ -72,7 +72,7 @@ def from_history(store: Store, hanger: Hanger) -> list[Told]:
             posterior.model,
             in_numbers(posterior, hanger, selection),
         )
-        for stored, posterior in store.history(hanger.id)
+        for stored, posterior in store.posteriors.history(hanger.id)
     ]
 
 
@@ -100,7 +100,7 @@ def from_trend(store: Store, hanger: Hanger) -> list[Told]:
             point.model,
             numbers_of(point),
         )
-        for point in store.trend(hanger)
+        for point in store.posteriors.trend(hanger)
     ]
 
 
@@ -111,43 +111,43 @@ def without_samples(store: Store) -> None:
 
 
 def sent_back(store: Store) -> None:
-    store.again(store.tests(3)[1].recording_id, Stage.UPDATED, NOW)
+    store.recordings.reprocess(store.tests.list_all(3)[1].recording_id, Stage.UPDATED, NOW)
 
 
 def sent_back_and_done_again(store: Store) -> None:
     sent_back(store)
-    store.updated(store.tests(3)[1], a_sprung("t2", 0.8), LINEAGE, NOW)
+    store.posteriors.save(store.tests.list_all(3)[1], a_sprung("t2", 0.8), LINEAGE, NOW)
 
 
 def refused(store: Store) -> None:
-    test = store.tests(3)[1]
-    store.refuse(test.recording_id, {"message": "no."}, NOW, [test.id])
+    test = store.tests.list_all(3)[1]
+    store.recordings.refuse(test.recording_id, {"message": "no."}, NOW, [test.id])
 
 
 def adopted(store: Store) -> None:
-    before = store.selection(3)
+    before = store.posteriors.selection(3)
     assert before is not None
     model = "beam2+point_mass@everywhere"
     adoption = Adoption(3, model, "beam2", "point_mass", "everywhere", "a lamp", "engineer")
     probable = {"beam1": 0.1, "beam2": 0.4, model: 0.5}
-    chosen = [store.tests(3)[0]]
+    chosen = [store.tests.list_all(3)[0]]
     prior = described(model, HANGER_3).prior
     posterior = replace(modelled(list((prior.lower + prior.upper) / 2), model), tests=("t1",))
-    store.adopt(adoption, posterior, probable, (before, chosen), LINEAGE, NOW)
+    store.posteriors.adopt(adoption, posterior, probable, (before, chosen), LINEAGE, NOW)
 
 
 def undone(store: Store) -> None:
     adopted(store)
-    store.drop_adoption(1, "the lamp is gone", "engineer", NOW)
+    store.posteriors.drop_adoption(1, "the lamp is gone", "engineer", NOW)
 
 
 def rebaselined(store: Store) -> None:
-    baseline = store.baseline(3)
+    baseline = store.watch.baseline(3)
     assert baseline is not None
-    chosen = list(store.tests(3)[1:])
+    chosen = list(store.tests.list_all(3)[1:])
     record = ("engineer", "new pin", chosen[0].time)
     joint = replace(a_sprung("t3", 0.9), tests=tuple(test.test.id for test in chosen))
-    store.rebaseline(baseline, joint, chosen, record, LINEAGE, NOW)
+    store.watch.rebaseline(baseline, joint, chosen, record, LINEAGE, NOW)
 
 
 HAPPENINGS = (sent_back, sent_back_and_done_again, refused, adopted, undone, rebaselined)
@@ -164,11 +164,11 @@ def test_the_trend_is_what_the_history_says(
     expected = from_history(store, HANGER_3)
     assert 2 <= len(expected) <= 3
     assert from_trend(store, HANGER_3) == expected
-    store.keep_summaries(HANGER_3)
+    store.posteriors.save_summaries(HANGER_3)
     without_samples(store)
     assert from_trend(store, HANGER_3) == expected
-    (latest,) = store.latest_trends([HANGER_3]).values()
-    assert latest == store.trend(HANGER_3)[-1]
+    (latest,) = store.posteriors.latest_trends([HANGER_3]).values()
+    assert latest == store.posteriors.trend(HANGER_3)[-1]
 
 
 @pytest.mark.parametrize("happened", HAPPENINGS, ids=lambda each: each.__name__)
@@ -180,24 +180,24 @@ def test_the_baselines_in_force_are_those_of_each_hanger(
     updated(file_store, 3, 0.9)
     begun(file_store, 4, hanger=4)
     happened(file_store)
-    found = file_store.baselines_in_force([HANGER_3, ANOTHER])
+    found = file_store.watch.baselines_in_force([HANGER_3, ANOTHER])
     assert list(found) == [3, 4]
     for hanger, glance in found.items():
-        baseline = file_store.baseline(hanger)
+        baseline = file_store.watch.baseline(hanger)
         assert baseline is not None
         assert (glance.id, glance.who, glance.why) == (baseline.id, baseline.who, baseline.why)
         assert (glance.since, glance.tests) == (baseline.since, baseline.posterior.tests)
         assert glance.temperature_c == 11.5
         assert glance.tension_n == Summary.of(baseline.posterior.tension_n)
-    assert file_store.baseline_temperatures() == {3: 11.5, 4: 11.5}
+    assert file_store.watch.baseline_temperatures() == {3: 11.5, 4: 11.5}
 
 
 def test_only_what_is_not_kept_is_made_from_samples(
     file_store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun(file_store)
-    assert file_store.keep_summaries(HANGER_3) == 1
-    assert file_store.keep_summaries(HANGER_3) == 0
+    assert file_store.posteriors.save_summaries(HANGER_3) == 1
+    assert file_store.posteriors.save_summaries(HANGER_3) == 0
     updated(file_store, 2, 0.95)
     made: list[tuple[str, ...]] = []
     summarised = trends.summarised
@@ -208,29 +208,29 @@ def test_only_what_is_not_kept_is_made_from_samples(
 
     with monkeypatch.context() as patched:
         patched.setattr(trends, "summarised", noted)
-        assert [point.test for point in file_store.trend(HANGER_3)] == ["t1", "t2"]
+        assert [point.test for point in file_store.posteriors.trend(HANGER_3)] == ["t1", "t2"]
     assert made == [("t2",)]
-    assert file_store.keep_summaries(HANGER_3) == 1
+    assert file_store.posteriors.save_summaries(HANGER_3) == 1
     without_samples(file_store)
-    assert [point.test for point in file_store.trend(HANGER_3)] == ["t1", "t2"]
+    assert [point.test for point in file_store.posteriors.trend(HANGER_3)] == ["t1", "t2"]
 
 
 def test_the_tension_over_all_classes_follows_the_selected_one(file_store: Store) -> None:
     begun(file_store)
-    (first,) = file_store.trend(HANGER_3)
-    found = file_store.selection(3)
+    (first,) = file_store.posteriors.trend(HANGER_3)
+    found = file_store.posteriors.selection(3)
     assert found is not None
     assert first.averaged == found.selection.averaged(HANGER_3.limits)
     updated(file_store, 2, 0.9)
-    latest = file_store.trend(HANGER_3)[-1]
+    latest = file_store.posteriors.trend(HANGER_3)[-1]
     ratio = latest.tension_n.mean / first.tension_n.mean
     assert latest.averaged.tension_n.mean == pytest.approx(
         ratio * first.averaged.tension_n.mean, rel=2e-3
     )
     limited = replace(HANGER_3, limits=Limits(tension_max_n=latest.averaged.tension_n.q50))
-    assert file_store.trend(limited)[-1].averaged.probability_above_limit == pytest.approx(
-        0.5, abs=0.02
-    )
+    assert file_store.posteriors.trend(limited)[
+        -1
+    ].averaged.probability_above_limit == pytest.approx(0.5, abs=0.02)
 
 
 def test_another_description_of_the_hanger_gives_another_stiffness(file_store: Store) -> None:
@@ -242,15 +242,15 @@ def test_another_description_of_the_hanger_gives_another_stiffness(file_store: S
     posterior = modelled(list((prior.lower + prior.upper) / 2), "solid2", narrow)
     first = identified(file_store, 1)
     chosen = Selection((replace(posterior, tests=("t1",)),), (1.0,))
-    file_store.selected(3, [first], chosen, LINEAGE, NOW)
-    file_store.keep_summaries(narrow)
+    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
+    file_store.posteriors.save_summaries(narrow)
     for hanger in (wide, narrow):
         assert from_trend(file_store, hanger) == from_history(file_store, hanger)
-    (before,), (after,) = file_store.trend(narrow), file_store.trend(wide)
+    (before,), (after,) = file_store.posteriors.trend(narrow), file_store.posteriors.trend(wide)
     assert before.tension_n == after.tension_n
     name = "longitudinal_end_stiffness"
     assert after.stiffness[name].mean - before.stiffness[name].mean > 0.05
-    assert file_store.keep_summaries(wide) == 1
+    assert file_store.posteriors.save_summaries(wide) == 1
 
 
 def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
@@ -268,9 +268,9 @@ def test_summaries_are_kept_some_at_a_time_and_what_was_kept_is_not_done_again(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        file_store.keep_summaries(HANGER_3, killed)
+        file_store.posteriors.save_summaries(HANGER_3, killed)
     assert heard == pytest.approx([2 / 6, 4 / 6])
-    assert file_store.keep_summaries(HANGER_3) == 2
+    assert file_store.posteriors.save_summaries(HANGER_3) == 2
 
 
 def test_a_trend_begins_where_it_is_asked_to(file_store: Store) -> None:
@@ -278,15 +278,15 @@ def test_a_trend_begins_where_it_is_asked_to(file_store: Store) -> None:
     for number in (2, 3):
         updated(file_store, number, 0.9)
     since = NOW + timedelta(days=2)
-    assert [point.test for point in file_store.trend(HANGER_3, since)] == ["t2", "t3"]
+    assert [point.test for point in file_store.posteriors.trend(HANGER_3, since)] == ["t2", "t3"]
 
 
 def test_clamped_ends_have_no_stiffness(file_store: Store) -> None:
     first = identified(file_store, 1)
     chosen = Selection((a_posterior("beam1", ("t1",)),), (1.0,))
-    file_store.selected(3, [first], chosen, LINEAGE, NOW)
-    file_store.keep_summaries(HANGER_3)
-    assert file_store.trend(HANGER_3)[0].stiffness == {}
+    file_store.posteriors.save_selection(3, [first], chosen, LINEAGE, NOW)
+    file_store.posteriors.save_summaries(HANGER_3)
+    assert file_store.posteriors.trend(HANGER_3)[0].stiffness == {}
 
 
 def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> None:
@@ -297,6 +297,6 @@ def test_a_database_of_before_the_summaries_answers_the_same(tmp_path: Path) -> 
         expected = from_history(store, HANGER_3)
         assert len(expected) == 3
         assert from_trend(store, HANGER_3) == expected
-        assert store.keep_summaries(HANGER_3) > 0
+        assert store.posteriors.save_summaries(HANGER_3) > 0
         without_samples(store)
         assert from_trend(store, HANGER_3) == expected

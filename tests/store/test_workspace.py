@@ -23,7 +23,7 @@ def test_a_new_workspace_has_everything_and_opens(tmp_path: Path) -> None:
     assert names == ["archive", "bridge.toml", "quarantine", "shm.db", "spool"]
     assert [hanger.id for hanger in workspace.bridge.hangers] == [3]
     with workspace.store() as store:
-        assert store.recordings() == ()
+        assert store.recordings.list_all() == ()
 
 
 def test_a_workspace_is_not_made_twice(tmp_path: Path) -> None:

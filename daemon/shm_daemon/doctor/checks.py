@@ -156,14 +156,14 @@ def check_under_way(examined: Examined) -> Iterator[Finding]:
     unready = _without_baseline(examined)
     standing = [
         each
-        for each in store.standing()
+        for each in store.recordings.list_under_way()
         if each.stage is Stage.RECEIVED or each.hanger not in unready
     ]
     if not standing:
         yield ok("recordings", "none is on its way")
         return
     oldest = min(standing, key=lambda each: each.since)
-    newest_at = store.newest_row_at() or now
+    newest_at = store.upkeep.newest_row_at() or now
     waits, idle = now - oldest.since, now - newest_at
     found = (
         f"{len(standing)} on their way; {oldest.file_name} (recording {oldest.id}) has been "
@@ -194,7 +194,7 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
 
 def check_held(examined: Examined) -> Iterator[Finding]:
     """Whether recordings wait for a person to decide."""
-    found = examined.store.holds()
+    found = examined.store.recordings.list_holds()
     if not found:
         yield ok("held", "nothing waits for you to decide")
         return
@@ -209,8 +209,8 @@ def check_held(examined: Examined) -> Iterator[Finding]:
 def check_raw_files(examined: Examined) -> Iterator[Finding]:
     """Whether the raw files of the latest recordings are where the store says."""
     store, archive = examined.store, examined.workspace.archive
-    latest = store.recordings()[-_LOOKED_AT:]
-    away = store.removed_to()
+    latest = store.recordings.list_all()[-_LOOKED_AT:]
+    away = store.upkeep.removed_to()
     missing = [r.file.file_name for r in latest if not archive.holds(r.file) and r.id not in away]
     if missing:
         yield fault(
@@ -226,8 +226,11 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
 
 def _without_baseline(examined: Examined) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
-    wanted, selected = examined.workspace.settings.baseline_tests, examined.store.selected_models()
-    latest = examined.store.latest_tests().items()
+    wanted, selected = (
+        examined.workspace.settings.baseline_tests,
+        examined.store.posteriors.selected_models(),
+    )
+    latest = examined.store.tests.latest().items()
     return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
 
 
@@ -251,7 +254,7 @@ def _why(reason: Path) -> str:
 def check_store(examined: Examined) -> Iterator[Finding]:
     """Whether the store is whole, as far as a quick look tells."""
     store = examined.store
-    troubles = (*quick_troubles(store), *(error.message for error in store.known_damage()))
+    troubles = (*quick_troubles(store), *(error.message for error in store.upkeep.known_damage()))
     if troubles:
         yield fault(
             "store",
@@ -260,7 +263,7 @@ def check_store(examined: Examined) -> Iterator[Finding]:
             "`shm db restore FILE --replace`.",
         )
     else:
-        held = sum(store.stage_counts().values())
+        held = sum(store.recordings.stage_counts().values())
         kind = store.engine.dialect.name
         yield ok(
             "store", f"{store.location} ({kind}), present schema, {counted(held, 'recording')}"
@@ -270,22 +273,25 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 def check_backup(examined: Examined) -> Iterator[Finding]:
     """How old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
-    last, remedy = store.last_backup(), "`shm db backup FILE --archive DIR`, best every night."
+    last, remedy = (
+        store.upkeep.last_backup(),
+        "`shm db backup FILE --archive DIR`, best every night.",
+    )
     if last is None:
         yield warning("backup", "never made here", remedy)
     else:
         found = f"{last[1]}, {told(now - last[0])} ago"
         late = now - last[0] > timedelta(days=examined.workspace.settings.backup_days)
         yield warning("backup", found, remedy) if late else ok("backup", found)
-    copied = {copy.recording_id for copy in store.archive_copies()}
-    alone = sum(recording.id not in copied for recording in store.recordings())
+    copied = {copy.recording_id for copy in store.upkeep.list_copies()}
+    alone = sum(recording.id not in copied for recording in store.recordings.list_all())
     if last is not None and alone:
         yield warning("backup", f"raw files without a copy elsewhere: {alone}", remedy)
 
 
 def check_clock(examined: Examined) -> Iterator[Finding]:
     """Whether the clock has jumped back, and whether anything sets it."""
-    newest, now = examined.store.newest_row_at(), examined.now
+    newest, now = examined.store.upkeep.newest_row_at(), examined.now
     if newest is not None and newest - now > _CLOCK_TOLERANCE:
         yield fault(
             "clock",
@@ -306,8 +312,8 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
     store, bridge = examined.store, examined.workspace.bridge
     settings, latest, selected = (
         examined.workspace.settings,
-        store.latest_tests(),
-        store.selected_models(),
+        store.tests.latest(),
+        store.posteriors.selected_models(),
     )
     ids = [hanger.id for hanger in bridge.hangers]
     never = [str(each) for each in ids if each not in latest]
@@ -343,7 +349,9 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
 def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
     """Baselines that are not what they were made from any more."""
     store = examined.store
-    baselines = [(each, store.baseline(each.id)) for each in examined.workspace.bridge.hangers]
+    baselines = [
+        (each, store.watch.baseline(each.id)) for each in examined.workspace.bridge.hangers
+    ]
     changed = [str(each.id) for each, made in baselines if redescribed(each, made)]
     gone = [str(each.id) for each, made in baselines if discarded_of(store, made)]
     for hangers, found in (

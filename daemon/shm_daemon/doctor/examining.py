@@ -77,7 +77,7 @@ def check_hooks(workspace: Workspace) -> Iterator[Finding]:
 def check_deliveries(examined: Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
-    waiting = store.deliveries(DeliveryState.WAITING)
+    waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
     late = [each for each in waiting if each.attempts or now - each.next_attempt_at > WAITS_LONG]
     if late:
         worst = max(late, key=lambda each: each.attempts)
@@ -88,7 +88,7 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
             f"{worst.attempts} times: {said}",
             f"`shm alerts test --hook {worst.hook}`; they are tried again by themselves.",
         )
-    ended = store.deliveries(DeliveryState.GIVEN_UP)
+    ended = store.alerts.list_deliveries(DeliveryState.GIVEN_UP)
     lost = [each for each in ended if each.ended_at and now - each.ended_at < _REMEMBERED]
     if lost:
         last = lost[-1]

@@ -103,7 +103,7 @@ def token_in_force(request: Request, site: Site, secret: str) -> StoredToken:
             f"Try again in {wait_s:.0f} s, with a token that is in force.",
             {"Retry-After": f"{math.ceil(wait_s)}"},
         )
-    token = site.store.token_of(secret, utc_now())
+    token = site.store.upkeep.token_of(secret, utc_now())
     if token is None:
         site.wrong_tokens.note_wrong(caller)
         raise _nobody("This token is wrong or revoked.")
@@ -125,7 +125,7 @@ def _visitor(request: Request, site: Site, secret: str, scope: Scope) -> Visitor
 def _at_home(request: Request, site: Site) -> Visitor:
     """Here reading needs no token: a cookie that is out of date takes nothing away."""
     secret = request.cookies.get(COOKIE)
-    token = site.store.token_of(secret, utc_now()) if secret else None
+    token = site.store.upkeep.token_of(secret, utc_now()) if secret else None
     return Visitor(token.name, Scope.WRITE in token.scopes) if token else Visitor("")
 
 

@@ -43,9 +43,9 @@ def alerts(
     """
     is_open = True if open else None
     if limit is None:
-        found = site.store.alert_rows(hanger, is_open=is_open)[::-1]
+        found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
         return {"alerts": [alert_document(each) for each in found], "next_before": None}
-    rows = site.store.alert_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
+    rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
     return {
         "alerts": [alert_document(each) for each in rows[:limit]],
         "next_before": rows[limit - 1].id if len(rows) > limit else None,
@@ -66,8 +66,8 @@ def acknowledge(
 ) -> Any:
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
-    site.store.acknowledge(alert_id, who, told.why, utc_now())
-    return alert_document(site.store.alert_row(alert_id))
+    site.store.alerts.acknowledge(alert_id, who, told.why, utc_now())
+    return alert_document(site.store.alerts.row(alert_id))
 
 
 def alert_document(alert: AlertRow) -> dict[str, Any]:

@@ -114,7 +114,7 @@ class Comparison:
 def glance(site: Site, now: datetime) -> BridgeGlance:
     """The bridge as the store has it now."""
     workspace, store = site.workspace, site.store
-    tests, quiet_before = store.latest_tests(), now - timedelta(days=workspace.settings.quiet_days)
+    tests, quiet_before = store.tests.latest(), now - timedelta(days=workspace.settings.quiet_days)
     hangers = tuple(
         HangerGlance(
             line,

@@ -116,7 +116,7 @@ def _environment() -> Environment:
 def _open_alerts(site: Site) -> int | None:
     """None where the store cannot be asked: the page itself says so."""
     try:
-        return site.store.alert_counts()[0]
+        return site.store.alerts.counts()[0]
     except ShmError:
         return None
 

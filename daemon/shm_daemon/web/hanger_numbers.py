@@ -41,8 +41,8 @@ def trend(
 ) -> Any:
     """Every test with its posterior in numbers, the oldest first, events and states over time."""
     view = _view(request, site, hanger_id)
-    points = view.trend if since is None else view.store.trend(view.hanger, since)
-    events = view.store.hanger_events(hanger_id, since)
+    points = view.trend if since is None else view.store.posteriors.trend(view.hanger, since)
+    events = view.store.alerts.list_hanger_events(hanger_id, since)
     return JSONResponse(
         plain(
             {

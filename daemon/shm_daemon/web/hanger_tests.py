@@ -66,6 +66,6 @@ def headings(view: HangerView) -> tuple[str, ...]:
 def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
     """So many tests, the newest first; `before` is the number of the test to go on after."""
     points = {point.test_id: point for point in view.trend}
-    rows = view.store.test_rows(view.hanger.id, limit, before)
+    rows = view.store.tests.list_rows(view.hanger.id, limit, before)
     unit = tension_unit(view.trend)
     return [TestLine(row, points.get(row.id), unit) for row in rows]

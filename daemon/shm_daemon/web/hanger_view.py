@@ -59,7 +59,7 @@ class StatesOrder:
         """Runs in a process of its own: the workspace is opened anew."""
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
-            baseline = store.baseline(self.hanger.id, self.model)
+            baseline = store.watch.baseline(self.hanger.id, self.model)
             return WorkedOutStates(hanger_states(workspace, store, self.hanger, baseline))
 
 
@@ -73,20 +73,20 @@ class HangerView:
     @cached_property
     def trend(self) -> tuple[TrendPoint, ...]:
         """One point a test that has been through updating, the oldest first."""
-        return self.store.trend(self.hanger)
+        return self.store.posteriors.trend(self.hanger)
 
     @cached_property
     def baseline(self) -> BaselineGlance | None:
-        return self.store.baselines_in_force([self.hanger]).get(self.hanger.id)
+        return self.store.watch.baselines_in_force([self.hanger]).get(self.hanger.id)
 
     @cached_property
     def events(self) -> tuple[HangerEvent, ...]:
-        return self.store.hanger_events(self.hanger.id)
+        return self.store.alerts.list_hanger_events(self.hanger.id)
 
     @cached_property
     def calls(self) -> tuple[StoredWatch, ...]:
         """The tests at which a change stood as called."""
-        return self.store.called_watches(self.hanger.id)
+        return self.store.watch.list_detected(self.hanger.id)
 
     @cached_property
     def report(self) -> HangerReport | None:
@@ -98,7 +98,7 @@ class HangerView:
     @cached_property
     def sheet(self) -> DiagnosisSheet | None:
         """The latest diagnosis of the gap."""
-        stored = self.store.latest_diagnosis(self.hanger.id)
+        stored = self.store.posteriors.latest_diagnosis(self.hanger.id)
         if stored is None:
             return None
         return DiagnosisSheet(stored.diagnosis, self.hanger, self.workspace.bridge.name)
@@ -116,13 +116,13 @@ class HangerView:
         return None if made is None else made.states
 
     def _order(self, baseline: BaselineGlance) -> StatesOrder:
-        stored = self.store.baseline(self.hanger.id, baseline.model)
+        stored = self.store.watch.baseline(self.hanger.id, baseline.model)
         assert isinstance(stored, Baseline)
         return StatesOrder(
             folder=self.workspace.folder,
             hanger=self.hanger,
             baseline_id=baseline.id,
             model=baseline.model,
-            tests=tuple(each.id for each in self.store.watched_since(stored)),
+            tests=tuple(each.id for each in self.store.watch.list_watched(stored)),
             false_call_years=self.workspace.settings.false_call_years,
         )

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Path
 from shm.documents import averaged_document
 from shm.errors import BadInput, NothingThere
 from shm.store import DeliveryState, Store, StoredWatch, TrendPoint, Workspace
-from shm.store.listing import of_readable
+from shm.store.checksums import of_readable
 from shm.values import Hanger
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
@@ -36,11 +36,11 @@ def status(site: AtSite, _: Reader) -> Any:
     workspace, store = site.workspace, site.store
     return {
         "bridge": workspace.bridge.name,
-        "recordings": store.stage_counts(),
+        "recordings": store.recordings.stage_counts(),
         "spool": len(scan(workspace.spool)),
         "quarantine": quarantined(workspace),
-        "open_alerts": store.alert_counts()[0],
-        "waiting_deliveries": store.delivery_counts()[DeliveryState.WAITING],
+        "open_alerts": store.alerts.counts()[0],
+        "waiting_deliveries": store.alerts.delivery_counts()[DeliveryState.WAITING],
         "daemon_seen_seconds_ago": seconds_since_beat(workspace),
     }
 
@@ -82,9 +82,12 @@ def quarantined(workspace: Workspace) -> int:
 
 def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Of many hangers in as many questions as of one."""
-    trends, baselines = store.latest_trends(hangers), store.baselines_in_force(hangers)
-    tests, alerts = store.latest_tests(), store.open_alert_counts()
-    watches = of_readable(store.latest_watches, {})
+    trends, baselines = (
+        store.posteriors.latest_trends(hangers),
+        store.watch.baselines_in_force(hangers),
+    )
+    tests, alerts = store.tests.latest(), store.alerts.open_counts()
+    watches = of_readable(store.watch.latest, {})
     return [
         {
             "hanger": hanger.id,

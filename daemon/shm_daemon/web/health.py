@@ -78,7 +78,7 @@ def _of_description(site: Site) -> list[Notice]:
 
 def _of_strangers(site: Site) -> list[Notice]:
     try:
-        tested = set(site.store.latest_tests())
+        tested = set(site.store.tests.latest())
     except ShmError:
         return []  # told as a trouble
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
@@ -108,8 +108,8 @@ def _looked_at(site: Site, check: Callable[[Site], list[str]]) -> list[str]:
 
 def _store(site: Site) -> list[str]:
     try:
-        site.store.alert_counts()
-        damage = site.store.known_damage()
+        site.store.alerts.counts()
+        damage = site.store.upkeep.known_damage()
     except ShmError as error:
         log.error("%s", error)
         return ["The store cannot be used."]
@@ -137,7 +137,7 @@ def _daemon(site: Site) -> list[str]:
 
 def _held(site: Site) -> list[str]:
     try:
-        holds = site.store.holds()
+        holds = site.store.recordings.list_holds()
     except ShmError:
         return []  # told as a trouble
     of_hangers: dict[int, list[int]] = {}

@@ -17,5 +17,5 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
             "held_at": hold.held_at,
             "message": hold.message,
         }
-        for hold in site.store.holds(hanger)
+        for hold in site.store.recordings.list_holds(hanger)
     ]

@@ -20,7 +20,7 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4 as CONTENT_TYP
 from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
-from shm.store.measuring import ON_THE_WAY
+from shm.store.recording_rows import ON_THE_WAY
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.hangers import quarantined
@@ -110,37 +110,41 @@ def _daemon(site: Site) -> Iterator[Metric]:
 
 
 def _usable(site: Site) -> Iterator[Metric]:
-    site.store.alert_counts()
+    site.store.alerts.counts()
     yield _store_up(is_up=True)
 
 
 def _queue(site: Site) -> Iterator[Metric]:
-    looks, counts = scan(site.workspace.spool), site.store.stage_counts()
+    looks, counts = scan(site.workspace.spool), site.store.recordings.stage_counts()
     waiting = len(looks) + sum(counts[stage] for stage in ON_THE_WAY)
     text = "Files in the spool and recordings that are not through."
     yield _gauge("shm_queue_length", text, waiting)
     changed_s = [time.time() - look.modified_ns / 1e9 for look in looks.values()]
-    oldest = site.store.oldest_waiting()
+    oldest = site.store.recordings.oldest_waiting()
     stored_s = [(utc_now() - oldest).total_seconds()] if oldest else []
     text = "How long the oldest of the queue has waited; 0 where it is empty."
     yield _gauge("shm_queue_oldest_seconds", text, max([0.0, *changed_s, *stored_s]))
 
 
 def _recordings(site: Site) -> Iterator[Metric]:
-    yield _labelled("shm_recordings", "Recordings at a stage.", "stage", site.store.stage_counts())
+    yield _labelled(
+        "shm_recordings", "Recordings at a stage.", "stage", site.store.recordings.stage_counts()
+    )
 
 
 def _alerts(site: Site) -> Iterator[Metric]:
-    counts = dict(zip(("open", "acknowledged"), site.store.alert_counts(), strict=True))
+    counts = dict(zip(("open", "acknowledged"), site.store.alerts.counts(), strict=True))
     yield _labelled("shm_alerts", "Alerts raised.", "state", counts)
 
 
 def _deliveries(site: Site) -> Iterator[Metric]:
-    yield _labelled("shm_deliveries", "Alerts to hooks.", "state", site.store.delivery_counts())
+    yield _labelled(
+        "shm_deliveries", "Alerts to hooks.", "state", site.store.alerts.delivery_counts()
+    )
 
 
 def _stages(site: Site) -> Iterator[Metric]:
-    lately = site.store.stage_seconds(utc_now() - _LATELY)
+    lately = site.store.recordings.stage_seconds(utc_now() - _LATELY)
     text = "From the stage before to this one, over the last hour: quantiles."
     seconds = GaugeMetricFamily("shm_stage_seconds", text, labels=["stage", "quantile"])
     for stage, values in lately.items():

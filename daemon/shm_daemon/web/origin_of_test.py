@@ -38,7 +38,7 @@ def _now(view: TestView) -> str:
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
     """The steps of the file, and those of this test of it."""
-    found = view.store.steps(view.recording.id)
+    found = view.store.recordings.list_steps(view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
 
@@ -61,7 +61,7 @@ def steps(view: TestView) -> Table:
 
 def formers_of(view: TestView) -> tuple[FormerTest, ...]:
     """Every identification of this test, in force or superseded, oldest first."""
-    found = view.store.former_tests(view.recording.id)
+    found = view.store.tests.list_former(view.recording.id)
     return tuple(each for each in found if each.name == view.stored.test.id)
 
 

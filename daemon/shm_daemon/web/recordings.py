@@ -156,7 +156,7 @@ def recordings(
     site: AtSite, _: Reader, sha256: Annotated[str, Query(pattern="^[0-9a-fA-F]{64}$")]
 ) -> Any:
     """One, or none while the file waits in the spool."""
-    found = site.store.recording_of(sha256.lower())
+    found = site.store.recordings.with_checksum(sha256.lower())
     return {"recordings": [_row(site.store, found)] if found else []}
 
 
@@ -207,18 +207,18 @@ def _land(
 
 
 def _outcome(store: Store, landed: Landed) -> Any:
-    known = store.recording_of(landed.sha256)
+    known = store.recordings.with_checksum(landed.sha256)
     if known is None:
         return "new"
     if known.stage is not Stage.REFUSED:
         return "duplicate"
-    return "reopened" if store.discarded(known.id) is None else "discarded before"
+    return "reopened" if store.recordings.discard_in_force(known.id) is None else "discarded before"
 
 
 def _recording(store: Store, key: str) -> StoredRecording:
     if len(key) < 64:
-        return store.recording(int(key))
-    found = store.recording_of(key.lower())
+        return store.recordings.get(int(key))
+    found = store.recordings.with_checksum(key.lower())
     if found is None:
         raise NothingThere(
             "no recording of this checksum was taken in yet.", remedy="Ask again in some seconds."
@@ -230,7 +230,7 @@ def _tests(store: Store, recording: StoredRecording) -> list[dict[str, str]]:
     """The tests in force that came of a recording, but for those that are held."""
     if recording.hanger is None:
         return []
-    found = store.former_tests(recording.id)
+    found = store.tests.list_former(recording.id)
     shown = (each for each in found if each.stage is not Stage.HELD)
     names = [test.name for test in shown if test.superseded_at is None]
     return [{"name": name, "page": test_page(recording.hanger, name)} for name in names]

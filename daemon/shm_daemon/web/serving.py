@@ -181,7 +181,7 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
     if address.is_loopback:
         return
     with workspace.store() as store:
-        if any(token.revoked_at is None for token in store.tokens()):
+        if any(token.revoked_at is None for token in store.upkeep.list_tokens()):
             return
     raise UsageError(
         f"{address.host} can be reached by others, and no token is in force.",

@@ -215,7 +215,7 @@ def hits(_: Reader, view: View) -> Any:
 def test(_: Reader, view: View) -> Any:
     """Modes, quality, what was set aside, and where all that comes from."""
     sheet, stored = view.as_stored, view.stored
-    before, after = view.store.beside(stored)
+    before, after = view.store.tests.beside(stored)
     response = sheet.identification.frequency_response
     return {
         "test": modes_document.test_document(stored.test),

@@ -60,8 +60,8 @@ class TestView:
         cls, workspace: Workspace, store: Store, workshop: Workshop[Any], hanger_id: int, name: str
     ) -> TestView:
         """Raises NothingThere for a hanger or a test that is none."""
-        stored = store.test_named(described(workspace, hanger_id).id, name)
-        return cls(workspace, store, workshop, stored, store.recording(stored.recording_id))
+        stored = store.tests.named(described(workspace, hanger_id).id, name)
+        return cls(workspace, store, workshop, stored, store.recordings.get(stored.recording_id))
 
     @property
     def is_archived(self) -> bool:
@@ -239,7 +239,7 @@ def worked_out(sheet: TestSheet) -> WorkedOut:
 
 def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> TestSheet:
     """What the store knows of a test: no records, hits, poles and fit."""
-    response, settings = store.frequency_response(stored), workspace.settings
+    response, settings = store.tests.frequency_response(stored), workspace.settings
     found = Identification(
         test=stored.test,
         frequency_response=response,

@@ -35,7 +35,7 @@ def alerts_page(
     """
     opened, older_open = _some(site.store, hanger, open_before, is_open=True)
     noted, older_noted = _some(site.store, hanger, noted_before, is_open=False)
-    counts = site.store.open_alert_counts()
+    counts = site.store.alerts.open_counts()
     return page(
         request,
         "alerts.html.j2",
@@ -55,7 +55,7 @@ def _some(
     store: Store, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Alerts as the page shows them, and the number to go on after, if there are more."""
-    rows = store.alert_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    rows = store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown = rows[:_SHOWN]
     return [_with_address(each) for each in shown], shown[-1].id if len(rows) > _SHOWN else None
 

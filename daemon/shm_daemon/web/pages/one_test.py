@@ -45,7 +45,7 @@ def one_test(
 
 def _page(request: Request, view: TestView, response: int | None) -> HTMLResponse:
     sheet, hanger_id = view.sheet, view.stored.hanger
-    before, after = view.store.beside(view.stored)
+    before, after = view.store.tests.beside(view.stored)
     points, verdict = _points(view), overall(view.stored.quality)
     chosen = response if response is not None and response < len(points) else _telling(view)
     address = test_page(hanger_id, view.stored.test.id)
@@ -144,7 +144,7 @@ def _temperature(celsius: float) -> str:
 
 def _tension(view: TestView) -> tuple[str, str, str]:
     try:
-        posterior = view.store.posterior_of(view.stored)
+        posterior = view.store.posteriors.of_test(view.stored)
     except NothingThere:
         return "Tension", "not yet", f"the test is {view.stored.stage}"
     tension_n = Interval.of_samples(posterior.tension_n)

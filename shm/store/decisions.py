@@ -1,12 +1,12 @@
-"""Taking a test that counts out again, and taking back what was discarded.
+"""What a person decides of a recording: to confirm or discard it, take it out or back, do it again.
 
-Nothing is deleted: the raw file, the test and what was made of it stay, as of work done again.
+Nothing is deleted: the raw file, the test and what was made of it stay.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -14,16 +14,36 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
-from shm.store.database import Database, insert
-from shm.store.files import by_id, counts, end_recording, end_tests, in_force, write_event
-from shm.store.hold_rows import Decision, HeldTest, Hold
-from shm.store.holding import confirmed_values, discarded_reason, holds_of, taking_back
-from shm.store.judging import reason_of
+from shm.store.checksums import loads
+from shm.store.database import Repository, insert
+from shm.store.files import (
+    by_id,
+    counts,
+    end_recording,
+    end_tests,
+    in_force,
+    write_event,
+    write_step,
+)
+from shm.store.holding import (
+    confirmed_values,
+    decide,
+    discarded_reason,
+    held_rows,
+    holds_of,
+    latest_hold,
+    open_holds,
+    reason_of,
+    refuse_time,
+    standing_discard,
+    taking_back,
+    undecided,
+)
 from shm.store.queries import WEIGHED
+from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
+from shm.store.reprocessing import BEFORE, of_baselines, reprocess, supersede_results
 from shm.store.results import advance_recordings
 from shm.store.rows import Stage
-from shm.store.stepping import write_step
-from shm.store.superseding import BEFORE, of_baselines, supersede_results
 from shm.store.tables import holds, recordings, tests, watch_states, watches
 
 
@@ -38,8 +58,74 @@ class Withdrawal:
     watched_again: int
 
 
-class Withdrawing(Database):
-    """The part of the store that takes out and takes back."""
+class Decisions(Repository):
+    """The part of `Recordings` by which people decide what counts."""
+
+    def list_holds(self, hanger: int | None = None) -> tuple[Hold, ...]:
+        """What nobody has decided on yet, the oldest first; of one hanger where named."""
+        with self.reading() as connection:
+            return open_holds(connection, hanger)
+
+    def latest_hold(self, recording_id: int) -> Hold | None:
+        """Why a recording is or was last held, and what a person made of it."""
+        with self.reading() as connection:
+            return latest_hold(connection, recording_id)
+
+    def discard_in_force(self, recording_id: int) -> Hold | None:
+        """The decision by which a recording is out; None where it counts, or was refused since."""
+        with self.reading() as connection:
+            return standing_discard(connection, by_id(connection, recording_id))
+
+    def decisions(self, recording_id: int, sidecar_as: str | None) -> Mapping[int, Hold]:
+        """The newest decision on each test of a recording, by its place in the file, among those
+        that were made on it with one sidecar."""
+        with self.reading() as connection:
+            return _decided_with(connection, recording_id, sidecar_as)
+
+    def confirm(
+        self,
+        recording_id: int,
+        who: str,
+        why: str,
+        at: datetime,
+        time: datetime | None = None,
+    ) -> Hold:
+        """Lets the held tests of a recording count from now on; the hold with that decision.
+
+        `time` is the true time of its test; without it, one whose time is certainly wrong counts
+        from its receipt. Raises NothingThere where there is no such recording, UsageError where it
+        is not held, or where the time cannot be right.
+        """
+        with self.writing() as connection:
+            hold = undecided(connection, recording_id)
+            refuse_time(hold, time, at)
+            for row in held_rows(connection, recording_id):
+                values = confirmed_values(connection, row, hold, time, who)
+                this = sa.update(tests).where(tests.c.id == row.id)
+                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
+                write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
+            own = sa.update(recordings).where(recordings.c.id == recording_id)
+            connection.execute(own.values(reason=None))
+            advance_recordings(connection, [recording_id], at)
+            decided = replace(hold, decision=Decision.CONFIRMED, time=time)
+            return decide(connection, decided, who, why, at)
+
+    def discard(self, recording_id: int, who: str, why: str, at: datetime) -> Hold:
+        """Ends the held tests of a recording; its raw file stays in the archive.
+
+        Raises NothingThere where there is no such recording, UsageError where it is not held.
+        """
+        with self.writing() as connection:
+            hold = undecided(connection, recording_id)
+            held = [row.id for row in held_rows(connection, recording_id)]
+            end_tests(connection, recording_id, held, at)
+            reason = connection.scalar(
+                sa.select(recordings.c.reason).where(recordings.c.id == recording_id)
+            )
+            decided = replace(hold, decision=Decision.DISCARDED, decided_at=at, who=who, why=why)
+            told = {"message": discarded_reason(decided), "remedy": taking_back(decided)}
+            end_recording(connection, recording_id, {**(loads(reason) or {}), **told}, at)
+            return decide(connection, decided, who, why, at)
 
     def withdraw(
         self, recording_id: int, who: str, why: str, at: datetime, test: str | None = None
@@ -67,7 +153,8 @@ class Withdrawing(Database):
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
             again = _watch_again(connection, chosen, weighed, at)
             held = [HeldTest(row.position, row.name, ()) for row in chosen]
-            hold = _decide(connection, recording, held, (Decision.WITHDRAWN, who, why, at, None))
+            record = (Decision.WITHDRAWN, who, why, at, None)
+            hold = _decide_unheld(connection, recording, held, record)
             if not connection.scalar(_left(recording_id)):
                 reason = reason_of(recording, discarded_reason(hold), at, taking_back(hold))
                 end_recording(connection, recording_id, reason, at)
@@ -108,7 +195,7 @@ class Withdrawing(Database):
                 if each.position == row.position
             ]
             record = (Decision.REINSTATED, who, why, at, time or former[-1].time)
-            hold = _decide(connection, recording, held, record)
+            hold = _decide_unheld(connection, recording, held, record)
             for row in chosen:
                 values = confirmed_values(connection, row, hold, hold.time, who)
                 this = sa.update(tests).where(tests.c.id == row.id)
@@ -122,11 +209,16 @@ class Withdrawing(Database):
             _watch_again(connection, chosen, _weighed(connection, chosen), at)
             return hold
 
-    def decided(self, recording_id: int, sidecar_as: str | None) -> Mapping[int, Hold]:
-        """The newest decision on each test of a recording, by its place in the file, among those
-        that were made on it with one sidecar."""
-        with self.reading() as connection:
-            return _decided_with(connection, recording_id, sidecar_as)
+    def reprocess(
+        self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
+    ) -> Rerun:
+        """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
+
+        A file is always identified as a whole; from a later stage on it may be one `test` alone.
+        Raises NothingThere, and UsageError where the recording has not come so far.
+        """
+        with self.writing() as connection:
+            return reprocess(connection, recording_id, stage, at, test)
 
 
 def _decided_with(
@@ -156,7 +248,7 @@ def _left(recording_id: int) -> sa.Select[Any]:
     return sa.select(sa.func.count()).where(own, tests.c.stage != Stage.REFUSED)
 
 
-def _decide(
+def _decide_unheld(
     connection: Connection,
     recording: Row[Any],
     held: Sequence[HeldTest],

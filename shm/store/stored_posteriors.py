@@ -1,4 +1,4 @@
-"""Verbs on diagnoses and adoptions: an adoption and all that comes with it are one transaction."""
+"""Posteriors, the classes they compete in, why a model missed, and what was adopted of that."""
 
 from __future__ import annotations
 
@@ -14,30 +14,144 @@ from sqlalchemy.engine import Connection, Row
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.checksums import decoding, loads
-from shm.store.database import Database, insert
-from shm.store.queries import selection_in_force
-from shm.store.results import insert_baseline, insert_posterior, insert_selection
+from shm.store.database import insert
+from shm.store.files import in_force
+from shm.store.queries import (
+    counted_tests,
+    hidden,
+    lineage_from,
+    posterior_of_row,
+    read_tests,
+    selected_classes,
+    selection_in_force,
+    selection_of,
+)
+from shm.store.results import all_at, insert_baseline, insert_posterior, insert_selection, move
 from shm.store.rows import (
     Adoption,
     Lineage,
+    Stage,
     StoredAdoption,
     StoredDiagnosis,
+    StoredPosterior,
     StoredSelection,
     StoredTest,
 )
-from shm.store.tables import adoptions, diagnoses, posteriors, selection_entries
-from shm.values import Diagnosis, Posterior
+from shm.store.tables import (
+    adoptions,
+    diagnoses,
+    posterior_tests,
+    posteriors,
+    selection_entries,
+    selections,
+    tests,
+)
+from shm.store.trends import Trends
+from shm.values import Diagnosis, Posterior, Selection
 
 log = logging.getLogger(__name__)
-
 _ADOPTION = tuple(field.name for field in fields(Adoption))
 _in_force = adoptions.c.undone_at.is_(None)
 
 
-class Adopting(Database):
-    """The part of the store that keeps why a model missed, and what was made of it."""
+class Posteriors(Trends):
+    """Posteriors, selections, diagnoses and adoptions."""
 
-    def add_diagnosis(
+    def save(
+        self,
+        test: StoredTest,
+        posterior: Posterior,
+        lineage: Lineage,
+        at: datetime,
+        *,
+        to_watch: bool = True,
+    ) -> None:
+        """Keeps the posterior of one test; does nothing where another process was first.
+
+        `to_watch` is false of a test from which the baseline itself was made.
+        """
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.IDENTIFIED):
+                insert_posterior(connection, test.hanger, posterior, [test], lineage, at)
+                move(connection, [test], Stage.UPDATED if to_watch else Stage.WATCHED, at)
+
+    def save_selection(
+        self,
+        hanger: int,
+        chosen: Sequence[StoredTest],
+        selection: Selection,
+        lineage: Lineage,
+        at: datetime,
+    ) -> None:
+        """Keeps the competing posteriors; the most probable is the hanger's baseline."""
+        with self.writing() as connection:
+            if not all_at(connection, chosen, Stage.IDENTIFIED) or _has(connection, hanger):
+                return
+            ids = [
+                insert_posterior(connection, hanger, posterior, chosen, lineage, at)
+                for posterior in selection.posteriors
+            ]
+            probable = list(zip(ids, selection.probabilities, strict=True))
+            insert_selection(connection, hanger, selection.selected.model, probable, at)
+            why = "the first test" if len(chosen) == 1 else f"the first {len(chosen)} tests"
+            insert_baseline(connection, hanger, ids[0], "shm", why, at)
+            move(connection, chosen, Stage.WATCHED, at)
+
+    def get(self, hanger: int, test: str | None = None) -> Posterior:
+        """The latest posterior of a hanger, or that of one test; raises NothingThere."""
+        query = _shown(hanger)
+        if test is not None:
+            query = query.where(posteriors.c.id.in_(_of_test(hanger, test)))
+        # First which one, then its samples: else those of all would be sorted.
+        named = query.with_only_columns(posteriors.c.id)
+        latest = named.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
+        chosen = sa.select(posteriors).where(posteriors.c.id == latest.scalar_subquery())
+        with self.reading() as connection:
+            row = connection.execute(chosen).one_or_none()
+        if row is None:
+            what = f"hanger {hanger}" + (f", test {test}" if test else "")
+            raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
+        return posterior_of_row(row)
+
+    def of_test(self, test: StoredTest) -> Posterior:
+        """The posterior of a test known by its row; raises NothingThere."""
+        return self.get(test.hanger, test.test.id)
+
+    def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
+        """The posteriors of a hanger in its selected class, by time."""
+        query = _shown(hanger)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(posteriors.c.time, posteriors.c.id)).all()
+        return tuple(_stored_posterior(row) for row in rows)
+
+    def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
+        """Each test of a hanger that has a posterior, with it, by time."""
+        newest = (
+            sa.select(posterior_tests.c.test_id, sa.func.max(posterior_tests.c.posterior_id))
+            .join(posteriors)
+            .where(posteriors.c.id.in_(_shown(hanger).with_only_columns(posteriors.c.id)))
+            .group_by(posterior_tests.c.test_id)
+        )
+        stored = {row.id: row.posterior for row in self.list_all(hanger)}
+        with self.reading() as connection:
+            newest_of = {row[0]: row[1] for row in connection.execute(newest)}
+        with self.reading() as connection:
+            known = read_tests(connection, counted_tests(hanger))
+        return tuple(
+            (test, stored[newest_of[test.id]]) for test in known if newest_of.get(test.id) in stored
+        )
+
+    def selection(self, hanger: int) -> StoredSelection | None:
+        """The selection in force."""
+        with self.reading() as connection:
+            return selection_of(connection, hanger)
+
+    def selected_models(self) -> dict[int, str]:
+        """The name of the selected or adopted class of each hanger that has one."""
+        with self.reading() as connection:
+            return selected_classes(connection)
+
+    def save_diagnosis(
         self, hanger: int, diagnosis: Diagnosis, lineage: Lineage, at: datetime
     ) -> StoredDiagnosis:
         """Keeps a diagnosis, which is the hanger's latest from now on."""
@@ -120,7 +234,7 @@ class Adopting(Database):
             connection.execute(changed.values(**undoing))
             return _adoption(connection.execute(by_id).one())
 
-    def adoptions(
+    def list_adoptions(
         self, hanger: int | None = None, *, undone: bool = False
     ) -> tuple[StoredAdoption, ...]:
         """Adoptions in force, of one hanger where named; with `undone` also those that were undone.
@@ -134,6 +248,32 @@ class Adopting(Database):
             query = query.where(_in_force)
         with self.reading() as connection:
             return tuple(_adoption(row) for row in connection.execute(query))
+
+
+def _has(connection: Connection, hanger: int) -> bool:
+    query = sa.select(selections.c.id).where(selections.c.hanger == hanger)
+    return connection.execute(query).first() is not None
+
+
+def _shown(hanger: int) -> sa.Select[Any]:
+    refused = (tests.c.hanger == hanger) & (tests.c.stage == Stage.REFUSED) & in_force(tests)
+    of_refused = sa.select(posterior_tests.c.posterior_id).join(tests).where(refused)
+    return sa.select(posteriors).where(
+        posteriors.c.hanger == hanger,
+        posteriors.c.id.not_in(hidden),
+        posteriors.c.id.not_in(of_refused),
+        in_force(posteriors),
+    )
+
+
+def _of_test(hanger: int, name: str) -> sa.Select[Any]:
+    joined = posterior_tests.join(tests)
+    query = sa.select(posterior_tests.c.posterior_id).select_from(joined)
+    return query.where(tests.c.hanger == hanger, tests.c.name == name, in_force(tests))
+
+
+def _stored_posterior(row: Row[Any]) -> StoredPosterior:
+    return StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
 
 
 def _refuse_late(connection: Connection, adoption: Adoption, before: StoredSelection) -> None:

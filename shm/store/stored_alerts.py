@@ -1,0 +1,271 @@
+"""Alerts, who has seen them, and their deliveries. An alert and those are one transaction."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import NothingThere, UsageError
+from shm.store.database import Repository, insert
+from shm.store.files import NOTIFIED, write_step
+from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
+from shm.store.outbox import acknowledgement_of, alert_of, stored_alert, stored_alerts
+from shm.store.rows import Acknowledgement, Delivery, DeliveryState, StoredAlert, counts_by_name
+from shm.store.tables import acknowledgements, adoptions, alerts, baselines, deliveries, tests
+
+_OWED = ("id", "hook", "state", "attempts", "next_attempt_at", "last_error", "ended_at")
+_outbox = stored_alerts.add_columns(
+    *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
+).join(deliveries, deliveries.c.alert_id == alerts.c.id)
+
+
+class Alerts(Repository):
+    """Alerts and the outbox."""
+
+    def list_all(self, hanger: int | None = None) -> tuple[StoredAlert, ...]:
+        """All alerts, or those of one hanger, as they were raised and acknowledged."""
+        query = stored_alerts.order_by(alerts.c.id)
+        if hanger is not None:
+            query = query.where(alerts.c.hanger == hanger)
+        with self.reading() as connection:
+            return tuple(stored_alert(row) for row in connection.execute(query))
+
+    def list_rows(
+        self,
+        hanger: int | None = None,
+        *,
+        is_open: bool | None = None,
+        limit: int | None = None,
+        before: int | None = None,
+    ) -> tuple[AlertRow, ...]:
+        """Alerts, the newest first; `before` is the number of the alert to go on after.
+
+        Only those that are open, or acknowledged, where `is_open` tells; acknowledged ones come
+        in the order in which they were, the latest first.
+        """
+        place = acknowledgements.c.id if is_open is False else alerts.c.id
+        query = stored_alerts.order_by(place.desc())
+        if hanger is not None:
+            query = query.where(alerts.c.hanger == hanger)
+        if is_open is not None:
+            query = query.where(acknowledgements.c.id.is_(None) == is_open)
+        if before is not None:
+            query = query.where(place < _place(before, is_open))
+        return self._alert_rows(query.limit(limit))
+
+    def row(self, alert_id: int) -> AlertRow:
+        """One alert; raises NothingThere."""
+        found = self._alert_rows(stored_alerts.where(alerts.c.id == alert_id))
+        if not found:
+            raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
+        return found[0]
+
+    def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
+        """Notes that somebody has seen an alert to its end; the alert with that note.
+
+        Raises NothingThere where there is none of that number, UsageError where it is noted.
+        """
+        with self.writing() as connection:
+            by_id = stored_alerts.where(alerts.c.id == alert_id)
+            row = connection.execute(by_id).one_or_none()
+            if row is None:
+                raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
+            alert = stored_alert(row)
+            if alert.acknowledgement is not None:
+                raise UsageError(
+                    f"alert {alert_id} was acknowledged by {alert.acknowledgement.who} on "
+                    f"{alert.acknowledgement.at:%Y-%m-%d} already.",
+                    remedy="See `shm alerts`.",
+                )
+            noted = Acknowledgement(alert_id, who, why, at)
+            insert(connection, acknowledgements, vars(noted))
+        return replace(alert, acknowledgement=noted)
+
+    def counts(self) -> tuple[int, int]:
+        """How many alerts are open, and how many were acknowledged."""
+        with self.reading() as connection:
+            raised = _count(connection, alerts)
+            noted = _count(connection, acknowledgements)
+        return raised - noted, noted
+
+    def open_counts(self) -> dict[int, int]:
+        """How many alerts of each hanger nobody has acknowledged; hangers without are left out."""
+        query = sa.select(alerts.c.hanger, sa.func.count()).outerjoin(acknowledgements)
+        is_open = acknowledgements.c.id.is_(None)
+        with self.reading() as connection:
+            rows = connection.execute(query.where(is_open).group_by(alerts.c.hanger))
+            return {row[0]: int(row[1]) for row in rows}
+
+    def list_hanger_events(
+        self, hanger: int, since: datetime | None = None
+    ) -> tuple[HangerEvent, ...]:
+        """What happened to a hanger beside its tests, by time."""
+        with self.reading() as connection:
+            found = [
+                HangerEvent(row.at, kind, row.who or "", row.why or "", row.id)
+                for kind, query in _events(hanger).items()
+                for row in connection.execute(query)
+            ]
+        late = (event for event in found if since is None or event.at >= since)
+        return tuple(sorted(late, key=lambda event: event.at))
+
+    def list_deliveries(self, state: DeliveryState | None = None) -> tuple[Delivery, ...]:
+        """The outbox: what was told to which hook, or is still owed."""
+        query = _outbox.order_by(deliveries.c.id)
+        if state is not None:
+            query = query.where(deliveries.c.state == state)
+        return self._deliveries(query)
+
+    def list_due_deliveries(
+        self,
+        now: datetime,
+        limit: int,
+        excluding: Collection[int] = (),
+        waits: Sequence[timedelta] = (),
+    ) -> tuple[Delivery, ...]:
+        """Deliveries whose time has come, the longest due first.
+
+        Also those that would wait longer than `waits` says for so many attempts, its last for more:
+        the clock was ahead when they were put off.
+        """
+        at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
+        counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
+        too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
+        due = (deliveries.c.state == DeliveryState.WAITING) & sa.or_(at <= now, *too_far)
+        query = _outbox.where(due, deliveries.c.id.not_in(excluding))
+        return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
+
+    def save_delivery(self, delivery: Delivery, at: datetime) -> None:
+        """Marks a delivery as done; one that has come to its end stays as it is."""
+        self._end(delivery, DeliveryState.DELIVERED, "", at)
+
+    def save_failure(
+        self, delivery: Delivery, error: str, at: datetime, next_attempt_at: datetime | None
+    ) -> None:
+        """Puts a delivery off, or gives it up where `next_attempt_at` is None."""
+        if next_attempt_at is None:
+            self._end(delivery, DeliveryState.GIVEN_UP, error, at)
+        else:
+            with self.writing() as connection:
+                waits = {"last_error": error, "next_attempt_at": next_attempt_at}
+                _note(connection, delivery, waits)
+
+    def delivery_counts(self) -> dict[str, int]:
+        """How many deliveries stand in each state; see `counts_by_name`."""
+        query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
+        with self.reading() as connection:
+            return counts_by_name(DeliveryState, connection.execute(query))
+
+    def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
+        with self.writing() as connection:
+            ended = {"state": state, "last_error": error, "ended_at": at}
+            if _note(connection, delivery, ended):
+                _note_notified(connection, delivery, at)
+
+    def _deliveries(self, query: sa.Select[Any]) -> tuple[Delivery, ...]:
+        with self.reading() as connection:
+            return tuple(_delivery(row) for row in connection.execute(query))
+
+    def _alert_rows(self, query: sa.Select[Any]) -> tuple[AlertRow, ...]:
+        with self.reading() as connection:
+            rows = connection.execute(query).all()
+            owed = _deliveries_of(connection, query)
+        return tuple(_row(row, tuple(owed[row.id])) for row in rows)
+
+
+def _count(connection: sa.Connection, table: sa.Table) -> int:
+    return int(connection.scalar(sa.select(sa.func.count()).select_from(table)) or 0)
+
+
+def _place(alert_id: int, is_open: bool | None) -> Any:
+    if is_open is not False:
+        return alert_id
+    noted = sa.select(acknowledgements.c.id).where(acknowledgements.c.alert_id == alert_id)
+    return noted.scalar_subquery()
+
+
+def _deliveries_of(
+    connection: Connection, chosen: sa.Select[Any]
+) -> defaultdict[int, list[DeliveryRow]]:
+    """Of the alerts that are chosen, by alert."""
+    ids = sa.select(chosen.subquery().c.id)
+    query = sa.select(deliveries).where(deliveries.c.alert_id.in_(ids)).order_by(deliveries.c.id)
+    found = defaultdict[int, list[DeliveryRow]](list)
+    for row in connection.execute(query):
+        one = DeliveryRow(row.hook, DeliveryState(row.state), row.attempts, row.last_error)
+        found[row.alert_id].append(one)
+    return found
+
+
+def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
+    alert = stored_alert(row).alert
+    return AlertRow(
+        id=row.id,
+        hanger=row.hanger,
+        raised_at=row.raised_at,
+        test=alert.test,
+        test_time=row.time,
+        kinds=alert.kinds,
+        message=alert.message,
+        acknowledgement=acknowledgement_of(row),
+        deliveries=owed,
+    )
+
+
+def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> bool:
+    """Whether it was still owed: another process may have had an answer of the hook before."""
+    owed = (deliveries.c.id == delivery.id) & (deliveries.c.state == DeliveryState.WAITING)
+    changed = sa.update(deliveries).where(owed)
+    noted = connection.execute(changed.values(attempts=deliveries.c.attempts + 1, **values))
+    return noted.rowcount == 1
+
+
+def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> None:
+    """The test of an alert has come to its end once no hook is owed it any more."""
+    siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery.id)
+    of_alert = deliveries.c.alert_id == siblings.scalar_subquery()
+    waiting = sa.select(deliveries.c.id).where(
+        of_alert, deliveries.c.state == DeliveryState.WAITING
+    )
+    if connection.execute(waiting).first() is None:
+        about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
+        row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+        write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+
+
+def _delivery(row: Row[Any]) -> Delivery:
+    owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
+    return Delivery(alert=alert_of(row), **{**owed, "state": DeliveryState(row.owed_state)})
+
+
+def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
+    noted = sa.select(acknowledgements).join(alerts).where(alerts.c.hanger == hanger)
+    undone = _named(adoptions, "undone_at", "undone_who", "undone_why")
+    raised = sa.select(
+        alerts.c.id,
+        alerts.c.time.label("at"),
+        sa.null().label("who"),
+        alerts.c.message.label("why"),
+    )
+    return {
+        EventKind.BASELINE: _of(hanger, baselines, _named(baselines, "set_at", "who", "why")),
+        EventKind.ADOPTED: _of(hanger, adoptions, _named(adoptions, "adopted_at", "who", "why")),
+        EventKind.UNDONE: _of(hanger, adoptions, undone.where(adoptions.c.undone_at.is_not(None))),
+        EventKind.ALERT: _of(hanger, alerts, raised),
+        EventKind.ACKNOWLEDGED: noted,
+    }
+
+
+def _of(hanger: int, table: sa.Table, query: sa.Select[Any]) -> sa.Select[Any]:
+    return query.where(table.c.hanger == hanger).order_by(table.c.id)
+
+
+def _named(table: sa.Table, at: str, who: str, why: str) -> sa.Select[Any]:
+    named = {"at": at, "who": who, "why": why}
+    return sa.select(table.c.id, *(table.c[name].label(label) for label, name in named.items()))

@@ -1,0 +1,349 @@
+"""Recordings: received, refused, looked up, named, timed."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from datetime import datetime
+from itertools import takewhile
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import NothingThere, UsageError
+from shm.store.checksums import readable
+from shm.store.database import insert
+from shm.store.decisions import Decisions
+from shm.store.files import (
+    ARCHIVED,
+    STEPS,
+    by_checksum,
+    by_former_names,
+    by_id,
+    by_row,
+    end_recording,
+    end_tests,
+    in_force,
+    note_name,
+    recording_from,
+    write_event,
+    write_step,
+)
+from shm.store.holding import standing_discard
+from shm.store.recording_rows import (
+    ON_THE_WAY,
+    Death,
+    Deaths,
+    Event,
+    Outcome,
+    Receipt,
+    ReceivedFile,
+    Standing,
+    Step,
+    StoredRecording,
+)
+from shm.store.reprocessing import redescribe, reopen
+from shm.store.rows import ENDED, OTHER, Stage, counts_by_name
+from shm.store.tables import events, recordings, steps, tests
+
+
+class Recordings(Decisions):
+    """Received files: how far each has come, and what people decided of it."""
+
+    def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
+        """Enters a file that is safe in the archive. The same bytes are never entered twice.
+
+        With another sidecar than before they are done again with that.
+        """
+        with self.writing() as connection:
+            known = by_checksum(connection, file.sha256)
+            outcome = _outcome(connection, known, file)
+            if known is None:
+                row_id = _enter(connection, file, at)
+            else:
+                row_id = known.id
+                _notice(connection, known, file, outcome, at)
+            return Receipt(outcome, recording_from(by_id(connection, row_id)))
+
+    def refuse(
+        self,
+        recording_id: int,
+        reason: Mapping[str, Any],
+        at: datetime,
+        test_ids: Collection[int] = (),
+        *,
+        stage: Stage | None = None,
+    ) -> None:
+        """Ends a recording with a reason; of its tests only those named, the others go on.
+
+        With `stage` only where it, or those tests, still wait there: another process may have done
+        the step that failed here, or refused it already.
+        """
+        with self.writing() as connection:
+            row = by_id(connection, recording_id)
+            if stage is not None and not _waits(connection, row, stage, test_ids):
+                return
+            test_ids = _own(connection, recording_id, test_ids)
+            end_recording(connection, recording_id, reason, at)
+            end_tests(connection, recording_id, test_ids, at)
+            message = str(reason.get("message", ""))
+            write_event(connection, at, "refused", row.id, row.file_name, message)
+
+    def refuse_unread(self, file_name: str, message: str, at: datetime) -> None:
+        """Notes that a file was refused for its size, of which nothing else is known."""
+        with self.writing() as connection:
+            write_event(connection, at, "refused", None, file_name, message)
+
+    def is_waiting(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
+        """Whether a recording, or its tests where some are named, are still at a stage."""
+        with self.reading() as connection:
+            return _waits(connection, by_id(connection, recording_id), stage, test_ids)
+
+    def get(self, recording_id: int) -> StoredRecording:
+        """One recording by its number; raises NothingThere."""
+        with self.reading() as connection:
+            return recording_from(by_id(connection, recording_id))
+
+    def with_checksum(self, sha256: str) -> StoredRecording | None:
+        """The recording with these bytes, if it was received."""
+        with self.reading() as connection:
+            row = by_checksum(connection, sha256)
+        return None if row is None else recording_from(row)
+
+    def find(self, which: str) -> tuple[int, str | None]:
+        """The recording that is meant: by its number, by the name of a test of it, by a name that
+        its file, with or without suffix, came under, or by a row of the store, as `posteriors/12`.
+
+        Also the test's name, where it was that. Raises NothingThere, and UsageError where several
+        recordings are called so.
+        """
+        with self.reading() as connection:
+            if which.isdecimal():
+                by_number = sa.select(recordings.c.id).where(recordings.c.id == int(which))
+                if connection.scalar(by_number) is not None:
+                    return int(which), None
+            by_name = sa.select(tests.c.recording_id).where(tests.c.name == which, in_force(tests))
+            found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
+            if found:
+                return _single(found, f"{len(found)} hangers have a test {which!r}."), which
+            former = by_row(connection, which) or by_former_names(connection, which)
+        if not former:
+            raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
+        return _single(former, f"{len(former)} recordings were called {which!r}."), None
+
+    def names_of(self, recording_id: int) -> tuple[str, ...]:
+        """Every name that the file of a recording came under: the present one, then the others."""
+        own = sa.select(recordings.c.file_name).where(recordings.c.id == recording_id)
+        other = sa.select(events.c.file_name).where(events.c.recording_id == recording_id)
+        with self.reading() as connection:
+            present = connection.scalars(own).all()
+            return tuple(
+                dict.fromkeys([*present, *connection.scalars(other.order_by(events.c.id))])
+            )
+
+    def list_all(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
+        """All recordings, or those at one stage, as they came in."""
+        query = sa.select(recordings).order_by(recordings.c.id)
+        if stage is not None:
+            query = query.where(recordings.c.stage == stage)
+        return self._recordings(query)
+
+    def list_waiting(
+        self, limit: int, excluding: Collection[int] = ()
+    ) -> tuple[StoredRecording, ...]:
+        """The first recordings that are received and not yet identified."""
+        waiting = recordings.c.stage == Stage.RECEIVED
+        query = sa.select(recordings).where(waiting, recordings.c.id.not_in(excluding))
+        return self._recordings(query.order_by(recordings.c.id).limit(limit))
+
+    def list_under_way(self) -> tuple[Standing, ...]:
+        """The recordings that are not through, and since when each stands where it stands."""
+        reached = sa.func.max(steps.c.at).label("reached_at")
+        query = (
+            sa.select(recordings, reached)
+            .outerjoin(steps, steps.c.recording_id == recordings.c.id)
+            .where(recordings.c.stage.in_(ON_THE_WAY))
+            .group_by(recordings.c.id)
+            .order_by(recordings.c.id)
+        )
+        with self.reading() as connection:
+            rows = connection.execute(query).all()
+        return tuple(
+            Standing(
+                row.id,
+                row.file_name,
+                Stage(row.stage),
+                row.hanger,
+                row.reached_at or row.received_at,
+            )
+            for row in rows
+        )
+
+    def oldest_waiting(self) -> datetime | None:
+        """When the oldest recording came in that is not through yet; None where all are."""
+        query = sa.select(recordings.c.received_at).where(recordings.c.stage.in_(ON_THE_WAY))
+        with self.reading() as connection:
+            row = connection.execute(query.order_by(recordings.c.id).limit(1)).first()
+        return None if row is None else row.received_at
+
+    def stage_counts(self) -> dict[str, int]:
+        """How many recordings stand at each stage; see `counts_by_name`."""
+        query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
+        with self.reading() as connection:
+            return counts_by_name(Stage, connection.execute(query))
+
+    def stage_seconds(self, since: datetime) -> dict[str, list[float]]:
+        """How long after the stage before each step was reached, of steps made since then.
+
+        By the name of the step, which need be no `Stage`; a name that this version does not know
+        is `OTHER`, so that what reads it has few names to keep.
+        """
+        lately = sa.select(steps.c.recording_id).where(steps.c.at >= since)
+        query = sa.select(steps).where(steps.c.recording_id.in_(lately)).order_by(steps.c.id)
+        found: defaultdict[str, list[float]] = defaultdict(list)
+        before: dict[tuple[int, int | None], datetime] = {}
+        with self.reading() as connection:
+            for row in connection.execute(query):
+                of_file, of_test = (row.recording_id, None), (row.recording_id, row.test_id)
+                began = before.get(of_test) or before.get(of_file)
+                if began is not None and row.at >= since and row.stage != Stage.RECEIVED:
+                    name = row.stage if row.stage in STEPS else OTHER
+                    found[name].append((row.at - began).total_seconds())
+                before[of_test] = row.at
+        return dict(found)
+
+    def note_death(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
+        """Notes that a process that worked on a recording died."""
+        with self.writing() as connection:
+            row = by_id(connection, recording_id)
+            write_event(connection, at, death, row.id, row.file_name, message)
+
+    def deaths(self) -> dict[int, Deaths]:
+        """What is noted of the recordings that are on their way, since each last moved on."""
+        moved_at = (
+            sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
+            .group_by(steps.c.recording_id)
+            .subquery()
+        )
+        noted = (
+            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+            .join(recordings, recordings.c.id == events.c.recording_id)
+            .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
+            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(recordings.c.stage.not_in(ENDED))
+            .order_by(events.c.id)
+        )
+        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
+        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
+        killed = killed.order_by(events.c.id.desc())
+        found: dict[int, Deaths] = {}
+        with self.reading() as connection:
+            latest = connection.execute(killed.limit(100)).all()
+            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
+            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
+            for row in connection.execute(noted):
+                before = found.get(row.recording_id, Deaths(0, 0, row.at))
+                found[row.recording_id] = Deaths(
+                    before.by_itself + (row.kind == Death.BY_ITSELF),
+                    before.from_outside + (row.id in in_a_row),
+                    row.at,
+                )
+        return found
+
+    def list_events(
+        self,
+        kind: str | None = None,
+        *,
+        recording_id: int | None = None,
+        file_name: str | None = None,
+    ) -> tuple[Event, ...]:
+        """What was noticed on the way, oldest first; `kind` as duplicate or refused.
+
+        Of one recording, or of what came under one name, where that is given.
+        """
+        query = sa.select(events).order_by(events.c.id)
+        wanted = {"kind": kind, "recording_id": recording_id, "file_name": file_name}
+        for name, value in wanted.items():
+            if value is not None:
+                query = query.where(events.c[name] == value)
+        with self.reading() as connection:
+            rows = connection.execute(query).all()
+        return tuple(Event(r.at, r.kind, r.file_name, r.message, r.recording_id) for r in rows)
+
+    def list_steps(self, recording_id: int) -> tuple[Step, ...]:
+        """The stages that a recording and its tests have reached, in that order."""
+        query = (
+            sa.select(steps, tests.c.name)
+            .outerjoin(tests)
+            .where(steps.c.recording_id == recording_id)
+            .order_by(steps.c.id)
+        )
+        with self.reading() as connection:
+            rows = connection.execute(query).all()
+        return tuple(Step(row.stage, row.at, row.version, row.test_id, row.name) for row in rows)
+
+    def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
+        with self.reading() as connection:
+            return tuple(readable(connection.execute(query), recording_from))
+
+
+def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile) -> Outcome:
+    if known is None:
+        return Outcome.NEW
+    if known.arrival == file.arrival:
+        return Outcome.RESUMED
+    is_described = file.sidecar_as not in (None, known.sidecar_as)
+    if known.stage == Stage.REFUSED:
+        is_out = standing_discard(connection, known) is not None
+        return Outcome.DISCARDED if is_out and not is_described else Outcome.REOPENED
+    return Outcome.REDESCRIBED if is_described else Outcome.DUPLICATE
+
+
+def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
+    values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
+    row_id = insert(connection, recordings, values)
+    write_step(connection, row_id, ARCHIVED, at)
+    write_step(connection, row_id, Stage.RECEIVED, at)
+    return row_id
+
+
+def _notice(
+    connection: Connection, known: Row[Any], file: ReceivedFile, outcome: Outcome, at: datetime
+) -> None:
+    if outcome is Outcome.RESUMED:
+        return
+    if outcome in (Outcome.REOPENED, Outcome.REDESCRIBED):
+        note_name(connection, known, file.file_name, at)
+    message = f"the same file as {known.file_name}; not stored twice."
+    if outcome is Outcome.REOPENED:
+        reopen(connection, known.id, file, at)
+        message = "dropped again after its refusal; tried again."
+    elif outcome is Outcome.DISCARDED:
+        message = f"the same file as {known.file_name}, which was discarded and stays so."
+    elif outcome is Outcome.REDESCRIBED:
+        message = redescribe(connection, known, file, at)
+    write_event(connection, at, outcome, known.id, file.file_name, message)
+
+
+def _waits(
+    connection: Connection, recording: Row[Any], stage: Stage, test_ids: Collection[int]
+) -> bool:
+    if not test_ids:
+        return bool(recording.stage == stage)
+    own = _own(connection, recording.id, test_ids)
+    waiting = sa.select(tests.c.id).where(in_force(tests), tests.c.stage == stage)
+    return len(connection.scalars(waiting.where(tests.c.id.in_(own))).all()) == len(own)
+
+
+def _own(connection: Connection, recording_id: int, test_ids: Collection[int]) -> Collection[int]:
+    """Those of the tests that are of one recording."""
+    own = sa.select(tests.c.id).where(tests.c.recording_id == recording_id)
+    return connection.scalars(own.where(tests.c.id.in_(test_ids)).order_by(tests.c.id)).all()
+
+
+def _single(found: Sequence[int], several: str) -> int:
+    if len(found) > 1:
+        numbers = ", ".join(map(str, found))
+        raise UsageError(several, remedy=f"Give its recording's number: {numbers}.")
+    return found[0]

@@ -1,0 +1,300 @@
+"""The watch: what it said after each test, against which baseline, and what it goes on from."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import fields
+from datetime import datetime
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.errors import StoreBusy
+from shm.store.blobs import change_from, watch_document, watch_from
+from shm.store.checksums import decoding, loads, whole
+from shm.store.columns import Number
+from shm.store.database import Repository, insert
+from shm.store.files import in_force
+from shm.store.list_rows import BaselineGlance, WatchedName
+from shm.store.outbox import raise_alert
+from shm.store.queries import baseline_in_force, baselines_now, compared_with, read_baseline
+from shm.store.results import all_at, insert_baseline, insert_posterior, move
+from shm.store.rows import Baseline, KeptWatch, Lineage, Stage, StoredAlert, StoredTest, StoredWatch
+from shm.store.tables import baselines, drifts, posterior_tests, tests, watch_states, watches
+from shm.store.trends import baselines_in_numbers
+from shm.values import Alert, Change, Drift, Hanger, Posterior, WatchedTest
+
+_DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
+
+
+class Watch(Repository):
+    """What the watch said, and the baselines it compares with."""
+
+    def save(
+        self,
+        test: StoredTest,
+        baseline: Baseline,
+        found: WatchedTest,
+        alert: Alert | None,
+        hooks: Sequence[str],
+        at: datetime,
+        state: KeptWatch | None = None,
+    ) -> StoredAlert | None:
+        """Keeps what the watch made of a test; the alert where it is a new one, else None.
+
+        An alert whose key was raised before is the same standing condition and is not raised again.
+        `state` is what the watch goes on from at the next test.
+        """
+        with self.writing() as connection:
+            if not all_at(connection, [test], Stage.UPDATED):
+                return None
+            for drift in found.drifts:
+                insert(connection, drifts, _drift_values(drift, test, baseline))
+            raised = None
+            if alert is not None:
+                raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
+            values = _watch_values(found, test, baseline, raised)
+            insert(connection, watches, values)
+            if state is not None:
+                _keep_state(connection, baseline, state)
+            move(connection, [test], Stage.WATCHED, at)
+            return raised
+
+    def state(self, baseline: Baseline) -> KeptWatch | None:
+        """What the watch goes on from at the next test that is compared with a baseline."""
+        query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
+        with self.reading() as connection:
+            row = connection.execute(query).one_or_none()
+        if row is None or not whole(watch_states, row):
+            return None  # it may be thrown away at will
+        return KeptWatch(row.key, row.last_test_time, row.content)
+
+    def forget_state(self, baseline: Baseline) -> None:
+        """Drops what the watch would go on from: it then begins anew at the next test."""
+        with self.writing() as connection:
+            _drop_state(connection, baseline)
+
+    def baseline(
+        self, hanger: int, model: str | None = None, time: datetime | None = None
+    ) -> Baseline | None:
+        """The baseline in force, or the last that was in force of one class, with its posterior.
+
+        With `time` it is that for a test of then: a baseline set anew is none for earlier tests.
+        """
+        with self.reading() as connection:
+            return read_baseline(connection, hanger, model, time)
+
+    def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
+        """The baseline in force of each hanger that has one, in numbers, by hanger."""
+        with self.reading() as connection:
+            return baselines_in_numbers(connection, hangers)
+
+    def baseline_temperatures(self) -> dict[int, float]:
+        """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""
+        mean_c = sa.func.avg(tests.c.temperature_c, type_=Number)
+        query: sa.Select[Any] = (
+            sa.select(baselines.c.hanger, mean_c.label("mean_c"))
+            .join(posterior_tests, posterior_tests.c.posterior_id == baselines.c.posterior_id)
+            .join(tests, tests.c.id == posterior_tests.c.test_id)
+            .where(baselines.c.id.in_(baselines_now()))
+            .group_by(baselines.c.hanger)
+        )
+        with self.reading() as connection:
+            return {row.hanger: row.mean_c for row in connection.execute(query)}
+
+    def rebaseline(
+        self,
+        before: Baseline,
+        posterior: Posterior,
+        chosen: Sequence[StoredTest],
+        record: tuple[str, str, datetime],
+        lineage: Lineage,
+        at: datetime,
+    ) -> Baseline:
+        """Has later tests compared with `posterior`, of the tests `chosen`, from now on.
+
+        `record` is who, why, and the time since which those tests were taken. What was compared
+        with the baseline `before` stays. Raises StoreBusy where that one is no longer in force.
+        """
+        (who, why, since), hanger = record, before.hanger
+        with self.writing() as connection:
+            _refuse_late(connection, before)
+            number = insert_posterior(connection, hanger, posterior, chosen, lineage, at)
+            id_ = insert_baseline(connection, hanger, number, who, why, at, since)
+        return Baseline(id_, hanger, posterior, at, who, why, since)
+
+    def list_watched(
+        self, baseline: Baseline, before: StoredTest | None = None
+    ) -> tuple[WatchedName, ...]:
+        """The tests that were watched since a baseline, or those of them `before` a test, by time.
+
+        Tests that were watched against an earlier baseline count, but for those before a day since
+        which the hanger is compared anew.
+        """
+        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*compared_with(baseline))
+        if before is not None:
+            at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
+            query = query.where((tests.c.time < before.time) | at_once)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(tests.c.time, tests.c.id)).all()
+        return tuple(WatchedName(row.id, row.name, row.time) for row in rows)
+
+    def list_drifts(self, hanger: int | None = None, test: str | None = None) -> tuple[Drift, ...]:
+        """Shifts from the baseline, by time; of one hanger or test where named."""
+        query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
+        if hanger is not None:
+            query = query.where(drifts.c.hanger == hanger)
+        if test is not None:
+            query = query.where(tests.c.name == test)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(drifts.c.time, drifts.c.id)).all()
+        return tuple(_drift(row) for row in rows)
+
+    def list_all(
+        self, hanger: int | None = None, baseline_id: int | None = None
+    ) -> tuple[StoredWatch, ...]:
+        """What the watch said after each test, by time; of one hanger or baseline where named."""
+        query = sa.select(watches.c.id).where(in_force(watches))
+        if hanger is not None:
+            query = query.where(watches.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(watches.c.baseline_id == baseline_id)
+        return self._watches(query)
+
+    def latest(self, excluding: Collection[int] = ()) -> dict[int, StoredWatch]:
+        """What the watch says of each hanger's latest test against its baseline in force.
+
+        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
+        """
+        held = baselines.alias()
+        latest = (
+            sa.select(watches.c.id)
+            .where(
+                watches.c.hanger == held.c.hanger,
+                watches.c.baseline_id == held.c.id,
+                in_force(watches),
+            )
+            .order_by(watches.c.time.desc(), watches.c.id.desc())
+            .limit(1)
+            .scalar_subquery()
+        )
+        wanted = held.c.id.in_(baselines_now()), held.c.hanger.not_in(excluding)
+        ids = sa.select(latest).select_from(held).where(*wanted)
+        with self.reading() as connection:
+            found = [id_ for id_ in connection.scalars(ids) if id_ is not None]
+        return {each.hanger: each for each in self._watches(found)}
+
+    def list_detected(self, hanger: int) -> tuple[StoredWatch, ...]:
+        """The watches of a hanger that detected a change from its baseline in force, by time."""
+        chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
+        return self._watches(chosen)
+
+    def detected_changes(self, excluding: Collection[int] = ()) -> dict[int, tuple[Change, ...]]:
+        """The changes detected of each hanger against its baseline in force, by time.
+
+        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
+        """
+        query = sa.select(watches).where(*_called(), watches.c.hanger.not_in(excluding))
+        found = defaultdict[int, list[Change]](list)
+        with self.reading() as connection:
+            for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
+                with decoding(watches, row, row.hanger):
+                    found[row.hanger].append(change_from(loads(row.document)))
+        return {hanger: tuple(changes) for hanger, changes in found.items()}
+
+    def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
+        """The watches that detected a change from a baseline, and the latest of it, by time."""
+        against = sa.select(watches.c.id).where(
+            watches.c.hanger == baseline.hanger,
+            watches.c.baseline_id == baseline.id,
+            in_force(watches),
+        )
+        latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
+        with self.reading() as connection:
+            ids = {*connection.scalars(against.where(watches.c.called)), connection.scalar(latest)}
+        return self._watches([id_ for id_ in ids if id_ is not None])
+
+    def _watches(self, chosen: sa.Select[Any] | Sequence[int]) -> tuple[StoredWatch, ...]:
+        """Watches that are `chosen` by their numbers, with their shifts, by time."""
+        name = tests.c.name.label("test")
+        query: sa.Select[Any] = sa.select(watches, name).select_from(watches).join(tests)
+        query = query.where(watches.c.id.in_(chosen))
+        same_test = watches.c.test_id == drifts.c.test_id
+        together = same_test & (watches.c.baseline_id == drifts.c.baseline_id)
+        of_shift = (drifts.c[name] for name in _DRIFT_COLUMNS)
+        shifts: sa.Select[Any] = (
+            sa.select(drifts.c.test_id, drifts.c.baseline_id, name, *of_shift)
+            .select_from(drifts.join(tests).join(watches, together))
+            .where(watches.c.id.in_(chosen), in_force(drifts))
+            .order_by(drifts.c.id)
+        )
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(watches.c.time, watches.c.id)).all()
+            found: defaultdict[tuple[int, int], list[Drift]] = defaultdict(list)
+            for row in connection.execute(shifts):
+                test_id, baseline_id, test, *values = row
+                named = dict(zip(_DRIFT_COLUMNS, values, strict=True))
+                found[test_id, baseline_id].append(Drift(test=test, **named))
+        return tuple(_stored_watch(row, found[row.test_id, row.baseline_id]) for row in rows)
+
+
+def _refuse_late(connection: Connection, before: Baseline) -> None:
+    """An adoption, its undoing or another baseline may have come in between."""
+    if connection.scalar(baseline_in_force(before.hanger)) != before.id:
+        raise StoreBusy(
+            f"hanger {before.hanger} has another baseline by now.",
+            remedy="Try again.",
+            retry_after_s=0.0,
+        )
+
+
+def _keep_state(connection: Connection, baseline: Baseline, state: KeptWatch) -> None:
+    _drop_state(connection, baseline)
+    row = {**vars(state), "hanger": baseline.hanger, "baseline_id": baseline.id}
+    insert(connection, watch_states, row)
+
+
+def _drop_state(connection: Connection, baseline: Baseline) -> None:
+    former = watch_states.c.baseline_id == baseline.id
+    connection.execute(sa.delete(watch_states).where(former))
+
+
+def _drift_values(drift: Drift, test: StoredTest, baseline: Baseline) -> dict[str, Any]:
+    values = {name: getattr(drift, name) for name in _DRIFT_COLUMNS}
+    return {**values, "test_id": test.id, "baseline_id": baseline.id}
+
+
+def _drift(row: Row[Any]) -> Drift:
+    return Drift(test=row.test, **{name: getattr(row, name) for name in _DRIFT_COLUMNS})
+
+
+def _watch_values(
+    found: WatchedTest, test: StoredTest, baseline: Baseline, raised: StoredAlert | None
+) -> dict[str, Any]:
+    # Names its shifts and its alert, so that one that is gone is missed.
+    told = {
+        "shifts": [drift.quantity for drift in found.drifts],
+        "alert": None if raised is None else raised.id,
+    }
+    return {
+        "test_id": test.id,
+        "baseline_id": baseline.id,
+        "hanger": test.hanger,
+        "time": found.time,
+        "document": {**watch_document(found), **told},
+        "called": found.change.called,
+    }
+
+
+def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
+    with decoding(watches, row, row.hanger):
+        found = watch_from(loads(row.document), row.test, row.time, shifts)
+        return StoredWatch(row.id, row.hanger, row.baseline_id, found)
+
+
+def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:
+    """Which watches detected a change from the baseline in force, of all hangers or of one."""
+    against = watches.c.baseline_id.in_(baselines_now(hanger))
+    return watches.c.called, against, in_force(watches)
