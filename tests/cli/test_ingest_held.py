@@ -117,7 +117,7 @@ def test_a_discarded_file_that_comes_again_is_told_in_one_line(
     (tmp_path / "resent.modes.json").write_text(epoch(held))
     ended = shm(*say, tmp_path / "resent.modes.json")
     assert ended.code == 0
-    (line,) = [each for each in ended.err.splitlines() if "discarded" in each]
+    (line,) = [each for each in ended.err.splitlines() if "discarded before" in each]
     today = f"{datetime.now(UTC):%Y-%m-%d}"
     assert line == (
         f"resent.modes.json: discarded before, on {today} by Ann, because: wrong hanger. Its raw "

@@ -237,7 +237,7 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         recording = store.recordings.get(3)
         assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
         assert check_store(store, quiet).troubles == ()
-        with pytest.raises(UsageError, match="does not count: it is refused"):
+        with pytest.raises(UsageError, match="does not count: it was discarded"):
             store.recordings.withdraw(3, "Ann", "", flow.clock())
         store.recordings.reinstate(3, "Ann", "it was of 3", flow.clock())
         flow.drain()
