@@ -18,8 +18,8 @@ from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.pipeline.terms import Taught, Terms
 from shm.values import Hanger, Posterior
 
-_SHARE_WITHIN_A_FAMILY = 1 / 3
-_UNSTATED_BENDING_SD = 0.3
+_SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery
+_UNSTATED_BENDING_SD = 0.3  # judgement: a strand's wires slip by layers (DESIGN: 0.3 to 1)
 
 
 def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:

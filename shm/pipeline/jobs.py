@@ -32,9 +32,9 @@ from shm.store import (
 from shm.values import Alert, Hanger, Posterior, Selection, WatchedTest
 from shm.values.stated_tension import averaged_now
 
-DELIVERIES = 16
-_DELIVERIES_A_HOOK = 4
-_LONGEST_S = 86400.0
+DELIVERIES = 16  # technical: threads that mostly wait for an answer
+_DELIVERIES_A_HOOK = 4  # technical: a quarter, so that a hook that hangs leaves room for three
+_LONGEST_S = 86400.0  # judgement: a hook mended within a day is told the day after at the latest
 _DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
 
 Clock = Callable[[], datetime]

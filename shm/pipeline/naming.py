@@ -24,7 +24,7 @@ from shm.store import StoredDiagnosis, StoredTest
 from shm.values import Cause, EffectEstimate, Hanger
 
 _FIRST_BASELINE = "beam1"
-_SHARE = 0.9
+_SHARE = 0.9  # the interval of every report
 
 
 def adopted_name(

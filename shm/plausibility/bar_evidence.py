@@ -84,6 +84,8 @@ _MISTAKEN, _MISTAKEN_DENSITY, _MOST_MISTAKEN = 0.02, 2.5, 2
 _MASSES, _MASS_ERROR = (0.01, 0.15), 2e-3
 """Probability that something was hung on the bar; share by which Rayleigh's quotient errs, and the
 error of each mode besides."""
+# Of the bar's own mass, from what moves a mode by 0.1 % to a clamp of twice the bar; places up to
+# the middle, as a mass acts alike from both ends.
 _MASS_SHARES = np.geomspace(0.003, 2.0, 11)
 _MASS_PLACES = np.linspace(0.05, 0.5, 10)
 

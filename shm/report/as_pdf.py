@@ -40,6 +40,7 @@ from shm.report import colours
 from shm.report.figures.illustration import Illustration
 from shm.report.paper import Fact, Paper, Part, Table
 
+# Layout of an A4 page, in points unless it says mm: margins for a binder, type that reads on paper.
 WIDTH = 174 * mm
 DOTS_PER_INCH = 220
 _PAGE_WIDTH, _PAGE_HEIGHT = A4
@@ -71,6 +72,7 @@ def _letters(name: str, size: float, font: str = _PLAIN, **more: Any) -> Paragra
     return ParagraphStyle(name, fontName=font, fontSize=size, **settings)
 
 
+# Sizes of type, in points: body 9, each heading a quarter larger than what it heads.
 _TITLE = _letters("title", 17, _BOLD, spaceAfter=6)
 _HEADING = _letters("heading", 12.5, _BOLD, spaceBefore=12, spaceAfter=6, keepWithNext=1)
 _SUBHEADING = _letters("subheading", 9.5, _BOLD, spaceAfter=3, keepWithNext=1)
@@ -301,6 +303,7 @@ def _rules(table: Table) -> list[tuple[Any, ...]]:
     return rules
 
 
+# A column is never wider for one word: a checksum breaks instead.
 _LONGEST_WORD_POINTS = 110.0
 _SLACK_POINTS = 1.0
 

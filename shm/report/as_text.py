@@ -16,6 +16,7 @@ from shm.report.paper import Paper, Part, Table
 WIDTH = 100
 """Columns of a terminal that a text may fill, where nobody says how wide it is."""
 _GAP = "  "
+# Layout: what fits a terminal of 80 columns with four numbers beside a name.
 _LONGEST_NAME = 24
 _LONGEST_NUMBER = 12
 _LEAST = 9

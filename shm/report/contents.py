@@ -187,7 +187,7 @@ class HangerReport:
         return force_unit(*(each.mean for each in both if each))
 
 
-_WATCH_PROBABILITY = 0.5
+_WATCH_PROBABILITY = 0.5  # likelier than not
 
 
 class Status(Enum):

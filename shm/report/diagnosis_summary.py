@@ -30,6 +30,7 @@ _CERTAIN = 20.0
 _CERTAIN_ODDS = 1000
 _SHRUNK = 0.8
 """The largest share of a held-out gap that may remain where it is said to have shrunk."""
+# Judgement: two sds, as for any trend; a fifth of the gap is worth a word; three names fit.
 _SURE_TREND_SD = 2.0
 _TREND_SHARE = 0.2
 _MOST_NAMED = 3

@@ -13,6 +13,7 @@ from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstima
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit, force_unit
 
+# Even odds; two places fit a sentence.
 _LIKELIER_THAN_NOT = 0.5
 
 
@@ -86,7 +87,7 @@ _PLACES = {
     "longitudinal": "in the longitudinal plane",
     "both planes alike": "in both planes alike",
 }
-_MOST_PLACES = 2
+_MOST_PLACES = 2  # what a sentence bears
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
 
 PHRASES: dict[str, Callable[[Sizes], str]] = {

@@ -12,7 +12,7 @@ from shm.report.intervals import Interval
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
 
-_LONGEST_NAME = 24
+_LONGEST_NAME = 24  # layout: what a column of a table holds
 _ROTATIONAL_SPRINGS = {
     "k1": "transverse, deck end",
     "k2": "longitudinal, deck end",

@@ -17,6 +17,8 @@ from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
 
+# 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
+# three names are what a sentence bears.
 _CONVERGED_R_HAT = 1.1
 _WORTH_DIAGNOSING_PERCENT = 0.5
 _MOST_NAMED = 3
@@ -361,7 +363,7 @@ def _thermometer(data: HangerReport) -> str:
     return "Record the temperature with the next test: it moves the tension."
 
 
-_MOST_CHANGES = 3
+_MOST_CHANGES = 3  # what a sentence bears
 
 
 def redescribed(data: HangerReport) -> str:

@@ -77,8 +77,8 @@ def temperatures(data: HangerReport) -> Table:
     return temperature_table(data.states)
 
 
-_BESIDE = 2
-_ROWS_SHOWN = 12
+_BESIDE = 2  # hangers on either side, which take up most of a lost load
+_ROWS_SHOWN = 12  # layout: what a page holds
 _EARLIER = "... and {} earlier ones (in HTML and JSON)"
 _IRREGULAR = (
     " Not followed: the mode is well off the bar that the others follow, as if the hanger sagged "

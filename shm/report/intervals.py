@@ -18,7 +18,7 @@ NORMAL_90 = 1.6448536269514722
 """Half width of the central 90 % of a normal distribution, in standard deviations."""
 
 
-_WIDE = 0.5
+_WIDE = 0.5  # judgement: an interval of half the value decides little
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 from shm.errors import UsageError
 
 _SPAN = re.compile(r"(\d{1,5})\s*([dwmy])", re.IGNORECASE)
-_DAYS = {"d": 1.0, "w": 7.0, "m": 365.25 / 12, "y": 365.25}
+_DAYS = {"d": 1.0, "w": 7.0, "m": 365.25 / 12, "y": 365.25}  # a Julian year and its twelfth
 _REMEDY = "Give a date such as 2026-03-01, or a span such as 90d, 12w, 6m or 1y."
 
 

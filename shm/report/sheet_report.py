@@ -74,7 +74,7 @@ HEADLINES: dict[Verdict, str] = {
     "refused": "Do not use",
     "unknown": "Not checked",
 }
-_MOST_REMEDIES = 3
+_MOST_REMEDIES = 3  # layout: more are not read
 
 
 def name(sheet: TestSheet) -> str:

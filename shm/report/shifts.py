@@ -11,8 +11,8 @@ from shm.values import NAN, TENSION, Drift
 from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.neighbours import BridgePattern, HangerRow
 
-_UNMOVED = 0.01
-_LARGEST_FACTOR = 1e3
+_UNMOVED = 0.01  # of the threshold: no test tells so little
+_LARGEST_FACTOR = 1e3  # judgement: beyond, an end is as good as clamped or free
 
 
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
@@ -74,7 +74,7 @@ def _stiffness(interval: Interval) -> tuple[str, str]:
     return f"{mean} times", f"{low} to {high} times"
 
 
-_BAR = 6
+_BAR = 6  # layout: signs of a bar in a terminal
 
 
 _PERCENT_DECIMALS = 1

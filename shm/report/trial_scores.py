@@ -170,7 +170,7 @@ PHRASES: dict[MarkName, Phrase] = {
 }
 
 
-_DIGITS = (2, 3, 4, 5)
+_DIGITS = (2, 3, 4, 5)  # tried in turn, until two shares read differently
 
 
 def title(name: MarkName) -> str:

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 MODES_SUFFIX = ".modes.json"
 _FETCH = "Drop the file into the spool again, which heals it, or run `shm archive fetch`."
-_CHUNK = 1 << 20
+_CHUNK = 1 << 20  # technical: 1 MB, between which the heart beats
 _HOLE = bytes(_CHUNK)
 _SYNC_BYTES = 16 << 20  # a slow memory card takes some 2 s for so much, and nobody waits longer
 _NAME_BYTES = 200  # file systems end at 255; the quarantine puts ".reason.json" behind

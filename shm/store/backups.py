@@ -30,7 +30,7 @@ from shm.store.copying import TableContent, Tell, copy_rows, delete_rows, row_co
 from shm.store.database import BUSY_SECONDS, Database, make_engine
 from shm.store.faults import translated
 
-_PAGES_AT_ONCE = 1000
+_PAGES_AT_ONCE = 1000  # technical: 4 MB, between which the daemon may write
 
 
 @dataclass(frozen=True)

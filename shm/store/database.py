@@ -15,7 +15,7 @@ from shm.store.checksums import forget_damage, look_before_update, seal
 from shm.store.faults import translated
 from shm.store.location import shown, url_of
 
-BUSY_SECONDS = 10.0
+BUSY_SECONDS = 10.0  # judgement: a hundred times the longest transaction; then the caller is told
 
 # First keys of PostgreSQL's advisory locks; the second is the schema the tables are in.
 WRITING_LOCK = 0x73686D01

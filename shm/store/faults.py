@@ -28,6 +28,7 @@ class Fault:
 
 _RESTORE = "Restore it from a backup: `shm db restore FILE --replace`."
 
+# Seconds are judgement: what another process holds is free soon, what a person mends takes longer.
 FAULTS = (
     Fault(
         ("is locked", "lock timeout", "queuepool limit"),
@@ -78,6 +79,7 @@ FAULTS = (
     Fault(("malformed",), "is damaged", _RESTORE, 60.0, StoreDamaged, states=("XX001", "XX002")),
 )
 
+# A server that begins again takes some seconds.
 UNREACHABLE = Fault(
     (),
     "cannot be reached",

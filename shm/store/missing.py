@@ -33,7 +33,7 @@ ACCEPTED = "accepted"
 UNHELD = ("withdrawn", "reinstated")
 """Decisions on what was not held: no step, no event and no alert tells of a hold."""
 
-_ROWS_AT_ONCE = 500
+_ROWS_AT_ONCE = 500  # technical: documents of some kB each
 
 
 @dataclass(frozen=True)

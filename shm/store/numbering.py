@@ -36,7 +36,7 @@ NUMBERED = (
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""
 
-_MOST_NAMED = 20
+_MOST_NAMED = 20  # technical: what fits a screen
 _ID = sa.column("id", sa.Integer)
 
 

@@ -208,6 +208,7 @@ baselines = sa.Table(
     sa.Column("since", UtcTime),
 )
 
+# A quantity's name is at most log10_k and a number of two digits; four times that.
 drifts = sa.Table(
     "drifts",
     metadata,

@@ -41,11 +41,11 @@ from shm.values import NAN, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 
 log = logging.getLogger(__name__)
-_AT_ONCE = 50
-_HANGERS_KNOWN = 4096
+_AT_ONCE = 50  # technical: posteriors of some 100 kB each
+_HANGERS_KNOWN = 4096  # technical: more than any bridge has
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
-_NUMBERS_HELD = 1024
+_NUMBERS_HELD = 1024  # technical: a page shows some hundred
 _SUMMARY = (
     summaries.c.key,
     summaries.c.document.label("summary"),

@@ -41,8 +41,8 @@ from shm.store.tables import (
 )
 from shm.values import Posterior
 
-_SECRET_BYTES = 32
-_LONGEST_NAME = 255
+_SECRET_BYTES = 32  # 256 bits: nobody guesses it
+_LONGEST_NAME = 255  # technical: what a column and a line of a table take
 _NOTED_AGAIN_AFTER = timedelta(minutes=1)
 _REMOVED, _BACKUP = "removed", "backup"
 _KIND = "damaged"

@@ -16,8 +16,8 @@ import numpy as np
 from shm.models import is_adopted
 from shm.values import Alert, Hanger, Posterior
 
-_GROWN = 3.0
-_VISIBLE_PERCENT = 0.1
+_GROWN = 3.0  # judgement: beyond the scatter of a misfit of a dozen modes from test to test
+_VISIBLE_PERCENT = 0.1  # three times the sd of a frequency, 3e-4
 
 
 def gap_percent(posterior: Posterior) -> float:

@@ -12,7 +12,7 @@ from shm.values import FloatArray
 from shm.values.drift import TENSION, Reading, TemperatureCoefficient, WatchedQuantity
 from shm.watch.quantities import value_at
 
-NINETY_PERCENT = 1.645
+NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,12 +38,12 @@ MeasuredMode = tuple[Plane, int]
 
 _TENSION_RATIO = "theta_F"
 _STIFFNESS = "log10_k"
-_TENSION_STEP = 0.05
-_STIFFNESS_STEP_DECADES = 0.3
-_INVISIBLE = 1e-5
-_NODES_PER_DECADE = 4
-_FINER = 10
-_TENSION_NODES = 201
+_TENSION_STEP = 0.05  # the default threshold: what an owner is told of
+_STIFFNESS_STEP_DECADES = 0.3  # a factor of 2
+_INVISIBLE = 1e-5  # of a frequency: a thirtieth of the best identification's sd
+_NODES_PER_DECADE = 4  # technical: frequencies are smooth in log k, and refined between
+_FINER = 10  # technical: points between two nodes
+_TENSION_NODES = 201  # technical: interpolated between
 # Below this a rise is the model's rounding: nodes as near as that are one.
 _ROUNDING = 1e-10
 

@@ -24,11 +24,11 @@ from shm.watch.history import StateHistory
 if TYPE_CHECKING:
     from shm.watch.local_level import Course, LocalLevels
 
-_SECONDS_A_YEAR = 365.25 * 86400
-_UNSEEN = 1e-6
-_ROUNDING = 1e-9
-_FEW = 5
-_A_STEP, _CLEAR = 0.5, 3
+_SECONDS_A_YEAR = 365.25 * 86400  # Julian
+_UNSEEN = 1e-6  # of a step: an sd of a thousand steps sees nothing
+_ROUNDING = 1e-9  # technical
+_FEW = 5  # fewer give an sd no better than to a third
+_A_STEP, _CLEAR = 0.5, 3  # likelier a step than a ramp; tests: judgement, see `set_free`
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ from shm.watch.wording import message_of, short_name, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
-_ENDS_BELOW = 0.5
+_ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
 _BEYOND: AlertKind = "beyond threshold"
 
 

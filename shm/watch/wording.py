@@ -9,10 +9,10 @@ from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, End, Hanger, Moved, Plane, WatchedTest
 from shm.values.force_units import force_unit
+from shm.watch.history import NINETY_PERCENT
 
-_NINETY_PERCENT = 1.645
-_CERTAIN = 0.999
-_LISTED = 3
+_CERTAIN = 0.999  # beyond, draws of a thousand cannot tell
+_LISTED = 3  # technical: what a sentence bears
 _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 _EITHER_LIKELY = 0.8
 _WHICH_END = "which end is not known"
@@ -105,7 +105,7 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
 
     `mean` and `sd` are a fraction of the tension, or decades of a stiffness.
     """
-    low, high = mean - _NINETY_PERCENT * sd, mean + _NINETY_PERCENT * sd
+    low, high = mean - NINETY_PERCENT * sd, mean + NINETY_PERCENT * sd
     if quantity != TENSION:
         verb = "fell" if high < 0 else "rose" if low > 0 else "moved"
         return (

@@ -40,6 +40,7 @@ class _Series:
     offset: float
 
 
+# Layout: where the marks of each series stand beside a mode.
 _SERIES = (
     _Series("residual_percent", "baseline", "circle", False, "quiet", -0.2),
     _Series("after_percent", "with the cause", "circle", True, "", 0.0),

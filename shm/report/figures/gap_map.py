@@ -92,6 +92,7 @@ _ROOM, _EDGE = 0.06, 0.16
 """Above and below the map, as a share of its height: as it is, and for what lies beyond it."""
 _CLEAR_SD = 2.0
 """Standard deviations beyond which a gap or a trend is drawn as clear."""
+# Layout: places that have room for their words, and inches of the map and of what stands below.
 _FEW_PLACES = 4
 _LOOKS: tuple[tuple[str, Dash], ...] = (
     ("purple", "solid"),

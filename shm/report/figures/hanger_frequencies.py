@@ -28,7 +28,7 @@ from shm.report.hanger_summary import residuals_percent
 from shm.report.intervals import NORMAL_90, Interval
 from shm.values import PLANES, Mode, Plane, PredictedFrequency
 
-_BESIDE = {"transverse": -0.12, "longitudinal": 0.12}
+_BESIDE = {"transverse": -0.12, "longitudinal": 0.12}  # layout: beside a mode, apart by a mark
 
 
 def specify(data: HangerReport) -> Specification | None:

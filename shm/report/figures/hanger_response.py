@@ -25,6 +25,7 @@ from shm.report.figures.specification import (
 )
 from shm.values import PLANES, FloatArray, FrequencyResponse, Mode, ResponsePoint
 
+# Layout: curves that can be told apart, room above them for names in rows, and a name that fits.
 _POINTS_SHOWN = 4
 _HEADROOM = 1.12
 _ROWS = {"transverse": 0.98, "longitudinal": 0.93}

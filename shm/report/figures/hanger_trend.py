@@ -29,7 +29,7 @@ from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit
 from shm.watch.history import Band as Bounds
 
-_AT_FOOT = 0.03
+_AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
 
 
 @dataclass(frozen=True)

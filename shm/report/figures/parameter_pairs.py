@@ -14,6 +14,7 @@ from shm.report.figures.style import WIDTH_INCHES
 from shm.values import FloatArray, Posterior
 from shm.values.force_units import force_unit
 
+# Layout: a page holds seven panels beside each other, each a cloud that can be seen through.
 _PANEL_INCHES = 1.6
 _MOST_SAMPLES = 250
 _MOST_PARAMETERS = 7

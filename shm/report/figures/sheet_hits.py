@@ -33,7 +33,7 @@ from shm.report.figures.specification import (
 _COLOURS = ("blue", "orange", "green", "purple")
 _DASHES: tuple[Dash, ...] = ("solid", "dash", "dot")
 _DROPPED_DASHES: tuple[Dash, ...] = ("dash", "dot", "dashdot", "longdash")
-_FADE_ROOM = 1.3
+_FADE_ROOM = 1.3  # layout: room to the right of the last hit
 
 
 def _draw(shown: Shown) -> Specification | None:

@@ -15,6 +15,7 @@ from shm.report.figures.sheet_spectra import Shown
 from shm.report.quality_table import SYMBOLS, overall, verdict_label, with_unit
 from shm.values import QualityCheck
 
+# Layout: inches of a line of small type, its cell and head; characters that a column holds.
 _LINE_INCHES = 0.155
 _PAD_INCHES = 0.11
 _HEAD_INCHES = 0.3

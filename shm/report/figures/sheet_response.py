@@ -36,6 +36,7 @@ from shm.report.figures.specification import (
 )
 from shm.values import ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
 
+# Layout: curves that can be told apart, and as many bins as a page has dots.
 _MOST_POINTS = 4
 _BINS = 550
 _HOVER = "%{x:.2f} Hz: %{y:.4g}"

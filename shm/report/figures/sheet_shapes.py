@@ -93,6 +93,7 @@ def guide(sheet: TestSheet, mode: Mode) -> Guide | None:
     return Guide(places, size * np.sin(wave * places))
 
 
+# Layout: panels beside each other on a page, and on a screen.
 _MOST_COLUMNS, _LEAST_COLUMNS = 7, 4
 _MOST_ON_SCREEN = 4
 _PANEL_INCHES = 1.12

@@ -12,6 +12,7 @@ from shm.report.contents import TestSheet
 from shm.report.figures.specification import envelope_places, peak_places
 from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 
+# Layout: channels drawn beside the sound one, bins of the fading; and what stands for a level of 0.
 _MOST_FAULTY = 2
 
 
@@ -129,8 +130,8 @@ _STRIKES = 0.05
 _TRANSFORM_S = 0.5
 _LEAD, _TAIL = 0.7, 3.0
 """Room before and after a pulse in a figure, in widths of it."""
-_TINY = 1e-9
-_FADE_BINS = 80
+_TINY = 1e-9  # stands for a level of 0 on an axis of dB
+_FADE_BINS = 80  # layout: steps that the eye takes for a line
 
 
 @dataclass(frozen=True, eq=False)

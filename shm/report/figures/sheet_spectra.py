@@ -21,9 +21,10 @@ from shm.report.figures.specification import (
 )
 from shm.values import PLANES, FloatArray, Mode, Recording, ResponsePoint
 
+# Eight segments smooth a spectrum to a third (1 / sqrt 8); 20 s resolve 0.05 Hz.
 _LEAST_SEGMENT_S = 20.0
 _SEGMENTS = 8
-_MARGIN = 0.06
+_MARGIN = 0.06  # layout: of the width
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from shm.report.figures.specification import (
 )
 from shm.values import BoolArray
 
+# Layout: as many bins as a page has dots; a scale is never narrower than two orders.
 _BINS = 550
 _LEAST_SPAN = 2.0
 

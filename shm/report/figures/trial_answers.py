@@ -45,6 +45,7 @@ def name_richness(axes: Axes, names: Sequence[str]) -> None:
     axes.set_xlim(-0.6, len(names) - 0.4)
 
 
+# Layout: powers of four; letters turn white on what is darker.
 _TICKS = (1, 4, 16, 64, 256, 1024)
 
 
@@ -117,7 +118,7 @@ DETECTION = Member(
 _NOTHING, _TWO, _UNKNOWN = "nothing", "two effects", "not in the catalogue"
 _NO_GAP, _PAIR, _UNEXPLAINED, _FAILED = "no gap", "a pair", "unexplained", "failed"
 _SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", colours.BLUE])
-_DARK = 0.55
+_DARK = 0.55  # layout: of the darkest; beyond, letters are white
 
 
 def _row(case: CaseScore) -> str:

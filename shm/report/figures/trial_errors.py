@@ -133,7 +133,7 @@ _KINDS: dict[PlantedKind, tuple[str, str, str]] = {
     "two": ("two effects", colours.PURPLE, "s"),
     "unknown": ("not in the catalogue", colours.ORANGE, "^"),
 }
-_LEAST = 0.01
+_LEAST = 0.01  # layout: of a per cent, where an axis of logarithms begins
 
 
 def _errors(case: CaseScore) -> tuple[float, float]:
@@ -207,6 +207,7 @@ TENSION_ERRORS = Member(
 )
 
 
+# Layout: marks, their words, and where each axis ends.
 _PANELS: tuple[tuple[MarkName, str, float], ...] = (
     ("tension covered", "tension, 95 % interval", 0.95),
     ("size covered", "effect's size, 90 % interval", 0.90),

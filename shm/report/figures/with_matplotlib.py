@@ -30,6 +30,7 @@ from shm.report.figures.specification import (
     Specification,
 )
 
+# Layout: points of dash and gap.
 _DASHES: dict[Dash, Any] = {
     "solid": "-",
     "dash": "--",

@@ -14,8 +14,6 @@ ExplanationName = Literal[
 ]
 Way = Literal["gained", "lost", "unchanged"]
 
-NINETY_PERCENT = 1.645
-
 
 @dataclass(frozen=True)
 class HangerShift:
@@ -37,6 +35,7 @@ class HangerShift:
     logger: str = ""
 
 
+# Judgement: why, says `NeighbourOptions`.
 _PRIOR: dict[ExplanationName, float] = {
     "nothing moved": 0.70,
     "shed load": 0.10,

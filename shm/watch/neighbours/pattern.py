@@ -13,10 +13,10 @@ from scipy.special import logsumexp
 
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray
+from shm.watch.history import NINETY_PERCENT
 from shm.watch.neighbours.evidence import Bridge
 from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
 from shm.watch.neighbours.nouns import (
-    NINETY_PERCENT,
     BridgePattern,
     Explanation,
     ExplanationName,
@@ -30,9 +30,9 @@ from shm.watch.neighbours.nouns import (
 )
 from shm.watch.neighbours.words import remarks_of, sentence_of
 
-FEWEST = 3
-_REACH = 2
-_SUSPECTS = 3
+FEWEST = 3  # of two, either may be the one that moved
+_REACH = 2  # places: what hangers further off take up is below 5 % of a loss
+_SUSPECTS = 3  # technical: pairs are tried of so many
 
 
 def shifts_of(

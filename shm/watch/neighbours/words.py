@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.values.force_units import force_unit
+from shm.watch.history import NINETY_PERCENT
 from shm.watch.neighbours.nouns import (
-    NINETY_PERCENT,
     BridgePattern,
     ExplanationName,
     HangerRow,
@@ -14,8 +14,8 @@ from shm.watch.neighbours.nouns import (
     Suspect,
 )
 
-_REACH = 2
-_SURE_WHICH = 0.8
+_REACH = 2  # as in pattern: those that take up a load
+_SURE_WHICH = 0.8  # judgement: four to one
 
 
 def sentence_of(pattern: BridgePattern, alike_remedy: str, options: NeighbourOptions) -> str:

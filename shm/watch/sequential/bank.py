@@ -21,10 +21,10 @@ from shm.watch.sequential.design import Design, Direction, Measurement
 from shm.watch.sequential.filtering import Filters, Sight, update, update_new
 
 STEP, RAMP = 0, 1
-KINDS = 2
-_KEPT_DENSE = 12
-_LEVEL_SD = 10.0
-_HOPELESS_NATS = 10.0
+KINDS = 2  # steps and ramps
+_KEPT_DENSE = 12  # technical: beginnings of the last so many tests are all kept, older ones thinned
+_LEVEL_SD = 10.0  # of a step: flat beside any reading
+_HOPELESS_NATS = 10.0  # 1 in 22,000
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,9 @@ from shm.watch.quantities import coordinate_of, shift_of, value_at
 from shm.watch.sequential.bank import STEP, Bank, log_total
 from shm.watch.sequential.design import DAYS_PER_YEAR
 
-_ALIKE_NATS = 3.0
-_TAIL = 0.05
-_DIGITS = 3
+_ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
+_TAIL = 0.05  # 90 % lie between
+_DIGITS = 3  # probabilities that read alike are ordered by tension first
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,9 +239,10 @@ def _drift(
     )
 
 
+# Technical: exact for polynomials of degree 13.
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
-_NEGLIGIBLE = 1e-7
+_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,12 @@ from shm.errors import BadInput
 from shm.values import NAN, TENSION, End, FloatArray, Reading, WatchedQuantity
 from shm.watch.options import WatchOptions
 
-_CORRELATION = 0.8
+_CORRELATION = 0.8  # judgement: see above
 _ENDS: tuple[End, ...] = ("deck", "arch")
-DAYS_PER_YEAR = 365.25
-_SEASON_YEARS = 60 / DAYS_PER_YEAR
-_SEEN_AT_ALL = 1e-4
-_SEEN_BESIDE_OTHERS = 1e-11
+DAYS_PER_YEAR = 365.25  # Julian
+_SEASON_YEARS = 60 / DAYS_PER_YEAR  # judgement: so many days are of one season
+_SEEN_AT_ALL = 1e-4  # in units of a step: an sd of a hundred steps sees nothing
+_SEEN_BESIDE_OTHERS = 1e-11  # technical: below is rounding of the largest
 
 
 @dataclass(frozen=True)

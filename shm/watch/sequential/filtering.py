@@ -21,6 +21,8 @@ import numpy as np
 from shm.values import FloatArray, IntArray
 from shm.watch.sequential.design import Direction, Measurement
 
+# Judgement: how an outlier lies (heavy tails: 2 degrees of freedom), and of what size a change is;
+# see above. What may not be missed, a step of the size of the threshold, is the first.
 _WIDER = 10.0
 _TAIL = 2.0
 _SIZES = np.array([1.0, 6.0])

@@ -216,6 +216,7 @@ def _priors(
     return np.array(scatters), coefficients
 
 
+# Technical: the share of a change from which the state has a place for its jump, or its rate.
 _PLACE_FOR_A_JUMP = 1e-4
 _PLACE_FOR_A_RATE = 1e-2
 
