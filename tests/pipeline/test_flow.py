@@ -390,7 +390,7 @@ class DyingPool(ThreadPoolExecutor):
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
         step, subject = fn.args[:2]
-        file_name = subject.file.file_name if step == "identify_file" else ""
+        file_name = subject.file.file_name if step is steps.identify_file else ""
         return super().submit(self._work, fn, file_name)
 
     def _work(self, fn: Any, file_name: str) -> Any:
@@ -457,7 +457,7 @@ class Killed(ThreadPoolExecutor):
 
     def _work(self, fn: Any) -> Any:
         step, subject = fn.args[:2]
-        file_name = subject.file.file_name if step == "identify_file" else "-"
+        file_name = subject.file.file_name if step is steps.identify_file else "-"
         for name, left in self.left.items():
             if left and file_name.startswith(name):
                 self.left[name] -= 1
@@ -557,7 +557,7 @@ def test_of_several_files_at_once_none_is_refused_for_a_death(tmp_path: Path) ->
 
     class Selecting(ThreadPoolExecutor):
         def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
-            if fn.args[0] == "select_model":
+            if fn.args[0] is steps.select_model:
                 fn = partial(self._die)
             return super().submit(fn, *args, **kwargs)
 
