@@ -191,12 +191,16 @@ class Daemon:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
 
     def _turn(self) -> bool:
-        """Whether anything is left to do; errors that pass are waited for, and shown meanwhile."""
+        """Whether anything is left to do; errors that pass are waited for, and shown until a turn
+        with a scan went well.
+        """
+        is_whole = time.monotonic() >= self._scan_at
         try:
-            if time.monotonic() >= self._scan_at:
+            if is_whole:
                 self._scan()
             left = self._flow.advance() or self._flow.suspects_due_s() is not None
-            self._tell_failure("")
+            if is_whole:
+                self._tell_failure("")
             return left
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")

@@ -157,13 +157,17 @@ def test_no_name_of_a_file_holds_up_the_others(
 def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    serve()
+    bell = serve()
     write_test(workspace.spool / "a.modes.json", workspace)
     until(lambda: counts(workspace) == {Stage.DONE: 1})
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
     away = workspace.archive.folder.rename(workspace.folder / "away")
     write_test(workspace.spool / "b.modes.json", workspace, day=30)
     until(lambda: "archive/ is gone" in why_turn_failed(workspace))
+    for _ in range(20):  # a turn without a scan, as after a step, says nothing of the spool
+        bell.ring()
+        time.sleep(0.02)
+        assert "archive/ is gone" in why_turn_failed(workspace)
     assert not workspace.archive.folder.exists()
     assert [path.name for path in workspace.spool.iterdir()] == ["b.modes.json"]
     away.rename(workspace.archive.folder)
