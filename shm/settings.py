@@ -37,7 +37,8 @@ class Setting:
         """
         if isinstance(raw, list) and all(isinstance(each, str) for each in raw):
             raw = ",".join(raw)
-        if isinstance(raw, bool) or isinstance(self.default, str) > isinstance(raw, str):
+        is_text = isinstance(self.default, str)
+        if isinstance(raw, bool) or (is_text and not isinstance(raw, str)):
             raise self._refusal(raw, source)
         try:
             value = type(self.default)(raw)

@@ -28,9 +28,8 @@ from shm.store.archive import (
     suffix_of,
     sync,
 )
-from shm_daemon.spool import SIDECAR, UNDER_WAY
+from shm_daemon.spool import LEFT_ALONE
 
-_LEFT_ALONE = (*UNDER_WAY, SIDECAR)
 _LEFTOVER_S = 86400.0  # judgement: a day; no sender that is cut off after a minute is at it still
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
@@ -56,7 +55,7 @@ def landing_name(given: str) -> str:
     name = safe_name(Path(_UNPRINTABLE.sub("", last).strip().lstrip(".")))
     if name in ("", "."):
         raise BadInput(f"{given!r} is no file name.", remedy="Give one such as hanger3.csv.")
-    if name.lower().endswith(_LEFT_ALONE):
+    if name.lower().endswith(LEFT_ALONE):
         raise BadInput(
             f"{name!r} would lie in the spool for ever: such names are left alone there.",
             remedy="Give the name of the recording itself, such as hanger3.csv.",

@@ -16,9 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shm.read import sidecar_path
+from shm.read.sidecar import SIDECAR_SUFFIX
 
-UNDER_WAY = (".part", ".tmp", ".filepart")
-SIDECAR = ".toml"
+_UNDER_WAY = (".part", ".tmp", ".filepart")
+LEFT_ALONE = (*_UNDER_WAY, SIDECAR_SUFFIX)
+"""Endings of names that are not taken by themselves."""
 _PATIENCE_WITH_EMPTY = 10.0  # judgement: times as long: some loggers open a file before they write
 
 
@@ -37,22 +39,26 @@ def scan(spool: Path, meanwhile: Callable[[], object] = lambda: None) -> dict[Pa
     found = {}
     for path in _entries(spool):
         meanwhile()
-        if not path.name.lower().endswith((*UNDER_WAY, SIDECAR)):
+        if not path.name.lower().endswith(LEFT_ALONE):
             look = _look(path)
-            if isinstance(look, Look):
+            if look is not None:
                 found[path] = look
     return found
 
 
+def is_sidecar(path: Path) -> bool:
+    """Whether a name is that of a sidecar, which waits for its file."""
+    return path.name.lower().endswith(SIDECAR_SUFFIX)
+
+
 def left_alone(spool: Path) -> list[Path]:
     """Uploads that are not finished, and sidecars whose file is not there."""
-    files = [path for path in _entries(spool) if isinstance(_look(path), Look)]
-    awaited = {sidecar_path(path) for path in files if not path.name.lower().endswith(SIDECAR)}
+    files = [path for path in _entries(spool) if isinstance(_lying(path), os.stat_result)]
+    awaited = {sidecar_path(path) for path in files if not is_sidecar(path)}
     return [
         path
         for path in files
-        if path.name.lower().endswith(UNDER_WAY)
-        or (path.name.lower().endswith(SIDECAR) and path not in awaited)
+        if path.name.lower().endswith(_UNDER_WAY) or (is_sidecar(path) and path not in awaited)
     ]
 
 
@@ -63,8 +69,8 @@ def never_taken(spool: Path) -> dict[Path, str]:
     def note(error: OSError) -> None:
         unlisted[Path(error.filename)] = f"a folder that cannot be listed ({error.strerror})"
 
-    looks = {path: _look(path) for path in _entries(spool, note)}
-    return unlisted | {path: look for path, look in looks.items() if isinstance(look, str)}
+    lying = {path: _lying(path) for path in _entries(spool, note)}
+    return unlisted | {path: what for path, what in lying.items() if isinstance(what, str)}
 
 
 def _entries(
@@ -89,30 +95,32 @@ _KINDS = (
 )
 
 
-def _look(path: Path) -> Look | str | None:
-    """What it is where it is no regular file or cannot be looked at; None where it is gone.
+def _lying(path: Path) -> os.stat_result | str | None:
+    """The status of a regular file, else what it is; None where it is gone.
 
     Whatever befalls one file, the others are seen.
     """
     try:
         status = path.lstat()
-        if not stat.S_ISREG(status.st_mode):
-            return next((kind for is_one, kind in _KINDS if is_one(status.st_mode)), "a device")
-        sidecar = _status(sidecar_path(path))
     except FileNotFoundError:
         return None
     except OSError as error:
         return f"a file that cannot be looked at ({error.strerror})"
-    if sidecar is None:
+    if stat.S_ISREG(status.st_mode):
+        return status
+    return next((kind for is_one, kind in _KINDS if is_one(status.st_mode)), "a device")
+
+
+def _look(path: Path) -> Look | None:
+    """None for what is no regular file, or was one a moment ago."""
+    status = _lying(path)
+    if not isinstance(status, os.stat_result):
+        return None
+    try:
+        sidecar = sidecar_path(path).lstat()
+    except FileNotFoundError:
         return Look(status.st_mtime_ns, status.st_size)
     return Look(status.st_mtime_ns, status.st_size, sidecar.st_mtime_ns, sidecar.st_size)
-
-
-def _status(path: Path) -> os.stat_result | None:
-    try:
-        return path.lstat()
-    except FileNotFoundError:
-        return None
 
 
 class FileStabilityTracker:

@@ -71,6 +71,7 @@ def hanger_now(
         store.posteriors.selection(hanger.id),
         store.watch.baseline(hanger.id, posterior.model),
     )
+    in_force = store.watch.baseline(hanger.id)
     diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     return HangerReport(
@@ -93,8 +94,8 @@ def hanger_now(
         is_called=any(each.change.called for each in watched),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),
-        redescribed=redescribed(hanger, store.watch.baseline(hanger.id)),
-        discarded=discarded_of(store, store.watch.baseline(hanger.id)),
+        redescribed=redescribed(hanger, in_force),
+        discarded=discarded_of(store, in_force),
     )
 
 

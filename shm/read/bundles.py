@@ -17,7 +17,7 @@ from shm.read.atomic import replace_file
 from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
 from shm.read.header import CHANNEL_KEYS, Header
 from shm.read.limits import guarded, limits
-from shm.read.sidecar import document_beside, sidecar_path, with_sidecar
+from shm.read.sidecar import SIDECAR_SUFFIX, document_beside, sidecar_path, with_sidecar
 
 SUFFIX = ".zip"
 FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
@@ -41,7 +41,7 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
     with unpacking_folder() as folder:
         with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
             files = _unpack_all(archive, members, folder)
-        sidecars = {file for file in files if file.suffix == ".toml"}
+        sidecars = {file for file in files if file.suffix == SIDECAR_SUFFIX}
         recordings = sorted(set(files) - sidecars, key=lambda file: natural(str(file)))
         _refuse_alone(sidecars, recordings, path)
         if not recordings:

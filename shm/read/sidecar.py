@@ -36,7 +36,7 @@ from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spr
 from shm.read.limits import refuse_long_header
 from shm.values import FrequencyResponse, Recording
 
-_SUFFIX = ".toml"
+SIDECAR_SUFFIX = ".toml"
 _NAME_BYTES = 255  # the most that Linux's file systems take
 _SHAPE = "Write hanger = 3 and the like, and a table [channel.acc_1] for each channel."
 
@@ -47,9 +47,9 @@ def sidecar_path(path: Path) -> Path:
     Beside a name so long that the sidecar's would be too long, it is the name cut to fit.
     """
     plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
-    name = os.fsencode(plain.with_suffix(_SUFFIX).name)
+    name = os.fsencode(plain.with_suffix(SIDECAR_SUFFIX).name)
     if len(name) > _NAME_BYTES:
-        name = name[: _NAME_BYTES - len(_SUFFIX)] + _SUFFIX.encode()
+        name = name[: _NAME_BYTES - len(SIDECAR_SUFFIX)] + SIDECAR_SUFFIX.encode()
     return plain.with_name(os.fsdecode(name))
 
 

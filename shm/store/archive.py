@@ -26,6 +26,7 @@ from shm.documents import dump
 from shm.errors import DISK_FULL, BadInput, ShmError, StoreError, TooLarge
 from shm.read import sidecar_path
 from shm.store.recording_rows import ReceivedFile
+from shm.values import printable
 
 log = logging.getLogger(__name__)
 
@@ -54,8 +55,7 @@ def safe_name(path: Path) -> str:
 
 
 def _printable(part: str | Path) -> str:
-    text = os.fsencode(part).decode(errors="replace")
-    return "".join(each if each.isprintable() else "_" for each in text)
+    return printable(os.fsencode(part).decode(errors="replace"))
 
 
 Meanwhile = Callable[[], object]

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from shm.errors import DamagedRow, sentence
+from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store.archive import Archive, checksum
 from shm.store.checksums import RESTORE
 from shm.store.copying import Rows, TableContent, Tell, contents
@@ -195,7 +196,7 @@ def archived_names(store: Database) -> tuple[str, ...]:
 def unknown_files(store: Database, archive: Archive) -> tuple[str, ...]:
     """Raw files that no recording refers to, by their path in the archive; no sidecars."""
     found = _unreferenced(archive, archived_names(store))
-    return tuple(name for name in found if not name.endswith(".toml"))
+    return tuple(name for name in found if not name.endswith(SIDECAR_SUFFIX))
 
 
 def of_no_recording(names: Sequence[str]) -> tuple[str, str]:

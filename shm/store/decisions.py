@@ -99,11 +99,7 @@ class Decisions(Repository):
         with self.writing() as connection:
             hold = undecided(connection, recording_id)
             refuse_time(hold, time, at)
-            for row in held_rows(connection, recording_id):
-                values = confirmed_values(connection, row, hold, time, who)
-                this = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
-                write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
+            _let_count(connection, held_rows(connection, recording_id), hold, time, who, at)
             own = sa.update(recordings).where(recordings.c.id == recording_id)
             connection.execute(own.values(reason=None))
             advance_recordings(connection, [recording_id], at)
@@ -196,11 +192,7 @@ class Decisions(Repository):
             ]
             record = (Decision.REINSTATED, who, why, at, time or former[-1].time)
             hold = _decide_unheld(connection, recording, held, record)
-            for row in chosen:
-                values = confirmed_values(connection, row, hold, hold.time, who)
-                this = sa.update(tests).where(tests.c.id == row.id)
-                connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
-                write_step(connection, recording_id, Stage.IDENTIFIED, at, row.id)
+            _let_count(connection, chosen, hold, hold.time, who, at)
             by_number = sa.update(recordings).where(
                 recordings.c.id == recording_id, recordings.c.stage == Stage.REFUSED
             )
@@ -219,6 +211,22 @@ class Decisions(Repository):
         """
         with self.writing() as connection:
             return reprocess(connection, recording_id, stage, at, test)
+
+
+def _let_count(
+    connection: Connection,
+    rows: Sequence[Row[Any]],
+    hold: Hold,
+    time: datetime | None,
+    who: str,
+    at: datetime,
+) -> None:
+    """Tests of one recording are identified from now on, at the `time` that a person gave."""
+    for row in rows:
+        values = confirmed_values(connection, row, hold, time, who)
+        this = sa.update(tests).where(tests.c.id == row.id)
+        connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
+        write_step(connection, row.recording_id, Stage.IDENTIFIED, at, row.id)
 
 
 def _decided_with(

@@ -69,6 +69,7 @@ from shm.values.modes import (
     ShapePoint,
     as_test_id,
     is_test_id,
+    printable,
 )
 from shm.values.posterior import (
     ENOUGH_EFFECTIVE,
@@ -187,4 +188,5 @@ __all__ = [
     "effect_label",
     "is_test_id",
     "leads",
+    "printable",
 ]

@@ -83,8 +83,12 @@ def is_test_id(text: str) -> bool:
 
 def as_test_id(name: str) -> str:
     """An id out of any name: what cannot be printed, and would break a line or a log, is "_"."""
-    printable = "".join(each if each.isprintable() else "_" for each in name)
-    return printable[:LONGEST_TEST_ID] or "_"
+    return printable(name)[:LONGEST_TEST_ID] or "_"
+
+
+def printable(text: str, instead: str = "_") -> str:
+    """A text with something else `instead` of each character that cannot be printed."""
+    return "".join(each if each.isprintable() else instead for each in text)
 
 
 @dataclass(frozen=True)

@@ -60,33 +60,37 @@ def agreement(
     None where it shows none, no test beside it agrees, two that agree were there before it, or the
     shift is `told` already.
     """
-    for j, quantity in enumerate(reader.quantities):
-        own = _shown(reader, newest[0], j, hanger, options)
-        if own is None or (quantity.name, "down" if own.mean < 0 else "up") in told:
+    own = _shown(reader, newest[0], hanger, options)
+    if not any(own):
+        return None
+    near = [
+        [(test, _shown(reader, test, hanger, options)) for test in tests]
+        for tests in (*beside.came, *beside.dated)
+    ]
+    for j, (quantity, mine) in enumerate(zip(reader.quantities, own, strict=True)):
+        if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
-        runs = [
-            _run(reader, tests, own, j, hanger, options) for tests in (*beside.came, *beside.dated)
-        ]
+        runs = [_run(tests, mine, j) for tests in near]
         others = [run[0] for run in runs if run]
         if others and max(map(len, runs)) < _TOLD:
             other, shown = others[0]
-            drift = _drift(quantity, newest, (own, shown), hanger)
+            drift = _drift(quantity, newest, (mine, shown), hanger)
             return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
     return None
 
 
+def way_of(shift: float) -> Way:
+    """To which side a shift goes."""
+    return "down" if shift < 0 else "up"
+
+
 def _run(
-    reader: Reader,
-    tests: Sequence[ModalTest],
-    own: _Shown,
-    j: int,
-    hanger: Hanger,
-    options: WatchOptions,
+    tests: Sequence[tuple[ModalTest, Sequence[_Shown | None]]], own: _Shown, j: int
 ) -> list[tuple[ModalTest, _Shown]]:
-    """Of tests, the nearest first, those up to the first that does not agree."""
+    """Of tests, the nearest first, those up to the first that does not agree in quantity `j`."""
     found: list[tuple[ModalTest, _Shown]] = []
-    for test in tests:
-        shown = _shown(reader, test, j, hanger, options)
+    for test, all_shown in tests:
+        shown = all_shown[j]
         if shown is None or not _agree(own, shown):
             break
         found.append((test, shown))
@@ -99,33 +103,36 @@ def _agree(one: _Shown, other: _Shown) -> bool:
 
 
 def _shown(
-    reader: Reader, test: ModalTest, j: int, hanger: Hanger, options: WatchOptions
-) -> _Shown | None:
-    """What a test shows of quantity `j`; None where that is not clear, or below its threshold."""
-    quantity = reader.quantities[j]
-    found = _read(reader, test, j, options)
-    is_beyond = abs(shift_of(quantity, found.mean)) >= threshold_of(quantity, hanger)
-    is_clear = abs(found.mean) >= _CLEAR * math.sqrt(found.variance)
-    return found if is_beyond and is_clear else None
+    reader: Reader, test: ModalTest, hanger: Hanger, options: WatchOptions
+) -> list[_Shown | None]:
+    """What a test shows of each quantity; None where that is not clear, or below its threshold."""
+    found: list[_Shown | None] = []
+    for quantity, each in zip(reader.quantities, _read(reader, test, options), strict=True):
+        is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity, hanger)
+        is_clear = abs(each.mean) >= _CLEAR * math.sqrt(each.variance)
+        found.append(each if is_beyond and is_clear else None)
+    return found
 
 
-def _read(reader: Reader, test: ModalTest, j: int, options: WatchOptions) -> _Shown:
+def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown]:
     """With all that makes tests of an unchanged hanger differ: errors, scatter, temperature."""
     reading = reader.reading(test, datetime.max)
-    quantity = reader.quantities[j]
     pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
     covariance = np.linalg.inv(reading.information + np.diag(pull))
     kelvin = test.temperature_c - reader.reference_temperature_c
     if not math.isfinite(kelvin):
         kelvin = options.unknown_temperature_sd_k
-    if quantity.name == TENSION:
-        scatter, per_kelvin = max(options.tension_scatter), options.tension_per_kelvin_sd
-    else:
-        scatter = max(options.spring_scatter_of_step) * quantity.step_sd
-        per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
-    of_both = 2 * scatter**2  # a baseline of one test scatters as much
-    variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
-    return _Shown(float(reading.mean[j]), variance)
+    found = []
+    for j, quantity in enumerate(reader.quantities):
+        if quantity.name == TENSION:
+            scatter, per_kelvin = max(options.tension_scatter), options.tension_per_kelvin_sd
+        else:
+            scatter = max(options.spring_scatter_of_step) * quantity.step_sd
+            per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
+        of_both = 2 * scatter**2  # a baseline of one test scatters as much
+        variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
+        found.append(_Shown(float(reading.mean[j]), variance))
+    return found
 
 
 def _drift(
@@ -164,7 +171,7 @@ def _alert(
     is_held: bool,
 ) -> Alert:
     test, time = newest
-    way: Way = "down" if drift.shift_mean < 0 else "up"
+    way = way_of(drift.shift_mean)
     return Alert(
         key=f"hanger-{hanger.id}:two-tests-agree:{drift.quantity}-{way}:{short_name(test.id)}",
         hanger=hanger.id,

@@ -35,7 +35,7 @@ from shm.values import (
     Reading,
     WatchedTest,
 )
-from shm.watch.agreement import Way, agreement
+from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
@@ -170,7 +170,7 @@ def after(told: Told, test: WatchedTest, hanger: Hanger) -> tuple[Told, Alert | 
     level = hanger.thresholds.alert_probability
     standing = _still(told, test, level)
     news = _news(standing, test, level)
-    beyond = {(drift.quantity, _way(drift.shift_mean)): test.time for drift in news.beyond}
+    beyond = {(drift.quantity, way_of(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
@@ -204,7 +204,7 @@ def _still(told: Told, test: WatchedTest, level: float) -> Told:
 
 def _probability(drift: Drift, way: Way) -> float:
     """That the shift is beyond its threshold in one way; nearly none is where it went the other."""
-    return drift.probability * (_way(drift.shift_mean) == way)
+    return drift.probability * (way_of(drift.shift_mean) == way)
 
 
 def _news(standing: Told, test: WatchedTest, level: float) -> _News:
@@ -212,7 +212,7 @@ def _news(standing: Told, test: WatchedTest, level: float) -> _News:
         drift
         for drift in test.drifts
         if drift.probability >= level
-        and (drift.quantity, _way(drift.shift_mean)) not in standing.beyond
+        and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
     )
     return _News(beyond, test.change.called and not _is_known(standing, test.change))
 
@@ -234,10 +234,10 @@ def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) 
     """The last called change of the same way as a shift; None where none is known to explain it."""
     if not called:
         return now if now.probability > 0.5 else None
-    shifts = {(drift.quantity, _way(drift.shift_mean)) for drift in beyond}
+    shifts = {(drift.quantity, way_of(drift.shift_mean)) for drift in beyond}
     for change in reversed(called):
         suspects = {
-            (moved.quantity, _way(moved.shift_mean))
+            (moved.quantity, way_of(moved.shift_mean))
             for moved in change.moved
             if moved.quantity in _suspects(change)
         }
@@ -287,15 +287,11 @@ def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Han
 def _first_moved(news: _News, test: WatchedTest) -> str:
     """The quantity that is told first, and its way."""
     if news.beyond:
-        return f"{news.beyond[0].quantity}-{_way(news.beyond[0].shift_mean)}"
+        return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
     if test.change.moved:
         first = test.change.moved[0]
-        return f"{first.quantity}-{_way(first.shift_mean)}"
+        return f"{first.quantity}-{way_of(first.shift_mean)}"
     return "unknown"
-
-
-def _way(shift: float) -> Way:
-    return "down" if shift < 0 else "up"
 
 
 @dataclass(frozen=True)

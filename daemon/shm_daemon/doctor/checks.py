@@ -18,7 +18,7 @@ from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
-from shm_daemon.spool import SIDECAR, left_alone, never_taken, scan
+from shm_daemon.spool import is_sidecar, left_alone, never_taken, scan
 
 # Judgement: a step takes seconds to minutes, so that work which stands for longer than these is
 # looked into; shorter ones would warn of a burst of files, longer ones hide a fault for a shift.
@@ -134,7 +134,7 @@ def check_spool(examined: Examined) -> Iterator[Finding]:
             "Only files are taken: put the file itself there, readable by the daemon's user.",
         )
     left = [(path, _age(path, examined.now)) for path in left_alone(spool)]
-    sidecars = [p.name for p, age in left if p.name.lower().endswith(SIDECAR) and age > _ALONE]
+    sidecars = [path.name for path, age in left if is_sidecar(path) and age > _ALONE]
     if sidecars:
         yield warning(
             "spool",

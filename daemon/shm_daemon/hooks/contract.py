@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from shm.errors import ShmError
-from shm.values import Alert
+from shm.values import Alert, printable
 
 SHOWN_CHARACTERS = 500  # technical: of a stranger's words, what a line of the log may hold
 
@@ -49,5 +49,4 @@ class Deliverer(Protocol):
 
 def one_line(text: str) -> str:
     """A stranger's words made fit for a log: printable, on one line, not endless."""
-    printable = "".join(character if character.isprintable() else " " for character in text)
-    return " ".join(printable.split())[:SHOWN_CHARACTERS]
+    return " ".join(printable(text, " ").split())[:SHOWN_CHARACTERS]
