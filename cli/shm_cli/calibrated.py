@@ -14,7 +14,7 @@ from shm.inference import Progress, UpdateOptions, select
 from shm.models import DESCRIPTION, Model
 from shm.modes_document import load_modes
 from shm.pipeline.calibrating import calibration
-from shm.pipeline.terms import Taught
+from shm.pipeline.lineage import Taught
 from shm.values import Hanger
 
 calibrated_by_option = click.option(

@@ -15,7 +15,7 @@ from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
-from shm.read.apart import read_test
+from shm.read.sandbox import read_test
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import TestSheet

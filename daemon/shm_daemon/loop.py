@@ -22,13 +22,13 @@ from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.active import ActiveLock
-from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_failed
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
+from shm_daemon.wakeup import SPOOL, Bell, rung_by_changes, stopped_by_signals
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0

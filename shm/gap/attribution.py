@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.gap.calibration import CALIBRATION
-from shm.gap.chances import Family, Tried, families, missed, probabilities
 from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
+from shm.gap.model_probabilities import Family, Tried, families, missed, probabilities
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
 from shm.inference.tmcmc import normalised

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shm.errors import UsageError
-from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis, Progress
+from shm.gap.detectability import HOPELESS_SHARE, Scan, scan, superposed, truncate
 from shm.gap.marginal import marginal
+from shm.gap.model_probabilities import Tried
 from shm.gap.problem import GapProblem
-from shm.gap.sensitivity import HOPELESS_SHARE, Scan, scan, superposed, truncate
 from shm.models.effects import EFFECTS
 
 IN_BASELINE = {

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
+from shm.gap.detectability import Scan
 from shm.gap.fit import STARTS, baseline_fit, fitted, with_remainder
 from shm.gap.hypotheses import (
     hopeful,
@@ -20,11 +20,11 @@ from shm.gap.hypotheses import (
     tried_by_screening,
     varied,
 )
-from shm.gap.laws import by_its_laws, mixed, otherwise
+from shm.gap.importance_sampling import sampled
+from shm.gap.law_error import by_its_laws, mixed, otherwise
+from shm.gap.model_probabilities import Family, Tried, families, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictive_p_value
-from shm.gap.sampled import sampled
-from shm.gap.sensitivity import Scan
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 

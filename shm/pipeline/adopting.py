@@ -18,8 +18,8 @@ from shm.inference.options import Progress, silent
 from shm.models import build, class_of
 from shm.models.adopted import AdoptedName, variant_of
 from shm.pipeline.calibrating import options_of
+from shm.pipeline.lineage import update_terms
 from shm.pipeline.naming import adopted_name
-from shm.pipeline.terms import update_terms
 from shm.store import Adoption, Baseline, Store, StoredAdoption, StoredSelection, Workspace
 from shm.values import Hanger
 from shm.values.diagnosis import joined

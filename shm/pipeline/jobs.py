@@ -13,9 +13,9 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.judging import judge
-from shm.pipeline.parcel import Opens, Parcel
+from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
-from shm.pipeline.terms import Taught, identify_lineage, update_terms
+from shm.pipeline.remote_file import Opens, Parcel
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (

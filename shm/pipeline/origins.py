@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 
-from shm.pipeline.terms import identify_settings
+from shm.pipeline.lineage import identify_settings
 from shm.settings import TABLE, Settings
 from shm.store import Store, StoredTest
 

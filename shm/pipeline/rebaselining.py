@@ -15,7 +15,7 @@ from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
 from shm.pipeline.calibrating import options_of
-from shm.pipeline.terms import update_terms
+from shm.pipeline.lineage import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
 from shm.values import Change, Hanger
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from datetime import datetime
 
 from shm.pipeline.jobs import Jobs
+from shm.pipeline.lineage import identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
-from shm.pipeline.terms import identify_lineage, update_terms
 from shm.store import Store, Workspace
 
 

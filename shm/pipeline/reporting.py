@@ -11,20 +11,20 @@ from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import stored_pattern
+from shm.pipeline.lineage import identify_lineage, read_limits
 from shm.pipeline.origins import IDENTIFY_SETTINGS, settings_words, test_lineage
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
-from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
-from shm.read.apart import read_test
+from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, TestSheet, trend_row_of
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
+from shm.watch.alert_text import watch_words
 from shm.watch.neighbours import BridgePattern
-from shm.watch.wording import watch_words
 
 
 def hanger_report(

@@ -36,10 +36,10 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
+from shm.watch.alert_text import message_of, short_name, suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
-from shm.watch.wording import message_of, short_name, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""

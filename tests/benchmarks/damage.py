@@ -30,7 +30,7 @@ from shm.errors import ShmError
 from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
-from shm_daemon.bell import Bell
+from shm_daemon.wakeup import Bell
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest, threads

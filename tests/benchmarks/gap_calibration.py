@@ -38,13 +38,13 @@ from shm.bridge import load_hanger
 from shm.errors import ShmError
 from shm.gap.attribution import Attribution, second_cause
 from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, Share
-from shm.gap.chances import log_prior
 from shm.gap.contract import Fit, GapOptions
-from shm.gap.laws import allowances, by_its_laws
+from shm.gap.data_checks import usable
+from shm.gap.law_error import allowances, by_its_laws
+from shm.gap.model_probabilities import log_prior
 from shm.gap.observations import observed
+from shm.gap.outlier_removal import Cleared, cleared
 from shm.gap.problem import GapProblem
-from shm.gap.remarks import usable
-from shm.gap.setting_aside import Cleared, cleared
 from shm.modes_document import load_modes
 from shm.values import TrueCase
 

@@ -32,8 +32,8 @@ from shm.modes_document import modes_document
 from shm.resources import one_thread_a_process
 from shm.store import Stage, Workspace
 from shm.values import Alert, ModalTest, Mode
-from shm_daemon.bell import Bell
 from shm_daemon.loop import run
+from shm_daemon.wakeup import Bell
 from tests.helpers.flows import Clock
 from tests.helpers.footprint import Trend, descendants, open_files, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put

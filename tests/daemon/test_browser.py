@@ -22,7 +22,7 @@ from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
 from shm_daemon.web.address_of_test import test_page as page_of
-from shm_daemon.web.working_out import Workshop
+from shm_daemon.web.background_work import Workshop
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest

@@ -18,8 +18,8 @@ from shm.report.contents import Status, status
 from shm.report.hanger_summary import summary
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace
+from shm_daemon.web.background_work import Order, Workshop
 from shm_daemon.web.hanger_figures import FIGURES
-from shm_daemon.web.working_out import Order, Workshop
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_loss, write_test

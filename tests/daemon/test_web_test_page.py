@@ -26,8 +26,8 @@ from shm.store import Stage, Workspace
 from shm_daemon.web.address_of_test import name_in
 from shm_daemon.web.address_of_test import test_json as document_of
 from shm_daemon.web.address_of_test import test_page as page_of
+from shm_daemon.web.background_work import Workshop
 from shm_daemon.web.figures_of_test import FIGURES, FROM_RECORDS
-from shm_daemon.web.working_out import Workshop
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
-from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis
+from shm.gap.model_probabilities import Tried
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
 

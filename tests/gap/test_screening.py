@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shm.gap.chances import Tried
 from shm.gap.contract import Hypothesis
 from shm.gap.hypotheses import varied
+from shm.gap.model_probabilities import Tried
 from shm.models.effects import Variant
 
 

@@ -17,8 +17,8 @@ from shm.report.contents import HangerLine, Status
 from shm.report.intervals import Interval
 from shm.values import NAN, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
+from shm_daemon.web.background_work import workshop_of
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import workshop_of
 
 QUICKLY_COMPARED = 24
 """So many hangers are compared while a page waits."""

@@ -23,7 +23,7 @@ from shm.store import (
     Workspace,
 )
 from shm.values import Hanger
-from shm_daemon.web.working_out import Workshop
+from shm_daemon.web.background_work import Workshop
 
 _BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
 

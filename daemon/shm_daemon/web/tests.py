@@ -19,12 +19,12 @@ from shm.report.quality_table import overall
 from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import name_in
+from shm_daemon.web.background_work import RETRY_AFTER, workshop_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
 from shm_daemon.web.origin_of_test import formers_of, steps_of
 from shm_daemon.web.view_of_test import AT_WORK, TestView, as_bytes
-from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 
 class Waiting(BaseModel):

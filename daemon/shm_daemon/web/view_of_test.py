@@ -17,17 +17,17 @@ import numpy as np
 
 from shm.errors import NothingThere
 from shm.identify import Identification, Poles
+from shm.pipeline.lineage import identify_lineage
 from shm.pipeline.reporting import test_sheet
-from shm.pipeline.terms import identify_lineage
 from shm.report.contents import TestSheet
 from shm.report.figures.sheet_spectra import Shown, Spectrum
 from shm.report.paper import Table
 from shm.report.sheet_report import advice, conditions, dropped, hits, summary, trust
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
+from shm_daemon.web.background_work import Workshop
 from shm_daemon.web.figures_of_test import FROM_RECORDS, MEMBERS, TestFigure
 from shm_daemon.web.hangers import described
-from shm_daemon.web.working_out import Workshop
 
 AT_WORK = "The raw file is being identified once more; this comes in some seconds."
 

@@ -28,9 +28,9 @@ from shm.values import (
 )
 from shm.watch.options import WatchOptions
 from shm.watch.sequential.bank import KINDS, RAMP, Bank, first_bank, read
-from shm.watch.sequential.conclusions import Subject, changed, drifted, probability_of_change
 from shm.watch.sequential.design import Design, Warmth, directions_of, measurement_of, years_between
 from shm.watch.sequential.filtering import Filters
+from shm.watch.sequential.posterior_summary import Subject, changed, drifted, probability_of_change
 from shm.watch.sequential.state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.

@@ -25,6 +25,7 @@ from shm.values.force_units import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import test_page
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.bridge_view import (
     QUICKLY_COMPARED,
     BridgeGlance,
@@ -36,7 +37,6 @@ from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import BridgeState, Moved, Underway
-from shm_daemon.web.working_out import RETRY_AFTER
 
 router = APIRouter(tags=["state"])
 

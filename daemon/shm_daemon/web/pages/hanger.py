@@ -20,6 +20,7 @@ from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.background_work import workshop_of
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
 from shm_daemon.web.hanger_tests import headings, lines_before
@@ -27,7 +28,6 @@ from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.working_out import workshop_of
 
 router = APIRouter(include_in_schema=False)
 

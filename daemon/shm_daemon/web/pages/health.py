@@ -25,6 +25,7 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.background_work import RETRY_AFTER, workshop_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
@@ -32,7 +33,6 @@ from shm_daemon.web.health import troubles
 from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import Examination, Operation, Underway
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 router = APIRouter(tags=["operation"])
 

@@ -21,12 +21,12 @@ from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address_of_test import test_json, test_page
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.figures_of_test import TestFigure
 from shm_daemon.web.frame import page
 from shm_daemon.web.origin_of_test import origin, steps, superseded
 from shm_daemon.web.tests import MOST_RESPONSES, View
 from shm_daemon.web.view_of_test import AT_WORK, TestView
-from shm_daemon.web.working_out import RETRY_AFTER
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
