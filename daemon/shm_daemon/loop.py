@@ -28,7 +28,7 @@ from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
-from shm_daemon.wakeup import SPOOL, Bell, rung_by_changes, stopped_by_signals
+from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0
@@ -43,7 +43,7 @@ def run(
     workspace: Workspace,
     *,
     clock: Clock = utc_now,
-    bell: Bell | None = None,
+    bell: Wakeup | None = None,
     once: bool = False,
     standby: bool = False,
     make_executor: Callable[[Settings], Executor] = executor_of,
@@ -55,7 +55,7 @@ def run(
     ended; else that raises StoreBusy. Raises SchemaOutdated and other errors of the store that
     waiting cannot mend.
     """
-    bell = bell or Bell()
+    bell = bell or Wakeup()
     patience = Patience(bell, standby)
     with stopped_by_signals(bell), last_words():
         while not bell.stopped:
@@ -86,7 +86,7 @@ def last_words() -> Iterator[None]:
 class Patience:
     """Waits for a store that is another's, or whose server does not answer, and says so once."""
 
-    def __init__(self, bell: Bell, standby: bool):
+    def __init__(self, bell: Wakeup, standby: bool):
         self._bell, self._standby, self._said = bell, standby, ""
 
     def __call__(self, error: StoreError) -> bool:
@@ -105,7 +105,7 @@ def _begin(
     stack: ExitStack,
     workspace: Workspace,
     lock: ActiveLock,
-    bell: Bell,
+    bell: Wakeup,
     clock: Clock,
     make_executor: Callable[[Settings], Executor],
     notifier: Notifier | None,
@@ -143,7 +143,7 @@ class Daemon:
     def __init__(
         self,
         flow: Flow,
-        bell: Bell,
+        bell: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],

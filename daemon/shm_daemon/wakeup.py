@@ -20,7 +20,7 @@ _CHANGES = ("created", "modified", "moved", "closed")
 log = logging.getLogger(__name__)
 
 
-class Bell:
+class Wakeup:
     """May be rung from any thread and from signal handlers; one thread listens."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class Bell:
 
 
 @contextmanager
-def stopped_by_signals(bell: Bell) -> Iterator[None]:
+def stopped_by_signals(bell: Wakeup) -> Iterator[None]:
     """SIGTERM and SIGINT stop the bell's listener; in other threads than the main one, nothing."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -66,7 +66,7 @@ def stopped_by_signals(bell: Bell) -> Iterator[None]:
 
 
 class _Hints(FileSystemEventHandler):
-    def __init__(self, bell: Bell):
+    def __init__(self, bell: Wakeup):
         self._bell = bell
 
     def on_any_event(self, event: FileSystemEvent) -> None:
@@ -76,7 +76,7 @@ class _Hints(FileSystemEventHandler):
 
 
 @contextmanager
-def rung_by_changes(bell: Bell, folder: Path) -> Iterator[None]:
+def rung_by_changes(bell: Wakeup, folder: Path) -> Iterator[None]:
     """Changes in a folder ring the bell where the file system tells; scanning finds them too."""
     observer = Observer()
     try:

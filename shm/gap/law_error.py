@@ -53,14 +53,14 @@ class ByLaws:
     """A fit with effects whose laws may be off.
 
     `gain` is what its log evidence gains, never less than the log of the prior probability that the
-    laws are exact; `passing` is the gain if it is something unknown that passes for the effects.
+    laws are exact; `mimic` is the gain if it is something unknown that passes for the effects.
     `fit` is that with the likeliest allowance where the data show that the laws are off. `draws`
     (n, d) are of the posterior by all allowances. `log_evidences` (1 + allowances,) are of exact
     laws and of each allowance.
     """
 
     gain: float
-    passing: float
+    mimic: float
     fit: Fit
     draws: FloatArray
     log_evidences: FloatArray
@@ -82,11 +82,11 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
     ways = [(exactly(fit.hypothesis), exact), *off]
     evidence = np.array([each.log_evidence for _, each in ways])
     with np.errstate(divide="ignore"):  # a share may be 0
-        weight, passing = np.log([share for share, _ in ways]).T + evidence
+        weight, mimic = np.log([share for share, _ in ways]).T + evidence
     draws = [_scattered(about, each, rng) for _, each in off]
     return ByLaws(
         gain=float(logsumexp(weight) - exact.log_evidence),
-        passing=float(logsumexp(passing) - exact.log_evidence),
+        mimic=float(logsumexp(mimic) - exact.log_evidence),
         fit=about,
         draws=mixed([fit.draws, *draws], normalised(weight), rng),
         log_evidences=evidence,

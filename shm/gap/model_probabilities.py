@@ -10,8 +10,8 @@ places (Scott and Berger, Ann. Stat. 38, 2010); its evidence is the mean over th
 p-value) is what the evidence does not hold: whether even the likeliest explanation fits
 (`probabilities`). What a hypothesis is in truth, P(cause | h), trials have taught
 (`calibration.toml`): a pair with a minor second cause is for the most part one cause with an error
-of its law (`without_faint` in `shm.gap.attribution`), and a free remainder sometimes a cause that
-was not found (`missed`); every other h is what its name says.
+of its law (`without_minor_cause` in `shm.gap.attribution`), and a free remainder sometimes a cause
+that was not found (`undetected_share`); every other h is what its name says.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ _SENSORS = "sensor_misalignment"
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class ScoredHypothesis:
     """A hypothesis with its evidence; `fit` is None where screening was enough.
 
-    `log_passing` is the log evidence of something unknown that passes for its effects, None where
+    `log_mimic` is the log evidence of something unknown that passes for its effects, None where
     their laws were not looked at. `draws` (n, d) are of the posterior by all laws.
     `log_fit` is the log likelihood at its best, less what the baseline's own parameters and the
     bar's deviations pay there for lying off their priors: a baseline that fits by an unlikely bar
@@ -65,7 +65,7 @@ class Tried:
     log_evidence: float
     log_fit: float
     fit: Fit | None = None
-    log_passing: float | None = None
+    log_mimic: float | None = None
     draws: FloatArray | None = None
 
     @property
@@ -80,7 +80,7 @@ class Tried:
         return self.fit.method if self.fit is not None else "screened"
 
     @classmethod
-    def fitted(cls, fit: Fit, common: int) -> Tried:
+    def fitted(cls, fit: Fit, common: int) -> ScoredHypothesis:
         """Of a fit whose first `common` parameters are those of the baseline and the bar."""
         unlikely = float(np.sum(fit.z[:common] ** 2)) / 2
         return cls(fit.hypothesis, fit.log_evidence, fit.log_fit - unlikely, fit)
@@ -90,19 +90,19 @@ class Tried:
 class Family:
     """What was tried of one effect, or one pair, wherever it may act, the best first.
 
-    `log_passing` is the log evidence of something unknown that passes for it, `passing_odds` the
+    `log_mimic` is the log evidence of something unknown that passes for it, `mimic_odds` the
     odds of that against the family itself, before any data.
     """
 
     name: str
-    tried: tuple[Tried, ...]
+    tried: tuple[ScoredHypothesis, ...]
     log_evidence: float
-    log_passing: float
+    log_mimic: float
     log_prior: float
-    passing_odds: float
+    mimic_odds: float
 
     @property
-    def best(self) -> Tried:
+    def best(self) -> ScoredHypothesis:
         return self.tried[0]
 
     @property
@@ -114,13 +114,13 @@ class Family:
         return len(self.best.hypothesis.effects)
 
 
-def families(tried: Sequence[Tried], variants: dict[str, int]) -> tuple[Family, ...]:
+def families(tried: Sequence[ScoredHypothesis], variants: dict[str, int]) -> tuple[Family, ...]:
     """The families of what was tried, each with its prior, the likeliest first.
 
     `variants` says how many variants each effect has; those of a pair that were not tried count as
     if they had no evidence, and so does a pair that was not tried at all.
     """
-    kinds: dict[tuple[tuple[str, ...], bool], list[Tried]] = {}
+    kinds: dict[tuple[tuple[str, ...], bool], list[ScoredHypothesis]] = {}
     for each in tried:
         names = tuple(sorted(name for name, _ in each.hypothesis.effects))
         kinds.setdefault((names, each.hypothesis.flexible), []).append(each)
@@ -135,16 +135,16 @@ def probabilities(candidates: Sequence[Family], p_value: float = 1.0) -> tuple[F
     that errs in its law may be given what it does not explain, while the flexible remainder pays
     for every form that it could take, so of a bad fit the evidence alone says too little.
     """
-    evidence, passing, prior, odds = (
+    evidence, mimic, prior, odds = (
         np.array([getattr(each, name) for each in candidates])
-        for name in ("log_evidence", "log_passing", "log_prior", "passing_odds")
+        for name in ("log_evidence", "log_mimic", "log_prior", "mimic_odds")
     )
     bad = misfit_odds(p_value)
     mimics = CALIBRATION.mimics_one + CALIBRATION.mimics_two
     kept = np.array([bad * (1 - mimics) if each.flexible else 1.0 for each in candidates])
     top = float((evidence + prior).max())
     weight = kept * np.exp(evidence + prior - top)
-    unknown = bad * float(np.sum(odds * np.exp(passing + prior - top)))
+    unknown = bad * float(np.sum(odds * np.exp(mimic + prior - top)))
     whole = weight.sum() + unknown
     return np.asarray(weight / whole), unknown / whole
 
@@ -159,7 +159,7 @@ def misfit_odds(p_value: float) -> float:
     return max(1.0, -1 / (np.e * p * np.log(p))) if p < 1 / np.e else 1.0
 
 
-def missed(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
+def undetected_share(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
     """Chances (families,) by which a remainder rules out no cause beyond what may be missed.
 
     Of what the causes gain, each has its share by what speaks for it: it was tried near its best.
@@ -181,21 +181,21 @@ def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:
     return float(np.log(_prior(hypothesis, len(variants)) / shared))
 
 
-def _family(members: Sequence[Tried], variants: dict[str, int]) -> Family:
+def _family(members: Sequence[ScoredHypothesis], variants: dict[str, int]) -> Family:
     ordered = tuple(sorted(members, key=lambda each: -each.log_evidence))
     hypothesis = ordered[0].hypothesis
     possible = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
     evidence = [each.log_evidence for each in ordered]
-    passing = [e.log_evidence if e.log_passing is None else e.log_passing for e in ordered]
-    log_evidence, log_passing = (
-        float(logsumexp(each) - np.log(possible)) for each in (evidence, passing)
+    mimic = [e.log_evidence if e.log_mimic is None else e.log_mimic for e in ordered]
+    log_evidence, log_mimic = (
+        float(logsumexp(each) - np.log(possible)) for each in (evidence, mimic)
     )
     log_prior = float(np.log(_prior(hypothesis, len(variants))))
-    odds = _passing_odds(hypothesis, variants)
-    return Family(hypothesis.name, ordered, log_evidence, log_passing, log_prior, odds)
+    odds = _mimic_odds(hypothesis, variants)
+    return Family(hypothesis.name, ordered, log_evidence, log_mimic, log_prior, odds)
 
 
-def _passing_odds(hypothesis: Hypothesis, catalogue: Collection[str]) -> float:
+def _mimic_odds(hypothesis: Hypothesis, catalogue: Collection[str]) -> float:
     names = [name for name, _ in hypothesis.effects]
     if hypothesis.flexible or not names:
         return 0.0

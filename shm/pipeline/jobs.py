@@ -15,7 +15,7 @@ from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
-from shm.pipeline.remote_file import Opens, Parcel
+from shm.pipeline.remote_file import Opens, RemoteFile
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
@@ -167,7 +167,7 @@ class Jobs:
         settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
-            archive = Parcel.of(workspace.archive, recording.file, settings.max_file_bytes)
+            archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
         step = registered().identify
         run = partial(run_step, step, recording, archive, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))

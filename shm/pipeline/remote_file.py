@@ -22,7 +22,7 @@ class Opens(Protocol):
 
 
 @dataclass(frozen=True)
-class Parcel:
+class RemoteFile:
     """The bytes of a file and of its sidecar; None where the archive has none."""
 
     content: bytes | None = field(repr=False)

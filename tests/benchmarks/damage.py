@@ -30,7 +30,7 @@ from shm.errors import ShmError
 from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
-from shm_daemon.wakeup import Bell
+from shm_daemon.wakeup import Wakeup
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest, threads
@@ -84,7 +84,7 @@ def is_found(workspace: Workspace) -> bool:
 
 def lives(workspace: Workspace) -> bool:
     """Whether the daemon takes several turns without ending, a new file in its spool."""
-    bell, turns = Bell(), 0
+    bell, turns = Wakeup(), 0
     write_test(workspace.spool / "new.modes.json", workspace, day=120, tension=0.8)
     waited = bell.wait
 

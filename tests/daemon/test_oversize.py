@@ -15,7 +15,7 @@ import pytest
 from shm.errors import TooLarge
 from shm.pipeline.intake import receive
 from shm.store import Archive, Stage, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import START, make_workspace, put, write_test
@@ -36,7 +36,7 @@ def on_disk(folder: Path) -> int:
 
 def serve_for(workspace: Workspace, seconds: float, done: threading.Event | None = None) -> float:
     """Runs a daemon for a while; the longest time between two signs of it."""
-    bell, heart, seen = Bell(), workspace.folder / HEARTBEAT, [time.time()]
+    bell, heart, seen = Wakeup(), workspace.folder / HEARTBEAT, [time.time()]
     daemon = threading.Thread(
         target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": threads}
     )

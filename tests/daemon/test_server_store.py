@@ -11,7 +11,7 @@ import pytest
 
 from shm.pipeline import steps
 from shm.store import Stage, Store, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
 from tests.helpers.flows import threads
 from tests.helpers.postgres import Databases
@@ -33,7 +33,7 @@ def served(
     for verb in ("update", "refresh", "select"):
         monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
     monkeypatch.setenv("SHM_STORE", url.replace("postgres@", "postgres:hush@"))
-    workspace, bell = make_workspace(tmp_path / "bridge"), Bell()
+    workspace, bell = make_workspace(tmp_path / "bridge"), Wakeup()
     options = {"bell": bell, "make_executor": threads}
     daemon = threading.Thread(target=run, args=(workspace,), kwargs=options)
     daemon.start()

@@ -15,7 +15,7 @@ import pytest
 from shm.errors import UsageError
 from shm.resources import service_unit
 from shm.store import Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
 from shm_daemon.unit import unit_text
 from tests.helpers.flows import threads
@@ -98,7 +98,7 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
     """Though it scans its spool once an hour, it gives a sign thrice in the watchdog's time."""
     monkeypatch.setenv("WATCHDOG_USEC", "600000")
     workspace = make_workspace(tmp_path / "bridge", settings={"spool_scan_seconds": 3600.0})
-    bell = Bell()
+    bell = Wakeup()
     thread = threading.Thread(
         target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": threads}
     )
@@ -116,7 +116,7 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
 
 def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socket) -> None:
     workspace = make_workspace(tmp_path / "bridge")
-    bell = Bell()
+    bell = Wakeup()
     with workspace.lock():
         thread = threading.Thread(
             target=run,

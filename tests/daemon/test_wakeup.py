@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from watchdog.observers import Observer
 
-from shm_daemon.wakeup import SPOOL, Bell, rung_by_changes, stopped_by_signals
+from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 
 
 def test_a_ring_before_the_wait_is_heard() -> None:
-    bell = Bell()
+    bell = Wakeup()
     bell.ring("one")
     bell.ring("two")
     assert bell.wait(10) == {"one", "two"}
@@ -23,14 +23,14 @@ def test_a_ring_before_the_wait_is_heard() -> None:
 
 
 def test_a_ring_ends_the_wait() -> None:
-    bell = Bell()
+    bell = Wakeup()
     threading.Timer(0.05, bell.ring, ["now"]).start()
     assert bell.wait(10) == {"now"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signals_stop_the_listener_and_only_within_the_context(number: int) -> None:
-    bell, before = Bell(), signal.getsignal(number)
+    bell, before = Wakeup(), signal.getsignal(number)
     with stopped_by_signals(bell):
         os.kill(os.getpid(), number)
         bell.wait(10)
@@ -43,7 +43,7 @@ def test_in_another_thread_signals_are_left_alone() -> None:
 
     def run() -> None:
         try:
-            with stopped_by_signals(Bell()):
+            with stopped_by_signals(Wakeup()):
                 pass
         except ValueError as error:
             errors.append(error)
@@ -55,7 +55,7 @@ def test_in_another_thread_signals_are_left_alone() -> None:
 
 
 def test_a_change_in_the_folder_rings(tmp_path: Path) -> None:
-    bell = Bell()
+    bell = Wakeup()
     (tmp_path / "sub").mkdir()
     with rung_by_changes(bell, tmp_path):
         (tmp_path / "sub" / "h3.csv").write_text("x")
@@ -64,7 +64,7 @@ def test_a_change_in_the_folder_rings(tmp_path: Path) -> None:
 
 def test_looking_does_not_ring(tmp_path: Path) -> None:
     """Else the daemon would wake itself for ever."""
-    bell = Bell()
+    bell = Wakeup()
     (tmp_path / "h3.csv").write_text("x")
     with rung_by_changes(bell, tmp_path):
         list(tmp_path.iterdir())
@@ -80,6 +80,6 @@ def test_without_hints_the_daemon_goes_on(
 
     monkeypatch.setattr(Observer, "start", refuse)
     began = time.monotonic()
-    with rung_by_changes(Bell(), tmp_path):
+    with rung_by_changes(Wakeup(), tmp_path):
         assert time.monotonic() - began < 5
     assert "inotify watch limit" in caplog.text

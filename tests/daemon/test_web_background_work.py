@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm_daemon.web.background_work import Workshop
+from shm_daemon.web.background_work import BackgroundWorker
 from tests.helpers.web_servers import a_thread
 
 _MADE: list[str] = []
@@ -57,10 +57,10 @@ def a_process(workers: int) -> ProcessPoolExecutor:
 
 
 @pytest.fixture
-def workshop() -> Iterator[Workshop[Text]]:
+def workshop() -> Iterator[BackgroundWorker[Text]]:
     _MADE.clear()
     _LET_GO.clear()
-    workshop: Workshop[Text] = Workshop(longest_s=5.0, pool=a_thread)
+    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=5.0, pool=a_thread)
     yield workshop
     _LET_GO.set()
     workshop.close()
@@ -74,7 +74,7 @@ def until(found: Callable[[], Text | None]) -> Text:
     raise AssertionError("nothing came")
 
 
-def test_an_order_is_made_once_and_kept(workshop: Workshop[Text]) -> None:
+def test_an_order_is_made_once_and_kept(workshop: BackgroundWorker[Text]) -> None:
     order = Order("one", "slow")
     assert workshop.kept(order) is None
     assert [workshop.wanted(order) for _ in range(5)] == [None] * 5
@@ -84,7 +84,9 @@ def test_an_order_is_made_once_and_kept(workshop: Workshop[Text]) -> None:
     assert _MADE == ["one"]
 
 
-def test_orders_are_made_one_at_a_time_and_only_a_few_wait(workshop: Workshop[Text]) -> None:
+def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
+    workshop: BackgroundWorker[Text],
+) -> None:
     orders = [Order(str(number), "slow") for number in range(20)]
     assert [workshop.wanted(order) for order in orders] == [None] * 20
     time.sleep(0.1)
@@ -95,7 +97,7 @@ def test_orders_are_made_one_at_a_time_and_only_a_few_wait(workshop: Workshop[Te
     assert until(lambda: workshop.wanted(orders[19])) == Text("19")
 
 
-def test_what_fails_says_why_and_stops_nothing_else(workshop: Workshop[Text]) -> None:
+def test_what_fails_says_why_and_stops_nothing_else(workshop: BackgroundWorker[Text]) -> None:
     for how, told in (("refused", "is no word"), ("bug", "internal error")):
         order = Order("none", how)
         with pytest.raises(ShmError, match=told):
@@ -106,7 +108,7 @@ def test_what_fails_says_why_and_stops_nothing_else(workshop: Workshop[Text]) ->
     assert until(lambda: workshop.wanted(Order("some"))) == Text("some")
 
 
-def test_the_oldest_go_where_memory_runs_out(workshop: Workshop[Text]) -> None:
+def test_the_oldest_go_where_memory_runs_out(workshop: BackgroundWorker[Text]) -> None:
     orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
     for order in orders:
         until(lambda order=order: workshop.wanted(order))  # type: ignore[misc]
@@ -114,7 +116,7 @@ def test_the_oldest_go_where_memory_runs_out(workshop: Workshop[Text]) -> None:
 
 
 def test_what_takes_too_long_is_given_up() -> None:
-    workshop: Workshop[Text] = Workshop(longest_s=0.3, pool=a_thread)
+    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=0.3, pool=a_thread)
     _LET_GO.clear()
     try:
         with pytest.raises(ShmError, match=r"more than 0\.3 s"):
@@ -127,7 +129,7 @@ def test_what_takes_too_long_is_given_up() -> None:
 
 
 def test_a_process_that_dies_is_told_and_replaced() -> None:
-    workshop: Workshop[Text] = Workshop(longest_s=20.0, pool=a_process)
+    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
     try:
         with pytest.raises(ShmError, match="died"):
             until(lambda: workshop.wanted(Order("last words", "dies")))
@@ -137,7 +139,7 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
 
 
 def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
-    workshop: Workshop[Text] = Workshop(longest_s=20.0, pool=a_process)
+    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
     order = Order(str(tmp_path / "ended"), "dies once")
     try:
         assert until(lambda: workshop.wanted(order)) == Text(order.word)
@@ -146,7 +148,7 @@ def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Pat
 
 
 def test_closing_ends_the_work_at_once() -> None:
-    workshop: Workshop[Text] = Workshop(longest_s=60.0, pool=a_process)
+    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
     _LET_GO.clear()
     assert workshop.wanted(Order("endless", "slow")) is None
     time.sleep(0.2)

@@ -70,8 +70,8 @@ def test_an_exact_law_pays_little_for_the_allowance() -> None:
 def test_what_is_exactly_an_effect_hardly_is_something_unknown_that_passes_for_it() -> None:
     exact, *_ = _by_laws("section_loss", False)
     wrong, *_ = _by_laws("point_mass", True)
-    assert exact.passing < exact.gain - 0.5
-    assert wrong.passing > wrong.gain + 0.5
+    assert exact.mimic < exact.gain - 0.5
+    assert wrong.mimic > wrong.gain + 0.5
 
 
 def test_another_effect_is_not_excused_by_its_laws() -> None:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import without_faint
+from shm.gap.attribution import without_minor_cause
 from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.model_probabilities import Tried, families
+from shm.gap.model_probabilities import ScoredHypothesis, families
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import Variant
@@ -38,12 +38,12 @@ def chances_of(second: PlantedEffect, variant: Variant, fit_first: bool = True) 
     baseline = baseline_fit(problem, rng)
     clamp, other = ("point_mass", Variant()), (second.name, variant)
     fits = [fitted(problem, Hypothesis(effects), rng) for effects in ((clamp,), (clamp, other))]
-    tried = [Tried.fitted(fit, len(baseline.z)) for fit in (baseline, *fits)]
+    tried = [ScoredHypothesis.fitted(fit, len(baseline.z)) for fit in (baseline, *fits)]
     if not fit_first:
         tried[1] = replace(tried[1], fit=None)
     kinds = families(tried, {"point_mass": 1, second.name: 1})
     before = np.array([0.9 if kind.effects == 2 else 0.05 for kind in kinds])
-    after = without_faint(problem, baseline, kinds, before)
+    after = without_minor_cause(problem, baseline, kinds, before)
     assert after.sum() == pytest.approx(before.sum())
     return {kind.name: float(chance) for kind, chance in zip(kinds, after, strict=True)}
 

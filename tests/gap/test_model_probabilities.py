@@ -13,12 +13,12 @@ from shm.gap.model_probabilities import (
     NO_GAP,
     SINGLE,
     UNKNOWN,
-    Tried,
+    ScoredHypothesis,
     families,
     log_prior,
     misfit_odds,
-    missed,
     probabilities,
+    undetected_share,
 )
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
@@ -26,15 +26,15 @@ from tests.gap import linear_toy as toy
 
 def _tried(
     log_evidence: float, *names: str, at: str = "everywhere", flexible: bool = False
-) -> Tried:
+) -> ScoredHypothesis:
     effects = tuple((name, Variant(at)) for name in names)
-    return Tried(Hypothesis(effects, flexible), log_evidence, 0.0)
+    return ScoredHypothesis(Hypothesis(effects, flexible), log_evidence, 0.0)
 
 
 def test_probabilities_add_to_one() -> None:
     tried = [_tried(0.0), _tried(1.0, "a"), _tried(3.0, "b"), _tried(2.0, flexible=True)]
-    chances, passing = probabilities(families(tried, {"a": 1, "b": 1}))
-    assert chances.sum() + passing == pytest.approx(1.0)
+    chances, mimic = probabilities(families(tried, {"a": 1, "b": 1}))
+    assert chances.sum() + mimic == pytest.approx(1.0)
 
 
 def test_an_effect_does_not_gain_by_having_more_variants() -> None:
@@ -64,11 +64,9 @@ def test_with_evidence_for_nothing_the_priors_stand() -> None:
 
 def test_what_is_unknown_may_pass_for_an_effect() -> None:
     tried = [_tried(0.0), _tried(30.0, "a"), _tried(0.0, "b"), _tried(0.0, flexible=True)]
-    chances, passing = probabilities(families(tried, {"a": 1, "b": 1}))
-    assert chances.sum() + passing == pytest.approx(1.0)
-    assert passing / chances[0] == pytest.approx(
-        CALIBRATION.mimics_one * UNKNOWN / SINGLE, rel=1e-6
-    )
+    chances, mimic = probabilities(families(tried, {"a": 1, "b": 1}))
+    assert chances.sum() + mimic == pytest.approx(1.0)
+    assert mimic / chances[0] == pytest.approx(CALIBRATION.mimics_one * UNKNOWN / SINGLE, rel=1e-6)
 
 
 def test_a_pair_that_imitates_freely_is_claimed_less_surely() -> None:
@@ -84,8 +82,8 @@ def test_a_pair_that_imitates_freely_is_claimed_less_surely() -> None:
 def test_the_further_an_effect_is_off_its_law_the_likelier_something_unknown_passes_for_it() -> (
     None
 ):
-    off = [_tried(0.0), replace(_tried(30.0, "a"), log_passing=32.0)]
-    near = [_tried(0.0), replace(_tried(30.0, "a"), log_passing=29.0)]
+    off = [_tried(0.0), replace(_tried(30.0, "a"), log_mimic=32.0)]
+    near = [_tried(0.0), replace(_tried(30.0, "a"), log_mimic=29.0)]
     (_, far_off), (_, hardly_off) = (probabilities(families(t, {"a": 1})) for t in (off, near))
     assert far_off > 5 * hardly_off
 
@@ -110,8 +108,10 @@ def test_the_best_variant_comes_first() -> None:
 def test_a_baseline_that_fits_by_an_unlikely_bar_fits_less_well() -> None:
     own = toy.fit(np.zeros(toy.design().size), toy.tension())
     unlikely = replace(own, z=np.array([4.0]))
-    assert Tried.fitted(unlikely, 1).log_fit == pytest.approx(Tried.fitted(own, 1).log_fit - 8.0)
-    assert Tried.fitted(unlikely, 0).log_fit == pytest.approx(own.log_fit)
+    assert ScoredHypothesis.fitted(unlikely, 1).log_fit == pytest.approx(
+        ScoredHypothesis.fitted(own, 1).log_fit - 8.0
+    )
+    assert ScoredHypothesis.fitted(unlikely, 0).log_fit == pytest.approx(own.log_fit)
 
 
 def test_a_p_value_raises_the_odds_of_something_unknown_as_published() -> None:
@@ -126,24 +126,24 @@ def test_a_p_value_raises_the_odds_of_something_unknown_as_published() -> None:
 def test_of_a_bad_fit_something_unknown_gains_and_of_a_good_one_nothing_changes() -> None:
     tried = [_tried(0.0), _tried(9.0, "a"), _tried(8.0, "b"), _tried(7.0, flexible=True)]
     kinds = families(tried, {"a": 1, "b": 1})
-    before, passing = probabilities(kinds)
+    before, mimic = probabilities(kinds)
     same, passes = probabilities(kinds, 0.6)
-    assert (*same, passes) == pytest.approx((*before, passing))
+    assert (*same, passes) == pytest.approx((*before, mimic))
     after, passes = probabilities(kinds, 0.001)
     assert after.sum() + passes == pytest.approx(1.0)
     a, unknown = (next(i for i, k in enumerate(kinds) if k.name == n and k.flexible == f)
                   for n, f in (("a", False), ("", True)))  # fmt: skip
     odds = misfit_odds(0.001)
     assert after[unknown] / after[a] == pytest.approx(odds * before[unknown] / before[a])
-    assert passes / after[a] == pytest.approx(odds * passing / before[a])
+    assert passes / after[a] == pytest.approx(odds * mimic / before[a])
 
 
 def test_of_what_is_unexplained_a_part_is_a_cause_that_was_missed() -> None:
     tried = [_tried(0.0), _tried(900.0, "a"), _tried(897.0, "b"), _tried(2000.0, flexible=True)]
     kinds = families(tried, {"a": 1, "b": 1})
-    chances, passing = probabilities(kinds)
-    told = missed(kinds, chances)
-    assert told.sum() + passing == pytest.approx(1.0)
+    chances, mimic = probabilities(kinds)
+    told = undetected_share(kinds, chances)
+    assert told.sum() + mimic == pytest.approx(1.0)
     by_name = {(k.name, k.flexible): c for k, c in zip(kinds, told, strict=True)}
     assert by_name["", True] == pytest.approx(1 - CALIBRATION.undetected_share)
     assert by_name["a", False] / by_name["b", False] == pytest.approx(np.exp(3.0))
@@ -153,4 +153,4 @@ def test_of_what_is_unexplained_a_part_is_a_cause_that_was_missed() -> None:
 def test_a_cause_that_a_remainder_does_not_rule_out_was_not_missed() -> None:
     kinds = families([_tried(9.0), _tried(30.0, "a"), _tried(31.0, flexible=True)], {"a": 1})
     chances, _ = probabilities(kinds)
-    assert missed(kinds, chances) is chances
+    assert undetected_share(kinds, chances) is chances

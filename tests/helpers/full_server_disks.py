@@ -15,7 +15,7 @@ import pytest
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
 from shm.store.tables import metadata
-from shm_daemon import Bell, loop
+from shm_daemon import Wakeup, loop
 from tests.helpers.contents import quiet
 from tests.helpers.feeds import Feed, assert_all_done_once
 from tests.helpers.flows import Postman, threads
@@ -76,7 +76,7 @@ def writes(databases: Databases, url: str) -> int:
 
 def ingest_meanwhile(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """A daemon until all is done; what it waits passes quickly."""
-    began, bell = time.monotonic(), Bell()
+    began, bell = time.monotonic(), Wakeup()
     quick = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))
     wait: Any = bell.wait
     with monkeypatch.context() as patched:

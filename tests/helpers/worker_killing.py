@@ -13,7 +13,7 @@ from pathlib import Path
 from shm.pipeline import steps
 from shm.settings import Settings
 from shm.store import Stage, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.execution import Workers
 from tests.helpers import quick_update
 from tests.helpers.workspaces import write_test
@@ -49,7 +49,7 @@ def kill_workers(
         write_test(workspace.spool / f"t{number:04}.modes.json", workspace, day=number / 10)
     busy = workspace.folder / "busy"
     busy.mkdir()
-    bell, end, struck = Bell(), time.monotonic() + most_s, 0
+    bell, end, struck = Wakeup(), time.monotonic() + most_s, 0
 
     def make(settings: Settings) -> Workers:
         return Workers(settings.workers, partial(prepare_worker, busy))

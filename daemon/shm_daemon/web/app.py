@@ -16,7 +16,7 @@ from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm_daemon.web import alerts, hanger_numbers, hangers, recordings, signing_in, tests, watching
 from shm_daemon.web.access import Reader
-from shm_daemon.web.background_work import Workshop
+from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
 from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
@@ -46,7 +46,7 @@ def load_pages(site: Site) -> Pages:
         redoc_url=None,
     )
     app.state.site = site
-    app.state.workshop = Workshop()
+    app.state.workshop = BackgroundWorker()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (

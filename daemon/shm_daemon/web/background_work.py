@@ -61,7 +61,7 @@ class _Failure:
     at_s: float
 
 
-class Workshop(Generic[Made]):
+class BackgroundWorker(Generic[Made]):
     """Makes what is ordered and keeps it. May be used from many threads."""
 
     def __init__(
@@ -204,10 +204,10 @@ class Workshop(Generic[Made]):
             self._failures = {**fresh, order: _Failure(error, now)}
 
 
-def workshop_of(request: Request) -> Workshop[Any]:
+def background_worker_of(request: Request) -> BackgroundWorker[Any]:
     """The workshop of the app, for all that is ordered there."""
     workshop = request.app.state.workshop
-    assert isinstance(workshop, Workshop)
+    assert isinstance(workshop, BackgroundWorker)
     return workshop
 
 

@@ -23,7 +23,7 @@ from shm.store import (
     Workspace,
 )
 from shm.values import Hanger
-from shm_daemon.web.background_work import Workshop
+from shm_daemon.web.background_work import BackgroundWorker
 
 _BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
 
@@ -66,7 +66,9 @@ class StatesOrder:
 class HangerView:
     """One hanger as it stands in the store; what is asked for twice is read once."""
 
-    def __init__(self, workspace: Workspace, store: Store, hanger: Hanger, workshop: Workshop[Any]):
+    def __init__(
+        self, workspace: Workspace, store: Store, hanger: Hanger, workshop: BackgroundWorker[Any]
+    ):
         self.workspace, self.store, self.hanger = workspace, store, hanger
         self._workshop = workshop
 

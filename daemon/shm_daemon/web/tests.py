@@ -19,7 +19,7 @@ from shm.report.quality_table import overall
 from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address_of_test import name_in
-from shm_daemon.web.background_work import RETRY_AFTER, workshop_of
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
@@ -162,7 +162,7 @@ Point = Annotated[
 
 def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    workshop = workshop_of(request)
+    workshop = background_worker_of(request)
     return TestView.of(site.workspace, site.store, workshop, hanger_id, name_in(test))
 
 

@@ -25,7 +25,7 @@ from shm.report.paper import Table
 from shm.report.sheet_report import advice, conditions, dropped, hits, summary, trust
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
-from shm_daemon.web.background_work import Workshop
+from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.figures_of_test import FROM_RECORDS, MEMBERS, TestFigure
 from shm_daemon.web.hangers import described
 
@@ -51,13 +51,18 @@ class TestView:
 
     workspace: Workspace
     store: Store
-    workshop: Workshop[WorkedOut]
+    workshop: BackgroundWorker[WorkedOut]
     stored: StoredTest
     recording: StoredRecording
 
     @classmethod
     def of(
-        cls, workspace: Workspace, store: Store, workshop: Workshop[Any], hanger_id: int, name: str
+        cls,
+        workspace: Workspace,
+        store: Store,
+        workshop: BackgroundWorker[Any],
+        hanger_id: int,
+        name: str,
     ) -> TestView:
         """Raises NothingThere for a hanger or a test that is none."""
         stored = store.tests.named(described(workspace, hanger_id).id, name)

@@ -25,7 +25,7 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.background_work import RETRY_AFTER, workshop_of
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
@@ -228,7 +228,7 @@ def _examination(request: Request, site: Site) -> Table | None:
 def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
     order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
     try:
-        found = workshop_of(request).wanted(order)
+        found = background_worker_of(request).wanted(order)
     except ShmError as error:
         return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
     return None if found is None else found.findings
