@@ -37,8 +37,8 @@ from shm_cli.common import (
     told_doubts,
 )
 from shm_cli.effects import effects
+from shm_cli.parameter_types import NewFile
 from shm_cli.update import modes_argument
-from shm_cli.writable import NewFile
 
 _DEFAULT = GapOptions()
 

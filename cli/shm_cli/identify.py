@@ -34,7 +34,7 @@ from shm_cli.common import (
     show,
     told_doubts,
 )
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 _DEFAULT = Settings()
 

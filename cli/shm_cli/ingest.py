@@ -42,7 +42,7 @@ from shm_cli.held import (
     hold_document,
     show_held,
 )
-from shm_cli.record import Words
+from shm_cli.parameter_types import Words
 from shm_cli.reprocess import rerun_document, send_back
 from shm_cli.working import finish, working
 

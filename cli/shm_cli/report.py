@@ -23,7 +23,7 @@ from shm.report.paper import Paper
 from shm.report.period import Period, period_since
 from shm.report.sheet_report import sheet_json, sheet_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 

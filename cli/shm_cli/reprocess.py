@@ -8,7 +8,7 @@ import rich_click as click
 
 from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import utc_now
-from shm.pipeline.rebuilding import rebuild
+from shm.pipeline.jobs import rebuild
 from shm.store import Rerun, Stage, Store, Workspace
 from shm_cli.working import LEFT_TO_IT, finish, working
 

@@ -11,8 +11,13 @@ from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import stored_pattern
-from shm.pipeline.lineage import identify_lineage, read_limits
-from shm.pipeline.origins import IDENTIFY_SETTINGS, settings_words, test_lineage
+from shm.pipeline.lineage import (
+    IDENTIFY_SETTINGS,
+    identify_lineage,
+    read_limits,
+    settings_words,
+    test_lineage,
+)
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests

@@ -48,7 +48,6 @@ from shm.values.hanger import (
     Thresholds,
     Turnbuckle,
 )
-from shm.values.held import Doubt, Fingerprint, KnownSamples
 from shm.values.kinds import (
     NAN,
     PLANES,
@@ -84,7 +83,10 @@ from shm.values.posterior import (
 from shm.values.recording import (
     AddedMass,
     Channel,
+    Doubt,
+    Fingerprint,
     FrequencyResponse,
+    KnownSamples,
     Recording,
     ResponsePoint,
 )

@@ -33,7 +33,7 @@ from scipy.special import logsumexp
 from shm.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE, read_document
 from shm.blind.making import WAYS, make_trial
 from shm.blind.scoring.marks import LARGE
-from shm.blind.solving.case import identify_tests
+from shm.blind.solving import identify_tests
 from shm.bridge import load_hanger
 from shm.errors import ShmError
 from shm.gap.attribution import Attribution, second_cause

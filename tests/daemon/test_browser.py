@@ -21,7 +21,7 @@ from playwright.sync_api import Page, expect
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm_daemon.web.address_of_test import test_page as page_of
+from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon

@@ -15,9 +15,9 @@ import pytest
 from shm.errors import UsageError
 from shm.resources import service_unit
 from shm.store import Workspace
+from shm_cli.daemon import unit_text
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
-from shm_daemon.unit import unit_text
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import make_workspace
 

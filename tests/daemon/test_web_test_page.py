@@ -23,9 +23,9 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm_daemon.web.address_of_test import name_in
-from shm_daemon.web.address_of_test import test_json as document_of
-from shm_daemon.web.address_of_test import test_page as page_of
+from shm_daemon.web.address import name_in
+from shm_daemon.web.address import test_json as document_of
+from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.figures_of_test import FIGURES, FROM_RECORDS
 from tests.helpers.flows import ingest

@@ -18,7 +18,7 @@ from shm.errors import NothingThere
 from shm.report.quality_table import overall
 from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.address_of_test import name_in
+from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.figures_of_test import FIGURES

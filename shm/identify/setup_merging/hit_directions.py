@@ -25,7 +25,7 @@ import numpy as np
 from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.measuring.points import place_of
+from shm.identify.measuring.responses import place_of
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.setup_merging.joined import LARGEST_SHIFT, Joined, matched
 from shm.identify.setup_merging.modal_participation import levels, ringing

@@ -19,7 +19,7 @@ from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Pole
 from shm.identify.estimation.candidates import FAR
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.measuring.points import Place, place_of
+from shm.identify.measuring.responses import Place, place_of
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.options import IdentifyOptions
 from shm.identify.setup_merging.modal_participation import levels, ringing

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from shm.errors import BadInput
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.estimation.repeats import jackknife_sd
-from shm.identify.measuring.points import Place, place_of
+from shm.identify.measuring.responses import Place, place_of
 from shm.identify.setup_merging.modal_participation import Ringing
 from shm.values import BoolArray, FloatArray, FrequencyResponse, Plane, ResponsePoint
 

@@ -26,8 +26,8 @@ from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
 from shm_daemon.web.hanger_tests import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.site import held_documents
 
 router = APIRouter(include_in_schema=False)
 

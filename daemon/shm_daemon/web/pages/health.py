@@ -30,9 +30,8 @@ from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import troubles
-from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import Examination, Operation, Underway
-from shm_daemon.web.site import Site
+from shm_daemon.web.site import Site, held_documents
 
 router = APIRouter(tags=["operation"])
 

@@ -20,7 +20,7 @@ from shm.report.sheet_report import HEADLINES, name
 from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
-from shm_daemon.web.address_of_test import test_json, test_page
+from shm_daemon.web.address import test_json, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.figures_of_test import TestFigure
 from shm_daemon.web.frame import page

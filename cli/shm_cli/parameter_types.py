@@ -1,4 +1,7 @@
-"""Files that a command is to write: whether they can be is told before the work, not after it."""
+"""What options take besides plain texts and paths: a text that is not empty, a file to write.
+
+Whether a file can be written is checked before the work, not after it.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,18 @@ from typing import Any
 import rich_click as click
 
 from shm.errors import BadInput
+
+
+class Words(click.ParamType[str]):
+    """A text with something in it."""
+
+    name = "text"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The text without blanks around it; refuses an empty one."""
+        if not value.strip():
+            self.fail("it is empty. Say it in a few words.", param, ctx)
+        return value.strip()
 
 
 class NewFile(click.Path):
