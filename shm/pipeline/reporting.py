@@ -22,7 +22,7 @@ from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
-from shm.report.contents import HangerReport, TestSheet, trend_row_of
+from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
@@ -166,7 +166,9 @@ def hanger_states(
     return states_over_time(watched, hanger)
 
 
-def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) -> TestSheet:
+def modal_test_report(
+    workspace: Workspace, store: Store, hanger_id: int, name: str
+) -> ModalTestReport:
     """How a stored test came to its modes: its raw file is identified once more.
 
     Raises NothingThere for an unknown test and for one whose modes a file gave.
@@ -188,7 +190,7 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
     if identify_lineage(recording, hanger_id, workspace) != stored.lineage:
         note = "identified anew: settings, description or version differ from those of the store"
         found = replace(found, notes=(*found.notes, note))
-    return TestSheet(
+    return ModalTestReport(
         found,
         records,
         hanger,

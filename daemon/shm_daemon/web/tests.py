@@ -21,10 +21,10 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
-from shm_daemon.web.origin_of_test import formers_of, steps_of
-from shm_daemon.web.view_of_test import AT_WORK, TestView, as_bytes
+from shm_daemon.web.modal_test_figures import FIGURES
+from shm_daemon.web.modal_test_origin import formers_of, steps_of
+from shm_daemon.web.modal_test_view import AT_WORK, TestView, as_bytes
 
 
 class Waiting(BaseModel):

@@ -13,8 +13,8 @@ import pytest
 from shm import documents
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.contents import TestSheet
-from shm.report.sheet_report import sheet_json, sheet_paper
+from shm.report.contents import ModalTestReport
+from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.values import ModalTest, QualityCheck
 from tests.report.outline import Outline
 from tests.report.sheets import (
@@ -28,7 +28,7 @@ from tests.report.sheets import (
     warned,
 )
 
-CASES: dict[str, Callable[[], TestSheet]] = {
+CASES: dict[str, Callable[[], ModalTestReport]] = {
     "dropped": lambda: warned(make_sheet(hits=6, dropped={2: "double hit"})),
     "refused": lambda: refused(make_sheet()),
     "given responses": given_responses,
@@ -41,7 +41,7 @@ PAGES = ["dropped", "given responses"]
 
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
-    return {name: as_html(sheet_paper(CASES[name]())) for name in PAGES}
+    return {name: as_html(modal_test_paper(CASES[name]())) for name in PAGES}
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +134,7 @@ def test_verdicts_are_marked_on_their_rows(outlines: dict[str, Outline]) -> None
     ],
 )
 def test_the_paragraph_fits_every_kind_of_test(name: str, words: str) -> None:
-    assert words in " ".join(as_text(sheet_paper(CASES[name]())).split())
+    assert words in " ".join(as_text(modal_test_paper(CASES[name]())).split())
 
 
 def test_a_test_of_good_checks_is_trusted() -> None:
@@ -144,7 +144,7 @@ def test_a_test_of_good_checks_is_trusted() -> None:
         QualityCheck("coherence", "unknown", float("nan"), 0.8, "", "one hit gives none"),
     )
     sheet = replace(sheet, identification=replace(sheet.identification, quality=checks))
-    text = " ".join(as_text(sheet_paper(sheet)).split())
+    text = " ".join(as_text(modal_test_paper(sheet)).split())
     assert "and one hit." in text
     assert "the one check that could be made is good" in text
     assert "Nothing needs doing before using them." in text
@@ -154,14 +154,14 @@ def test_a_test_of_good_checks_is_trusted() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_texts_fit_a_terminal(name: str) -> None:
-    text = as_text(sheet_paper(CASES[name]()))
+    text = as_text(modal_test_paper(CASES[name]()))
     assert max(len(line) for line in text.splitlines()) <= 100
     assert len(text.splitlines()) < 70
     assert not re.search(r"\b(nan|inf|None)\b", text)
 
 
 def test_the_text_tells_doubts_in_full_and_counts_good_checks() -> None:
-    text = " ".join(as_text(sheet_paper(CASES["dropped"]())).split())
+    text = " ".join(as_text(modal_test_paper(CASES["dropped"]())).split())
     assert "double hits ! warning 1 hits 0 hits hit 2 struck twice Hit freely." in text
     assert "clipping" not in text
     assert "2 further checks good." in text
@@ -174,7 +174,7 @@ def test_missing_orders_show_in_the_paragraph() -> None:
     kept = tuple(m for m in sheet.modes if m.plane == "transverse" and m.order not in (3, 5))
     test = replace(sheet.identification.test, modes=kept)
     text = as_text(
-        sheet_paper(replace(sheet, identification=replace(sheet.identification, test=test)))
+        modal_test_paper(replace(sheet, identification=replace(sheet.identification, test=test)))
     )
     assert "transverse 1 to 2, 4, 6 (5.8 to 34.8 Hz)" in " ".join(text.split())
 
@@ -190,14 +190,14 @@ def test_names_from_outside_cannot_inject_markup() -> None:
         notes=(sly,),
     )
     page = as_html(
-        sheet_paper(replace(sheet, identification=bare, hanger=replace(HANGER, name=sly)))
+        modal_test_paper(replace(sheet, identification=bare, hanger=replace(HANGER, name=sly)))
     )
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 
 
 def test_the_document_survives_json_and_holds_what_the_page_tells() -> None:
-    document = json.loads(documents.dump(sheet_json(CASES["dropped"]())))
+    document = json.loads(documents.dump(modal_test_json(CASES["dropped"]())))
     assert document["schema"] == "shm.test-sheet/1"
     assert document["verdict"] == "warning"
     assert document["test"]["modes"][0]["frequency_hz"] == 5.8

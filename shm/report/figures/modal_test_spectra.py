@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
@@ -42,7 +42,7 @@ class Spectrum:
         return np.asarray(np.sqrt(np.mean(np.square(self.values), axis=0)))
 
 
-def spectrum(sheet: TestSheet) -> Spectrum | None:
+def spectrum(sheet: ModalTestReport) -> Spectrum | None:
     """The accelerance where somebody hit, else the power spectral density of the records."""
     response = sheet.identification.frequency_response
     if response is not None and response.points:
@@ -60,12 +60,12 @@ class Shown:
     `point` is an index into the points of `spectrum`; None on paper, where several are shown.
     """
 
-    sheet: TestSheet
+    sheet: ModalTestReport
     spectrum: Spectrum | None
     point: int | None = None
 
     @classmethod
-    def of(cls, sheet: TestSheet, point: int | None = None) -> Shown:
+    def of(cls, sheet: ModalTestReport, point: int | None = None) -> Shown:
         """With the curve worked out from the sheet, whose records must be there."""
         return cls(sheet, spectrum(sheet), point)
 
@@ -99,13 +99,13 @@ def _welch(record: Recording, segment: int) -> tuple[FloatArray, FloatArray]:
     return frequency_hz, values
 
 
-def shown_range(sheet: TestSheet) -> tuple[float, float]:
+def shown_range(sheet: ModalTestReport) -> tuple[float, float]:
     """Lowest and highest frequency to draw, in Hz."""
     low, high = searched_range(sheet)
     return (0.0 if low < 0.15 * high else low - _MARGIN * (high - low), high * (1 + _MARGIN / 2))
 
 
-def searched_range(sheet: TestSheet) -> tuple[float, float]:
+def searched_range(sheet: ModalTestReport) -> tuple[float, float]:
     """The band in Hz; where it is not known, from the lowest to the highest that was found."""
     if sheet.band_hz is not None:
         return sheet.band_hz
@@ -136,7 +136,7 @@ def telling_points(
     return sorted(chosen)
 
 
-def shown_points(sheet: TestSheet, found: Spectrum, most: int) -> list[int]:
+def shown_points(sheet: ModalTestReport, found: Spectrum, most: int) -> list[int]:
     """Indices of the points of `found` that are drawn."""
     lines = np.searchsorted(found.frequency_hz, [mode.frequency_hz for mode in sheet.modes])
     lines = np.minimum(lines, len(found.frequency_hz) - 1)
@@ -152,7 +152,7 @@ _HEADROOM = 0.36
 """Share of the axes' height that the marks take."""
 
 
-def mode_marks(sheet: TestSheet, low_hz: float, high_hz: float) -> list[Mark]:
+def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[Mark]:
     """A symbol and a line at each mode within the axis, a row for each plane, orders where there is
     room."""
     found: list[Mark] = []

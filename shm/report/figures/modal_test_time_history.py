@@ -8,9 +8,9 @@ import numpy as np
 
 from shm.identify import Hit
 from shm.report import formatting
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_signals import (
+from shm.report.figures.modal_test_signals import (
     HitRecord,
     borders_s,
     channel_of,
@@ -23,7 +23,7 @@ from shm.report.figures.sheet_signals import (
     thinned,
     unknown_times_s,
 )
-from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.specification import (
     Axis,
     Line,
@@ -70,7 +70,7 @@ def _draw(shown: Shown) -> Specification | None:
     )
 
 
-def _history(sheet: TestSheet, row: int | None, is_top: bool) -> Panel:
+def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> Panel:
     records, channel = sheet.recordings, channel_of(sheet.recordings[0], row)
     assert channel is not None
     time_s, values = thinned(records, row)
@@ -111,7 +111,7 @@ def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, flo
     return low, high + room * (high - low)
 
 
-def _title(sheet: TestSheet, row: int | None) -> tuple[str, str]:
+def _title(sheet: ModalTestReport, row: int | None) -> tuple[str, str]:
     """Name, plane and place, and in red why the channel was left out."""
     channels = [channel_of(record, row) for record in sheet.recordings]
     first = channels[0]
@@ -124,7 +124,7 @@ def _title(sheet: TestSheet, row: int | None) -> tuple[str, str]:
     return (f"{title}, left out: {fault}", "red") if fault else (title, "ink")
 
 
-def _hit_lines(sheet: TestSheet) -> list[Mark]:
+def _hit_lines(sheet: ModalTestReport) -> list[Mark]:
     return [
         Rule(
             at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
@@ -134,7 +134,7 @@ def _hit_lines(sheet: TestSheet) -> list[Mark]:
     ]  # fmt: skip
 
 
-def _hit_marks(sheet: TestSheet) -> list[Mark]:
+def _hit_marks(sheet: ModalTestReport) -> list[Mark]:
     """A row of numbered symbols for the hits that were used, and for each reason to drop some."""
     located = located_hits(sheet)
     groups: dict[str, list[tuple[int, Hit]]] = {}
@@ -161,7 +161,7 @@ def _told(number: int, hit: Hit) -> str:
     return f"hit {number}, {hit.start_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
 
 
-def _typical(sheet: TestSheet) -> HitRecord | None:
+def _typical(sheet: ModalTestReport) -> HitRecord | None:
     """The used hit of median force, else any."""
     found = hit_records(sheet)
     hits = [hit_record for hit_record in found if hit_record.hit.used] or found
@@ -169,7 +169,7 @@ def _typical(sheet: TestSheet) -> HitRecord | None:
     return hits[len(hits) // 2] if hits else None
 
 
-def _near(sheet: TestSheet, near: HitRecord) -> list[Panel]:
+def _near(sheet: ModalTestReport, near: HitRecord) -> list[Panel]:
     record, start = sheet.recordings[near.hit.record], near.hit.start
     force, motion = record.force, channel_of(record, strongest_row(sheet))
     assert force is not None

@@ -18,16 +18,16 @@ import numpy as np
 from shm.errors import NothingThere
 from shm.identify import Identification, Poles
 from shm.pipeline.lineage import identify_lineage
-from shm.pipeline.reporting import test_sheet
-from shm.report.contents import TestSheet
-from shm.report.figures.sheet_spectra import Shown, Spectrum
+from shm.pipeline.reporting import modal_test_report
+from shm.report.contents import ModalTestReport
+from shm.report.figures.modal_test_spectra import Shown, Spectrum
+from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust
 from shm.report.paper import Table
-from shm.report.sheet_report import advice, conditions, dropped, hits, summary, trust
 from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm_daemon.web.background_work import BackgroundWorker
-from shm_daemon.web.figures_of_test import FROM_RECORDS, MEMBERS, TestFigure
 from shm_daemon.web.hangers import described
+from shm_daemon.web.modal_test_figures import FROM_RECORDS, MEMBERS, TestFigure
 
 AT_WORK = "The raw file is being identified once more; this comes in some seconds."
 
@@ -89,7 +89,7 @@ class TestView:
         return ""
 
     @cached_property
-    def order(self) -> SheetOrder:
+    def order(self) -> ModalTestOrder:
         return order_of(self.workspace, self.recording, self.stored)
 
     @cached_property
@@ -98,12 +98,12 @@ class TestView:
         return None if self.missing else self.workshop.kept(self.order)
 
     @cached_property
-    def sheet(self) -> TestSheet:
+    def sheet(self) -> ModalTestReport:
         """The whole sheet without its records, or what the store has of it."""
         return self.worked.sheet if self.worked else self.as_stored
 
     @cached_property
-    def as_stored(self) -> TestSheet:
+    def as_stored(self) -> ModalTestReport:
         return stored_sheet(self.workspace, self.store, self.stored)
 
     @property
@@ -171,7 +171,7 @@ class WorkedOut:
     `figures` are documents as JSON bytes, by name; those that came to nothing are not among them.
     """
 
-    sheet: TestSheet
+    sheet: ModalTestReport
     spectrum: Spectrum | None
     summary: str
     hits: Table
@@ -197,7 +197,7 @@ class WorkedOut:
 
 
 @dataclass(frozen=True)
-class SheetOrder:
+class ModalTestOrder:
     """A sheet to be worked out: of which stored identification, and under which terms."""
 
     folder: Path
@@ -207,22 +207,24 @@ class SheetOrder:
     terms: Lineage
 
     def make(self) -> WorkedOut:
-        """Identifies the raw file once more; raises what `shm.pipeline.reporting.test_sheet` does.
+        """Identifies the raw file once more; raises what `modal_test_report` does.
 
         It runs in a process of its own: the workspace is opened anew.
         """
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
-            return worked_out(test_sheet(workspace, store, self.hanger_id, self.name))
+            return worked_out(modal_test_report(workspace, store, self.hanger_id, self.name))
 
 
-def order_of(workspace: Workspace, recording: StoredRecording, stored: StoredTest) -> SheetOrder:
+def order_of(
+    workspace: Workspace, recording: StoredRecording, stored: StoredTest
+) -> ModalTestOrder:
     """What to work out of a test as it is stored and would be identified now."""
     terms = identify_lineage(recording, stored.hanger, workspace)
-    return SheetOrder(workspace.folder, stored.hanger, stored.test.id, stored.lineage, terms)
+    return ModalTestOrder(workspace.folder, stored.hanger, stored.test.id, stored.lineage, terms)
 
 
-def worked_out(sheet: TestSheet) -> WorkedOut:
+def worked_out(sheet: ModalTestReport) -> WorkedOut:
     """The sheet with all that needs its records made of them."""
     whole = Shown.of(sheet, point=0)
     documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
@@ -242,7 +244,7 @@ def worked_out(sheet: TestSheet) -> WorkedOut:
     )
 
 
-def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> TestSheet:
+def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> ModalTestReport:
     """What the store knows of a test: no records, hits, poles and fit."""
     response, settings = store.tests.frequency_response(stored), workspace.settings
     found = Identification(
@@ -257,4 +259,4 @@ def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> Test
         set_aside=stored.set_aside,
     )
     band_hz = (settings.band_low_hz, settings.band_high_hz) if response is not None else None
-    return TestSheet(found, (), workspace.bridge.hanger(stored.hanger), band_hz)
+    return ModalTestReport(found, (), workspace.bridge.hanger(stored.hanger), band_hz)

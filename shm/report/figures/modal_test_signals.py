@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.identify import Hit
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.figures.specification import envelope_places, peak_places
 from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 
@@ -16,7 +16,7 @@ from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 _MOST_FAULTY = 2
 
 
-def shown_rows(sheet: TestSheet, most: int) -> list[int]:
+def shown_rows(sheet: ModalTestReport, most: int) -> list[int]:
     """Rows of the accelerations to draw: a few that were left out, then of each plane in turn
     the first, the last, those between."""
     channels = sheet.recordings[0].accelerations
@@ -39,7 +39,7 @@ def _ends_first(rows: list[int]) -> list[int]:
     return [rows[0], *rows[:0:-1]] if rows else []
 
 
-def strongest_row(sheet: TestSheet) -> int:
+def strongest_row(sheet: ModalTestReport) -> int:
     """Row of the acceleration that moves most in the first record, faulty ones aside."""
     faults = sheet.channel_faults
     peaks = [
@@ -69,12 +69,12 @@ def borders_s(records: Sequence[Recording]) -> list[float]:
     return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
 
 
-def hit_time_s(sheet: TestSheet, hit: Hit) -> float:
+def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
     """When a hit fell on the common axis, in s."""
     return offsets_s(sheet.recordings)[hit.record] + hit.start_s
 
 
-def located_hits(sheet: TestSheet) -> list[tuple[int, Hit]]:
+def located_hits(sheet: ModalTestReport) -> list[tuple[int, Hit]]:
     """The hits whose records are at hand, each with its number from 1."""
     numbered = enumerate(sheet.hits, 1)
     return [(number, hit) for number, hit in numbered if hit.record < len(sheet.recordings)]
@@ -168,14 +168,14 @@ class HitRecord:
         return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
 
 
-def hit_records(sheet: TestSheet) -> list[HitRecord]:
+def hit_records(sheet: ModalTestReport) -> list[HitRecord]:
     """Every hit whose record is at hand, in the order of the hits."""
     row = strongest_row(sheet) if sheet.recordings else 0
     found = [_hit_record(sheet, number, hit, row) for number, hit in located_hits(sheet)]
     return [hit_record for hit_record in found if hit_record is not None]
 
 
-def shown_hits(sheet: TestSheet) -> list[HitRecord]:
+def shown_hits(sheet: ModalTestReport) -> list[HitRecord]:
     """All hits, or some of them with every dropped one first."""
     dropped_first = sorted(hit_records(sheet), key=lambda hit_record: hit_record.hit.used)
     return sorted(dropped_first[:_MOST_SHOWN], key=lambda hit_record: hit_record.number)
@@ -187,7 +187,7 @@ def hit_name(hit_record: HitRecord) -> str:
     return f"hit {hit_record.number}{reason}"
 
 
-def _hit_record(sheet: TestSheet, number: int, hit: Hit, row: int) -> HitRecord | None:
+def _hit_record(sheet: ModalTestReport, number: int, hit: Hit, row: int) -> HitRecord | None:
     record = sheet.recordings[hit.record]
     force, motion = record.force, channel_of(record, row)
     if force is None or motion is None:
@@ -206,7 +206,7 @@ def _run(struck: BoolArray) -> int:
     return len(struck) if np.all(struck) else int(np.argmin(struck))
 
 
-def _stop(sheet: TestSheet, hit: Hit) -> int:
+def _stop(sheet: ModalTestReport, hit: Hit) -> int:
     """Shortly before the next hit of the same record begins, or where the record ends."""
     record = sheet.recordings[hit.record]
     margin = int(_BEFORE_S * record.sampling_rate_hz) + _FILTER_SAMPLES

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.report import formatting
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
@@ -41,12 +41,12 @@ class Guide:
     value: FloatArray
 
 
-def shown_modes(sheet: TestSheet) -> list[Mode]:
+def shown_modes(sheet: ModalTestReport) -> list[Mode]:
     """Those with a shape, as many as there is room for."""
     return modes_with_shape(sheet)[:_MOST]
 
 
-def modes_with_shape(sheet: TestSheet) -> list[Mode]:
+def modes_with_shape(sheet: ModalTestReport) -> list[Mode]:
     """Modes measured at so many places or directions that there is a shape to see."""
     return [mode for mode in sheet.modes if _known_values(mode) >= _LEAST_POINTS]
 
@@ -56,7 +56,7 @@ def _known_values(mode: Mode) -> int:
     return sum(math.isfinite(value) for value in values)
 
 
-def extent_m(sheet: TestSheet) -> tuple[float, float]:
+def extent_m(sheet: ModalTestReport) -> tuple[float, float]:
     """From end to end of the hanger, or of the measured places where its length is not known."""
     if sheet.hanger is not None:
         return 0.0, sheet.hanger.length_m
@@ -70,12 +70,12 @@ def panel_title(mode: Mode) -> str:
     return f"{mode.order}: {mode.frequency_hz:.4g} Hz"
 
 
-def guide_name(sheet: TestSheet) -> str:
+def guide_name(sheet: ModalTestReport) -> str:
     """What the guides of a test are, for a legend."""
     return "places joined" if sheet.hanger is None else "guide: taut string"
 
 
-def guide(sheet: TestSheet, mode: Mode) -> Guide | None:
+def guide(sheet: ModalTestReport, mode: Mode) -> Guide | None:
     """A taut string's shape of the mode's order in the measured size, None where it does not come
     near the points; straight lines between the places where the hanger is not described."""
     known = [p for p in mode.shape if math.isfinite(p.x_m) and math.isfinite(p.value)]
@@ -110,7 +110,7 @@ def _draw(shown: Shown) -> Specification | None:
     )  # fmt: skip
 
 
-def rows_of(sheet: TestSheet, is_on_screen: bool) -> list[list[Mode]]:
+def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
     """The modes row by row, the rows of a plane about equally full: a plane begins a new row."""
     modes = shown_modes(sheet)
     planes = [[mode for mode in modes if mode.plane == plane] for plane in PLANES]
@@ -121,7 +121,7 @@ def rows_of(sheet: TestSheet, is_on_screen: bool) -> list[list[Mode]]:
     return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
 
 
-def _panel(sheet: TestSheet, mode: Mode) -> Panel:
+def _panel(sheet: ModalTestReport, mode: Mode) -> Panel:
     points = [p for p in mode.shape if math.isfinite(p.x_m)]
     x_m = [p.x_m for p in points]
     value, cross, sd = np.array([(p.value, p.cross, p.sd) for p in points]).reshape(-1, 3).T

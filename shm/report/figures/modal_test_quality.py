@@ -11,7 +11,7 @@ from shm.report import colours
 from shm.report.colours import VERDICT_COLOURS
 from shm.report.figures import style
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.modal_test_spectra import Shown
 from shm.report.quality_table import SYMBOLS, overall, verdict_label, with_unit
 from shm.values import QualityCheck
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from shm import modes_document
 from shm.report import formatting
 from shm.report.colours import VERDICT_STYLES
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.quality_table import overall, quality_table
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration
 
 
-def sheet_paper(sheet: TestSheet) -> Paper:
+def modal_test_paper(sheet: ModalTestReport) -> Paper:
     """Summary, modes and quality, figures, how it came about."""
     verdict = overall(sheet.identification.quality)
     return Paper(
@@ -43,13 +43,13 @@ def sheet_paper(sheet: TestSheet) -> Paper:
     )
 
 
-def _figures(sheet: TestSheet) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import sheet_page_figures
+def _figures(sheet: ModalTestReport) -> Sequence[Illustration]:
+    from shm.report.figures.every_figure import modal_test_page_figures
 
-    return sheet_page_figures(sheet)
+    return modal_test_page_figures(sheet)
 
 
-def facts(sheet: TestSheet) -> tuple[Fact, ...]:
+def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
     """The figures on top: what, value, what stands beside it."""
     test, hits = sheet.identification.test, sheet.hits
     planes = {mode.plane for mode in sheet.modes}
@@ -61,7 +61,7 @@ def facts(sheet: TestSheet) -> tuple[Fact, ...]:
     )
 
 
-def _force(sheet: TestSheet) -> str:
+def _force(sheet: ModalTestReport) -> str:
     forces = [hit.peak_force_n for hit in sheet.used_hits]
     if not forces:
         return "no force was recorded"
@@ -77,7 +77,7 @@ HEADLINES: dict[Verdict, str] = {
 _MOST_REMEDIES = 3  # layout: more are not read
 
 
-def name(sheet: TestSheet) -> str:
+def name(sheet: ModalTestReport) -> str:
     """`Test t7, Hanger 3`, as far as it is known."""
     test = sheet.identification.test
     if sheet.hanger is not None:
@@ -85,7 +85,7 @@ def name(sheet: TestSheet) -> str:
     return f"Test {test.id}" if test.hanger is None else f"Test {test.id}, Hanger {test.hanger}"
 
 
-def summary(sheet: TestSheet) -> str:
+def summary(sheet: ModalTestReport) -> str:
     """One paragraph in plain words."""
     sentences = (
         measured(sheet),
@@ -97,13 +97,13 @@ def summary(sheet: TestSheet) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def measured(sheet: TestSheet) -> str:
+def measured(sheet: ModalTestReport) -> str:
     test = sheet.identification.test
     when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
     return f"This test ({when}) has {_sensors(sheet)}{_excitation(sheet)}."
 
 
-def _sensors(sheet: TestSheet) -> str:
+def _sensors(sheet: ModalTestReport) -> str:
     response = sheet.identification.frequency_response
     points: Sequence[tuple[str | None, float]] = []
     if response is not None:
@@ -119,7 +119,7 @@ def _sensors(sheet: TestSheet) -> str:
     return f"{formatting.counted(len(points), 'acceleration channel')}{at}{where[len(planes)]}"
 
 
-def _excitation(sheet: TestSheet) -> str:
+def _excitation(sheet: ModalTestReport) -> str:
     if len(sheet.used_hits) == len(sheet.hits) == 1:
         return " and one hit"
     if not sheet.hits:
@@ -132,7 +132,7 @@ def _excitation(sheet: TestSheet) -> str:
     return f" and {hits}: {len(sheet.used_hits) if reasons else 'all'} used{dropped}"
 
 
-def _what_was_found(sheet: TestSheet) -> str:
+def _what_was_found(sheet: ModalTestReport) -> str:
     if not sheet.modes:
         return "No mode was identified."
     groups = [_group(sheet, plane) for plane in PLANES]
@@ -141,7 +141,7 @@ def _what_was_found(sheet: TestSheet) -> str:
     return f"{formatting.counted(len(sheet.modes), 'mode')} {verb} identified: {listed}."
 
 
-def _group(sheet: TestSheet, plane: Plane) -> str:
+def _group(sheet: ModalTestReport, plane: Plane) -> str:
     modes = sorted((m for m in sheet.modes if m.plane == plane), key=lambda m: m.frequency_hz)
     if not modes:
         return ""
@@ -161,7 +161,7 @@ def _orders(modes: Sequence[Mode]) -> str:
     return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
 
 
-def _what_is_no_mode(sheet: TestSheet) -> str:
+def _what_is_no_mode(sheet: ModalTestReport) -> str:
     found = sheet.identification.set_aside
     if not found:
         return ""
@@ -169,7 +169,7 @@ def _what_is_no_mode(sheet: TestSheet) -> str:
     return f"Set aside as no modes of the hanger: {listed}."
 
 
-def trust(sheet: TestSheet) -> str:
+def trust(sheet: ModalTestReport) -> str:
     """Whether the modes can be used."""
     checks = sheet.identification.quality
     made = [check for check in checks if check.verdict != "unknown"]
@@ -194,7 +194,7 @@ def _names(checks: Sequence[QualityCheck], verdict: Verdict) -> str:
     return formatting.listed([check.name for check in checks if check.verdict == verdict])
 
 
-def advice(sheet: TestSheet) -> str:
+def advice(sheet: ModalTestReport) -> str:
     """What to do next, gravest first."""
     checks = sheet.identification.quality
     graves = sorted(
@@ -208,7 +208,7 @@ def advice(sheet: TestSheet) -> str:
     return "Nothing needs doing before using them." if overall(checks) == "good" else ""
 
 
-def results(sheet: TestSheet) -> tuple[Table, ...]:
+def results(sheet: ModalTestReport) -> tuple[Table, ...]:
     """What came of the test, as far as there is any of it."""
     return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
 
@@ -221,14 +221,14 @@ def _doubts_in_terminal(checks: Table) -> Table:
     return replace(checks, terminal_rows=doubts, hidden_note=note) if good else checks
 
 
-def details(sheet: TestSheet) -> tuple[Table, ...]:
+def details(sheet: ModalTestReport) -> tuple[Table, ...]:
     """How it came about, as far as there is any of it."""
     told = (hits(sheet), conditions(sheet), settings(sheet.settings))
     hit, *others = (table.not_in_terminal() for table in told)
     return filled(notes(sheet), hit, dropped(sheet), *others)
 
 
-def modes(sheet: TestSheet) -> Table:
+def modes(sheet: ModalTestReport) -> Table:
     return Table(
         "Modes",
         ("plane", "order", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "amplitude, m/s²"),
@@ -251,11 +251,11 @@ def _mode_row(mode: Mode) -> tuple[str, ...]:
     )
 
 
-def quality(sheet: TestSheet) -> Table:
+def quality(sheet: ModalTestReport) -> Table:
     return quality_table(sheet.identification.quality)
 
 
-def set_aside(sheet: TestSheet) -> Table:
+def set_aside(sheet: ModalTestReport) -> Table:
     return Table(
         "Set aside: not modes of the hanger",
         ("what", "frequency, Hz", "damping, %", "why"),
@@ -271,7 +271,7 @@ def set_aside(sheet: TestSheet) -> Table:
     )
 
 
-def dropped(sheet: TestSheet) -> Table:
+def dropped(sheet: ModalTestReport) -> Table:
     """What the identification left out of the records, and why."""
     return Table(
         "Left out",
@@ -280,7 +280,7 @@ def dropped(sheet: TestSheet) -> Table:
     )
 
 
-def hits(sheet: TestSheet) -> Table:
+def hits(sheet: ModalTestReport) -> Table:
     """Each hit with its time in s and peak force in N, and whether it was used."""
     records = sheet.recordings
     return Table(
@@ -300,12 +300,12 @@ def hits(sheet: TestSheet) -> Table:
     )
 
 
-def notes(sheet: TestSheet) -> Table:
+def notes(sheet: ModalTestReport) -> Table:
     rows = [(str(number), note) for number, note in enumerate(sheet.identification.notes, 1)]
     return Table("Decisions to know of", ("no.", "note"), tuple(rows))
 
 
-def conditions(sheet: TestSheet) -> Table:
+def conditions(sheet: ModalTestReport) -> Table:
     """Which test it is, and what was noted with it."""
     test = sheet.identification.test
     facts = {
@@ -323,7 +323,7 @@ def conditions(sheet: TestSheet) -> Table:
     return Table("Conditions", ("what", "value"), tuple(facts.items()))
 
 
-def _hanger(sheet: TestSheet) -> str:
+def _hanger(sheet: ModalTestReport) -> str:
     number = sheet.identification.test.hanger
     if sheet.hanger is None:
         return "not stated" if number is None else f"{number}, not described"
@@ -334,18 +334,18 @@ def _hanger(sheet: TestSheet) -> str:
     return f"{called}, {hanger.length_m:g} m, nominal tension {nominal}"
 
 
-def _band(sheet: TestSheet) -> str:
+def _band(sheet: ModalTestReport) -> str:
     if sheet.band_hz is None:
         return "not stated"
     return f"{sheet.band_hz[0]:g} to {sheet.band_hz[1]:g} Hz"
 
 
-def _window(sheet: TestSheet) -> str:
+def _window(sheet: ModalTestReport) -> str:
     seconds = sheet.identification.window_time_constant_s
     return f"time constant {seconds:.3g} s" if math.isfinite(seconds) else "none"
 
 
-def _records(sheet: TestSheet) -> str:
+def _records(sheet: ModalTestReport) -> str:
     if not sheet.records:
         return "not at hand"
     return "; ".join(_record(record) for record in sheet.records)
@@ -365,7 +365,7 @@ def _file(record: Recording | FrequencyResponse) -> str:
 SHEET_SCHEMA = "shm.test-sheet/1"
 
 
-def sheet_json(sheet: TestSheet) -> dict[str, Any]:
+def modal_test_json(sheet: ModalTestReport) -> dict[str, Any]:
     """A document for `shm.documents.dump`; signals and curves stay in the records."""
     found = sheet.identification
     return {

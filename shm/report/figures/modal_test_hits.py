@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_signals import (
+from shm.report.figures.modal_test_signals import (
     CURVE_BINS,
     LOWEST_DB,
     REACH_DB,
@@ -18,7 +18,7 @@ from shm.report.figures.sheet_signals import (
     hit_name,
     shown_hits,
 )
-from shm.report.figures.sheet_spectra import Shown, searched_range
+from shm.report.figures.modal_test_spectra import Shown, searched_range
 from shm.report.figures.specification import (
     Axis,
     Dash,

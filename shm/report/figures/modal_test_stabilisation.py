@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_spectra import Shown, Spectrum, mode_marks, shown_range, with_headroom
+from shm.report.figures.modal_test_spectra import (
+    Shown,
+    Spectrum,
+    mode_marks,
+    shown_range,
+    with_headroom,
+)
 from shm.report.figures.specification import (
     Axis,
     Line,

@@ -16,12 +16,12 @@ from matplotlib.lines import Line2D
 
 from shm.report import colours
 from shm.report.colours import PALETTE
-from shm.report.contents import TestSheet
-from shm.report.figures.every_figure import OF_SHEET
-from shm.report.figures.every_figure import sheet_figures as report_test_figures
+from shm.report.contents import ModalTestReport
+from shm.report.figures.every_figure import OF_MODAL_TEST
+from shm.report.figures.every_figure import modal_test_figures as report_test_figures
 from shm.report.figures.illustration import Illustration
 from shm.report.figures.illustration import drawn as members_drawn
-from shm.report.figures.sheet_spectra import Shown
+from shm.report.figures.modal_test_spectra import Shown
 from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
 from tests.report.sheets import (
     ambient,
@@ -36,7 +36,7 @@ from tests.report.sheets import (
 
 DROPPED = {2: "double hit", 5: "not-a-number samples"}
 EIGHT_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
-CASES: dict[str, Callable[[], TestSheet]] = {
+CASES: dict[str, Callable[[], ModalTestReport]] = {
     "two sensors": make_sheet,
     "eight sensors": lambda: make_sheet(places_m=EIGHT_M, orders=12),
     "dropped hits": lambda: make_sheet(hits=6, dropped=DROPPED),
@@ -73,9 +73,11 @@ def drawn() -> Drawn:
     }
 
 
-def alone(name: str, sheet: TestSheet) -> Illustration:
+def alone(name: str, sheet: ModalTestReport) -> Illustration:
     """One figure by itself: all of them take a second."""
-    (item,) = members_drawn([member for member in OF_SHEET if member.name == name], Shown.of(sheet))
+    (item,) = members_drawn(
+        [member for member in OF_MODAL_TEST if member.name == name], Shown.of(sheet)
+    )
     return item
 
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_damping import FIGURE as DAMPING
-from shm.report.figures.sheet_hits import FIGURE as HITS
-from shm.report.figures.sheet_response import FIGURE as RESPONSE
-from shm.report.figures.sheet_shapes import FIGURE as SHAPES
-from shm.report.figures.sheet_shapes import rows_of
-from shm.report.figures.sheet_spectra import Shown
-from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
-from shm.report.figures.sheet_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.modal_test_damping import FIGURE as DAMPING
+from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_response import FIGURE as RESPONSE
+from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
+from shm.report.figures.modal_test_shapes import rows_of
+from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Specification
 from shm_daemon.web import with_plotly
 
@@ -36,7 +36,7 @@ class TestFigure:
 
     member: Member[Shown]
     source: Literal["store", "both", "file"]
-    height_px: Callable[[TestSheet], int]
+    height_px: Callable[[ModalTestReport], int]
     is_wide: bool = False
 
     @property

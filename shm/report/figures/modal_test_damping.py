@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_spectra import Shown, shown_range
+from shm.report.figures.modal_test_spectra import Shown, shown_range
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,

@@ -7,7 +7,7 @@ from datetime import datetime
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import FormerTest, Lineage, Step
-from shm_daemon.web.view_of_test import TestView
+from shm_daemon.web.modal_test_view import TestView
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.figures.illustration import Member
-from shm.report.figures.sheet_spectra import (
+from shm.report.figures.modal_test_spectra import (
     Shown,
     Spectrum,
     mode_marks,
