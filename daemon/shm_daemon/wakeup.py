@@ -48,14 +48,14 @@ class Wakeup:
 
 
 @contextmanager
-def stopped_by_signals(bell: Wakeup) -> Iterator[None]:
-    """SIGTERM and SIGINT stop the bell's listener; in other threads than the main one, nothing."""
+def stopped_by_signals(wakeup: Wakeup) -> Iterator[None]:
+    """SIGTERM and SIGINT end the waiting; in other threads than the main one, nothing."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(number: int, frame: FrameType | None) -> None:
-        bell.stop()
+        wakeup.stop()
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
@@ -66,21 +66,21 @@ def stopped_by_signals(bell: Wakeup) -> Iterator[None]:
 
 
 class _Hints(FileSystemEventHandler):
-    def __init__(self, bell: Wakeup):
-        self._bell = bell
+    def __init__(self, wakeup: Wakeup):
+        self._wakeup = wakeup
 
     def on_any_event(self, event: FileSystemEvent) -> None:
         # Our own looking opens folders: only changes count, or looking would ring for ever.
         if event.event_type in _CHANGES and not event.is_directory:
-            self._bell.ring(SPOOL)
+            self._wakeup.ring(SPOOL)
 
 
 @contextmanager
-def rung_by_changes(bell: Wakeup, folder: Path) -> Iterator[None]:
-    """Changes in a folder ring the bell where the file system tells; scanning finds them too."""
+def rung_by_changes(wakeup: Wakeup, folder: Path) -> Iterator[None]:
+    """Changes in a folder ring the wakeup where the file system tells; scanning finds them too."""
     observer = Observer()
     try:
-        observer.schedule(_Hints(bell), str(folder), recursive=True)
+        observer.schedule(_Hints(wakeup), str(folder), recursive=True)
         observer.start()
     except OSError as error:
         log.warning("no hints of changes in %s (%s); it is scanned only", folder, error)

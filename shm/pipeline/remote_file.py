@@ -15,7 +15,7 @@ from shm.store import Archive, ReceivedFile
 
 
 class Opens(Protocol):
-    """What shows a received file under the name it came with: the archive, or a parcel."""
+    """What shows a received file under the name it came with: the archive, or a remote file."""
 
     def opened(self, file: ReceivedFile) -> AbstractContextManager[Path]:
         """The file, its sidecar beside it, while the context lasts; raises StoreError."""

@@ -102,15 +102,15 @@ def noisy(test: ModalTest, rng: np.random.Generator) -> ModalTest:
 @contextmanager
 def served(week: Week) -> Iterator[None]:
     """The daemon's loop in a thread of this process."""
-    bell, options = Wakeup(), {"clock": week.clock, "notifier": week.notify}
+    wakeup, options = Wakeup(), {"clock": week.clock, "notifier": week.notify}
     thread = threading.Thread(
-        target=run, args=(week.workspace,), kwargs={"bell": bell, **options}, daemon=True
+        target=run, args=(week.workspace,), kwargs={"wakeup": wakeup, **options}, daemon=True
     )
     thread.start()
     try:
         yield
     finally:
-        bell.stop()
+        wakeup.stop()
         thread.join(60)
     if thread.is_alive():
         raise SystemExit("the daemon does not end")

@@ -37,20 +37,20 @@ def _quick(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) ->
 @pytest.fixture
 def serve(workspace: Workspace) -> Iterator[Callable[..., Wakeup]]:
     """Begins a daemon in a thread; it is stopped at the end."""
-    bells, threads = [], []
+    wakeups, threads = [], []
 
     def begin(where: Workspace = workspace, **options: object) -> Wakeup:
-        bell = Wakeup()
-        options = {"make_executor": make_threads, "bell": bell, **options}
+        wakeup = Wakeup()
+        options = {"make_executor": make_threads, "wakeup": wakeup, **options}
         thread = threading.Thread(target=run, args=(where,), kwargs=options)
-        bells.append(bell)
+        wakeups.append(wakeup)
         threads.append(thread)
         thread.start()
-        return bell
+        return wakeup
 
     yield begin
-    for bell in bells:
-        bell.stop()
+    for wakeup in wakeups:
+        wakeup.stop()
     for thread in threads:
         thread.join(20)
         assert not thread.is_alive()
@@ -157,7 +157,7 @@ def test_no_name_of_a_file_holds_up_the_others(
 def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bell = serve()
+    wakeup = serve()
     write_test(workspace.spool / "a.modes.json", workspace)
     until(lambda: counts(workspace) == {Stage.DONE: 1})
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
@@ -165,7 +165,7 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     write_test(workspace.spool / "b.modes.json", workspace, day=30)
     until(lambda: "archive/ is gone" in why_turn_failed(workspace))
     for _ in range(20):  # a turn without a scan, as after a step, says nothing of the spool
-        bell.ring()
+        wakeup.ring()
         time.sleep(0.02)
         assert "archive/ is gone" in why_turn_failed(workspace)
     assert not workspace.archive.folder.exists()
@@ -202,13 +202,13 @@ def test_a_hook_that_hangs_does_not_hold_up_the_files(
 ) -> None:
     workspace = make_workspace(tmp_path / "hangs", hooks={"mail": ["sleep", "600"]})
     write_loss(workspace.spool, workspace)
-    bell = serve(workspace)
+    wakeup = serve(workspace)
     until(lambda: counts(workspace) == {Stage.DONE: 3})
     until(lambda: len(deliveries(workspace)) == 1)
     write_test(workspace.spool / "later.modes.json", workspace, day=90)
     until(lambda: counts(workspace) == {Stage.DONE: 4})
     assert [each.state for each in deliveries(workspace)] == [DeliveryState.WAITING]
-    bell.stop()  # ends the hook too; the fixture checks that the daemon ends soon
+    wakeup.stop()  # ends the hook too; the fixture checks that the daemon ends soon
 
 
 def test_two_daemons_do_not_serve_one_workspace(

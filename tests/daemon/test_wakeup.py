@@ -1,4 +1,4 @@
-"""The bell: rung by signals, by changes, by threads; one listener."""
+"""The wakeup: rung by signals, by changes, by threads; one listener."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 
 
 def test_a_ring_before_the_wait_is_heard() -> None:
-    bell = Wakeup()
-    bell.ring("one")
-    bell.ring("two")
-    assert bell.wait(10) == {"one", "two"}
-    assert bell.wait(0.01) == set()
+    wakeup = Wakeup()
+    wakeup.ring("one")
+    wakeup.ring("two")
+    assert wakeup.wait(10) == {"one", "two"}
+    assert wakeup.wait(0.01) == set()
 
 
 def test_a_ring_ends_the_wait() -> None:
-    bell = Wakeup()
-    threading.Timer(0.05, bell.ring, ["now"]).start()
-    assert bell.wait(10) == {"now"}
+    wakeup = Wakeup()
+    threading.Timer(0.05, wakeup.ring, ["now"]).start()
+    assert wakeup.wait(10) == {"now"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_signals_stop_the_listener_and_only_within_the_context(number: int) -> None:
-    bell, before = Wakeup(), signal.getsignal(number)
-    with stopped_by_signals(bell):
+    wakeup, before = Wakeup(), signal.getsignal(number)
+    with stopped_by_signals(wakeup):
         os.kill(os.getpid(), number)
-        bell.wait(10)
-    assert bell.stopped
+        wakeup.wait(10)
+    assert wakeup.stopped
     assert signal.getsignal(number) is before
 
 
@@ -55,21 +55,21 @@ def test_in_another_thread_signals_are_left_alone() -> None:
 
 
 def test_a_change_in_the_folder_rings(tmp_path: Path) -> None:
-    bell = Wakeup()
+    wakeup = Wakeup()
     (tmp_path / "sub").mkdir()
-    with rung_by_changes(bell, tmp_path):
+    with rung_by_changes(wakeup, tmp_path):
         (tmp_path / "sub" / "h3.csv").write_text("x")
-        assert bell.wait(10) == {SPOOL}
+        assert wakeup.wait(10) == {SPOOL}
 
 
 def test_looking_does_not_ring(tmp_path: Path) -> None:
     """Else the daemon would wake itself for ever."""
-    bell = Wakeup()
+    wakeup = Wakeup()
     (tmp_path / "h3.csv").write_text("x")
-    with rung_by_changes(bell, tmp_path):
+    with rung_by_changes(wakeup, tmp_path):
         list(tmp_path.iterdir())
         (tmp_path / "h3.csv").read_text()
-        assert bell.wait(0.3) == set()
+        assert wakeup.wait(0.3) == set()
 
 
 def test_without_hints_the_daemon_goes_on(

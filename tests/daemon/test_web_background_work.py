@@ -57,13 +57,13 @@ def a_process(workers: int) -> ProcessPoolExecutor:
 
 
 @pytest.fixture
-def workshop() -> Iterator[BackgroundWorker[Text]]:
+def background_worker() -> Iterator[BackgroundWorker[Text]]:
     _MADE.clear()
     _LET_GO.clear()
-    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=5.0, pool=a_thread)
-    yield workshop
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=5.0, pool=a_thread)
+    yield background_worker
     _LET_GO.set()
-    workshop.close()
+    background_worker.close()
 
 
 def until(found: Callable[[], Text | None]) -> Text:
@@ -74,87 +74,89 @@ def until(found: Callable[[], Text | None]) -> Text:
     raise AssertionError("nothing came")
 
 
-def test_an_order_is_made_once_and_kept(workshop: BackgroundWorker[Text]) -> None:
+def test_an_order_is_made_once_and_kept(background_worker: BackgroundWorker[Text]) -> None:
     order = Order("one", "slow")
-    assert workshop.kept(order) is None
-    assert [workshop.wanted(order) for _ in range(5)] == [None] * 5
+    assert background_worker.kept(order) is None
+    assert [background_worker.wanted(order) for _ in range(5)] == [None] * 5
     _LET_GO.set()
-    assert until(lambda: workshop.wanted(order)) == Text("one")
-    assert workshop.kept(Order("one", "slow")) == Text("one")
+    assert until(lambda: background_worker.wanted(order)) == Text("one")
+    assert background_worker.kept(Order("one", "slow")) == Text("one")
     assert _MADE == ["one"]
 
 
 def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
-    workshop: BackgroundWorker[Text],
+    background_worker: BackgroundWorker[Text],
 ) -> None:
     orders = [Order(str(number), "slow") for number in range(20)]
-    assert [workshop.wanted(order) for order in orders] == [None] * 20
+    assert [background_worker.wanted(order) for order in orders] == [None] * 20
     time.sleep(0.1)
     assert _MADE == ["0"]
     _LET_GO.set()
-    until(lambda: workshop.kept(orders[7]))
-    assert [workshop.kept(order) for order in orders[8:]] == [None] * 12
-    assert until(lambda: workshop.wanted(orders[19])) == Text("19")
+    until(lambda: background_worker.kept(orders[7]))
+    assert [background_worker.kept(order) for order in orders[8:]] == [None] * 12
+    assert until(lambda: background_worker.wanted(orders[19])) == Text("19")
 
 
-def test_what_fails_says_why_and_stops_nothing_else(workshop: BackgroundWorker[Text]) -> None:
+def test_what_fails_says_why_and_stops_nothing_else(
+    background_worker: BackgroundWorker[Text],
+) -> None:
     for how, told in (("refused", "is no word"), ("bug", "internal error")):
         order = Order("none", how)
         with pytest.raises(ShmError, match=told):
-            until(lambda order=order: workshop.wanted(order))  # type: ignore[misc]
+            until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
         with pytest.raises(ShmError, match=told):
-            workshop.wanted(order)
+            background_worker.wanted(order)
     assert _MADE == ["none", "none"]
-    assert until(lambda: workshop.wanted(Order("some"))) == Text("some")
+    assert until(lambda: background_worker.wanted(Order("some"))) == Text("some")
 
 
-def test_the_oldest_go_where_memory_runs_out(workshop: BackgroundWorker[Text]) -> None:
+def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker[Text]) -> None:
     orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
     for order in orders:
-        until(lambda order=order: workshop.wanted(order))  # type: ignore[misc]
-    assert [workshop.kept(order) is None for order in orders] == [True, False, False]
+        until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+    assert [background_worker.kept(order) is None for order in orders] == [True, False, False]
 
 
 def test_what_takes_too_long_is_given_up() -> None:
-    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=0.3, pool=a_thread)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=0.3, pool=a_thread)
     _LET_GO.clear()
     try:
         with pytest.raises(ShmError, match=r"more than 0\.3 s"):
-            until(lambda: workshop.wanted(Order("slow one", "slow")))
+            until(lambda: background_worker.wanted(Order("slow one", "slow")))
         _LET_GO.set()
-        assert until(lambda: workshop.wanted(Order("quick one"))) == Text("quick one")
+        assert until(lambda: background_worker.wanted(Order("quick one"))) == Text("quick one")
     finally:
         _LET_GO.set()
-        workshop.close()
+        background_worker.close()
 
 
 def test_a_process_that_dies_is_told_and_replaced() -> None:
-    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
     try:
         with pytest.raises(ShmError, match="died"):
-            until(lambda: workshop.wanted(Order("last words", "dies")))
-        assert until(lambda: workshop.wanted(Order("next"))) == Text("next")
+            until(lambda: background_worker.wanted(Order("last words", "dies")))
+        assert until(lambda: background_worker.wanted(Order("next"))) == Text("next")
     finally:
-        workshop.close()
+        background_worker.close()
 
 
 def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
-    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
     order = Order(str(tmp_path / "ended"), "dies once")
     try:
-        assert until(lambda: workshop.wanted(order)) == Text(order.word)
+        assert until(lambda: background_worker.wanted(order)) == Text(order.word)
     finally:
-        workshop.close()
+        background_worker.close()
 
 
 def test_closing_ends_the_work_at_once() -> None:
-    workshop: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
     _LET_GO.clear()
-    assert workshop.wanted(Order("endless", "slow")) is None
+    assert background_worker.wanted(Order("endless", "slow")) is None
     time.sleep(0.2)
     began = time.monotonic()
-    workshop.close()
+    background_worker.close()
     assert time.monotonic() - began < 5
-    assert workshop.wanted(Order("endless", "slow")) is None
-    assert workshop.wanted(Order("another")) is None
+    assert background_worker.wanted(Order("endless", "slow")) is None
+    assert background_worker.wanted(Order("another")) is None
     until(lambda: None if multiprocessing.active_children() else Text("all gone"))

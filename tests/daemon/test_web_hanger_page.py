@@ -48,7 +48,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 class AtTheSecondRequest(BackgroundWorker[Any]):
-    """A workshop without a process: nothing is made yet when it is first asked for."""
+    """A background_worker without a process: nothing is made yet when it is first asked for."""
 
     made: ClassVar[dict[Order, Any]] = {}
 

@@ -76,13 +76,13 @@ def writes(databases: Databases, url: str) -> int:
 
 def ingest_meanwhile(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """A daemon until all is done; what it waits passes quickly."""
-    began, bell = time.monotonic(), Wakeup()
+    began, wakeup = time.monotonic(), Wakeup()
     quick = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))
-    wait: Any = bell.wait
+    wait: Any = wakeup.wait
     with monkeypatch.context() as patched:
         patched.setattr(loop, "time", quick)
-        patched.setattr(bell, "wait", lambda seconds: wait(min(seconds / _FASTER, 0.05)))
-        loop.run(workspace, bell=bell, once=True, make_executor=threads, notifier=Postman())
+        patched.setattr(wakeup, "wait", lambda seconds: wait(min(seconds / _FASTER, 0.05)))
+        loop.run(workspace, wakeup=wakeup, once=True, make_executor=threads, notifier=Postman())
 
 
 def assert_whole(feed: Feed) -> None:

@@ -46,7 +46,7 @@ def load_pages(site: Site) -> Pages:
         redoc_url=None,
     )
     app.state.site = site
-    app.state.workshop = BackgroundWorker()
+    app.state.background_worker = BackgroundWorker()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (
@@ -69,7 +69,7 @@ def load_pages(site: Site) -> Pages:
     app.include_router(_described)
 
     def close() -> None:
-        app.state.workshop.close()
+        app.state.background_worker.close()
         watching_site.close()
         site.close()
 

@@ -205,10 +205,10 @@ class BackgroundWorker(Generic[Made]):
 
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
-    """The workshop of the app, for all that is ordered there."""
-    workshop = request.app.state.workshop
-    assert isinstance(workshop, BackgroundWorker)
-    return workshop
+    """The background worker of the app, for all that is ordered there."""
+    background_worker = request.app.state.background_worker
+    assert isinstance(background_worker, BackgroundWorker)
+    return background_worker
 
 
 def _too_long(longest_s: float) -> ShmError:

@@ -67,10 +67,14 @@ class HangerView:
     """One hanger as it stands in the store; what is asked for twice is read once."""
 
     def __init__(
-        self, workspace: Workspace, store: Store, hanger: Hanger, workshop: BackgroundWorker[Any]
+        self,
+        workspace: Workspace,
+        store: Store,
+        hanger: Hanger,
+        background_worker: BackgroundWorker[Any],
     ):
         self.workspace, self.store, self.hanger = workspace, store, hanger
-        self._workshop = workshop
+        self._background_worker = background_worker
 
     @cached_property
     def trend(self) -> tuple[TrendPoint, ...]:
@@ -111,7 +115,7 @@ class HangerView:
         if self.baseline is None:
             return NOTHING_WATCHED
         try:
-            made = self._workshop.wanted(self._order(self.baseline))
+            made = self._background_worker.wanted(self._order(self.baseline))
         except ShmError as error:
             log.warning("states over time of hanger %d: %s", self.hanger.id, error)
             return NOTHING_WATCHED

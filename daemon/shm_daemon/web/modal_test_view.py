@@ -51,7 +51,7 @@ class TestView:
 
     workspace: Workspace
     store: Store
-    workshop: BackgroundWorker[WorkedOut]
+    background_worker: BackgroundWorker[WorkedOut]
     stored: StoredTest
     recording: StoredRecording
 
@@ -60,13 +60,15 @@ class TestView:
         cls,
         workspace: Workspace,
         store: Store,
-        workshop: BackgroundWorker[Any],
+        background_worker: BackgroundWorker[Any],
         hanger_id: int,
         name: str,
     ) -> TestView:
         """Raises NothingThere for a hanger or a test that is none."""
         stored = store.tests.named(described(workspace, hanger_id).id, name)
-        return cls(workspace, store, workshop, stored, store.recordings.get(stored.recording_id))
+        return cls(
+            workspace, store, background_worker, stored, store.recordings.get(stored.recording_id)
+        )
 
     @property
     def is_archived(self) -> bool:
@@ -95,7 +97,7 @@ class TestView:
     @cached_property
     def worked(self) -> WorkedOut | None:
         """The whole sheet, where it is at hand; begins nothing."""
-        return None if self.missing else self.workshop.kept(self.order)
+        return None if self.missing else self.background_worker.kept(self.order)
 
     @cached_property
     def sheet(self) -> ModalTestReport:
@@ -121,7 +123,7 @@ class TestView:
         """
         if self.missing:
             raise NothingThere(self.missing)
-        return self.workshop.wanted(self.order)
+        return self.background_worker.wanted(self.order)
 
     def shown(self, point: int = 0) -> Shown:
         """What figures are drawn from, without any record."""

@@ -16,9 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, needing
 from shm.store import Workspace
-from shm_daemon.extras import needing
 from shm_daemon.web.address import Address
 
 if TYPE_CHECKING:

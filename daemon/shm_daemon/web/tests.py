@@ -162,8 +162,8 @@ Point = Annotated[
 
 def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    workshop = background_worker_of(request)
-    return TestView.of(site.workspace, site.store, workshop, hanger_id, name_in(test))
+    background_worker = background_worker_of(request)
+    return TestView.of(site.workspace, site.store, background_worker, hanger_id, name_in(test))
 
 
 View = Annotated[TestView, Depends(view_of)]

@@ -87,7 +87,7 @@ def _hits(request: Request, view: TestView) -> HTMLResponse:
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
-    whole = None if view.missing else view.workshop.kept(view.order)
+    whole = None if view.missing else view.background_worker.kept(view.order)
     return filled(whole.hits) if whole else None
 
 
