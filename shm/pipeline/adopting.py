@@ -125,7 +125,7 @@ def adopt(
         build(str(name), hanger, terms.priors),
         options_of(terms, hanger),
         progress,
-        hint=baseline.posterior,
+        warm_start=baseline.posterior,
     )
     gaps = gap_percent(baseline.posterior), gap_percent(posterior)
     adoption = _adoption(name, hanger, wish, gaps, diagnosis.id if diagnosis else None)

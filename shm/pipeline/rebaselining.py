@@ -57,7 +57,7 @@ def rebaseline(
         build(model, hanger, terms.priors),
         options_of(terms, hanger),
         progress,
-        hint=before.posterior,
+        warm_start=before.posterior,
     )
     record = (order.who, order.why, order.since)
     return store.watch.rebaseline(before, posterior, chosen, record, lineage, at)

@@ -11,7 +11,7 @@ import pytest
 from shm.errors import BadInput
 from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
 from shm.watch.alert_text import shift_words
-from shm.watch.watching import Told, after, alerts_of, new_alert
+from shm.watch.watching import AlertState, after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
@@ -431,21 +431,21 @@ def test_one_and_several_that_explain_the_data_alike_are_told_as_alternatives() 
 
 
 def test_what_was_told_comes_back_from_its_text() -> None:
-    stands = Told()
-    assert Told.from_text("") == Told.from_text(stands.to_text()) == stands
+    stands = AlertState()
+    assert AlertState.from_text("") == AlertState.from_text(stands.to_text()) == stands
     joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
     for test in (day(1), day(2, joint), day(3, change(called=True, began=2), probability=0.99)):
         stands, _ = after(stands, test, HANGER_3)
     assert stands.beyond
     assert len(stands.called) == 2
-    assert Told.from_text(stands.to_text()) == stands
+    assert AlertState.from_text(stands.to_text()) == stands
 
 
 def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
     history = [day(1), day(2, change(called=True)), day(3, probability=0.99), day(4), day(5)]
     text, alerts = "", []
     for test in history:
-        stands, alert = after(Told.from_text(text), test, HANGER_3)
+        stands, alert = after(AlertState.from_text(text), test, HANGER_3)
         text = stands.to_text()
         alerts += [alert] if alert else []
     assert tuple(alerts) == alerts_of(history, HANGER_3)
@@ -455,4 +455,4 @@ def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
 @pytest.mark.parametrize("text", ["{", "{}", "[]", '{"beyond": [1], "call": null, "called": []}'])
 def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="cannot be read"):
-        Told.from_text(text)
+        AlertState.from_text(text)
