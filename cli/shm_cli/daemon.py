@@ -58,7 +58,6 @@ def command(
     \b
     Example: shm --workspace arch daemon
     """
-    from shm_cli.daemon import unit_text
     from shm_daemon.logs import begin_logging
     from shm_daemon.web.address import Address
     from shm_daemon.web.web_process import web_beside
