@@ -289,8 +289,8 @@ def test_a_reading_process_killed_before_it_is_asked_costs_no_file(
 def test_the_reading_process_ends_with_the_one_that_asks(csv: Path) -> None:
     code = (
         f"import sys, time; sys.path[:] = {sys.path!r}\nfrom pathlib import Path\n"
-        "from shm.read.sandbox import asking, read_test\n"
-        f"read_test(Path({str(csv)!r})); print(asking._known[0].process.pid, flush=True)\n"
+        "from shm.read.sandbox import read_test, reading_process\n"
+        f"read_test(Path({str(csv)!r})); print(reading_process._known[0].process.pid, flush=True)\n"
         "time.sleep(60)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
