@@ -265,7 +265,9 @@ def _recording_of(connection: Connection, test: int) -> object:
 
 def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]:
     """What is owed of alerts, holds that were told of, and notices of holds."""
-    owed = set(_counts(connection, "SELECT alert_id, hook, 1 FROM deliveries"))
+    owed = set(
+        _counts(connection, "SELECT alert_id, hook, 1 FROM deliveries WHERE news = 'raised'")
+    )
     rows = connection.execute(sa.text("SELECT id, decision FROM holds"))
     decisions: dict[int, str | None] = {row.id: row.decision for row in rows}
     holds = set(decisions)

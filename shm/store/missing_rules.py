@@ -232,7 +232,8 @@ RULES = (
         JOIN steps a ON a.recording_id = t.recording_id AND a.stage = 'archived'
         WHERE EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)
             AND NOT EXISTS (
-                SELECT 1 FROM deliveries d WHERE d.alert_id = x.id AND d.state = 'waiting')
+                SELECT 1 FROM deliveries d WHERE d.alert_id = x.id AND d.state = 'waiting'
+                AND d.news = 'raised')
         GROUP BY x.test_id
         """,
         ("told", "steps"),
@@ -248,6 +249,28 @@ RULES = (
         FROM steps s WHERE s.stage = 'notified' GROUP BY s.test_id
         """,
         ("steps", "told"),
+    ),
+    Rule(
+        "deliveries",
+        "a delivery is missing: {hook} may not be told that alert {alert} is resolved.",
+        HISTORY,
+        """
+        SELECT d.alert_id AS alert, d.hook FROM deliveries d
+        JOIN resolutions e ON e.alert_id = d.alert_id
+        WHERE d.news = 'raised' AND d.state = 'delivered' AND NOT EXISTS (
+            SELECT 1 FROM deliveries o WHERE o.alert_id = d.alert_id AND o.hook = d.hook
+                AND o.news = 'resolved')
+        """,
+    ),
+    Rule(
+        "resolutions",
+        "the resolution of alert {alert} is missing: {hook} is owed the news of it.",
+        RESTORE,
+        """
+        SELECT d.alert_id AS alert, d.hook FROM deliveries d
+        WHERE d.news = 'resolved' AND NOT EXISTS (
+            SELECT 1 FROM resolutions e WHERE e.alert_id = d.alert_id)
+        """,
     ),
     Rule(
         "fingerprints",
@@ -380,6 +403,9 @@ RULES = (
             AND (t.hanger, t.name) NOT IN (SELECT o.hanger, o.name FROM baselines b
                 JOIN posterior_tests p ON p.posterior_id = b.posterior_id
                 JOIN tests o ON o.id = p.test_id)
+            AND NOT EXISTS (SELECT 1 FROM silences m WHERE m.is_maintenance
+                AND (m.hanger IS NULL OR m.hanger = t.hanger) AND m.starts_at <= t.time
+                AND t.time < coalesce(m.ended_at, m.ends_at))
         """,
     ),
     Rule(

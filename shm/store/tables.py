@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
 
-SCHEMA = "0008"
+SCHEMA = "0009"
 
 metadata = sa.MetaData(
     naming_convention={
@@ -282,19 +282,52 @@ acknowledgements = sa.Table(
     sa.Column("why", sa.Text, nullable=False),
 )
 
-# The outbox: what has yet to be told to which hook, and how that went.
+# When the condition that an alert tells of ended, and who found that: `shm`, or a person.
+resolutions = sa.Table(
+    "resolutions",
+    metadata,
+    _id(),
+    sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+)
+
+# From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
+# window (`is_maintenance`) also keeps tests of then from the watch. `ended_at` is when a person
+# ended it before its time. Never changed otherwise, never taken out.
+silences = sa.Table(
+    "silences",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer),
+    sa.Column("starts_at", UtcTime, nullable=False),
+    sa.Column("ends_at", UtcTime, nullable=False),
+    sa.Column("is_maintenance", sa.Boolean, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+    sa.Column("made_at", UtcTime, nullable=False),
+    sa.Column("ended_at", UtcTime),
+    sa.Column("ended_who", sa.Text),
+)
+
+# The outbox: what has yet to be told to which hook, and how that went. `news` is the change of
+# state that it tells of, `raised` or `resolved`. `message_id` is empty until the first attempt is
+# due; from then on it is the number of the first delivery of the same message, and never changes.
 deliveries = sa.Table(
     "deliveries",
     metadata,
     _id(),
     _to("alerts"),
     sa.Column("hook", sa.String(255), nullable=False),
+    sa.Column("news", sa.String(16), nullable=False),
     sa.Column("state", sa.String(16), nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False),
     sa.Column("next_attempt_at", UtcTime, nullable=False),
     sa.Column("last_error", sa.Text, nullable=False),
     sa.Column("ended_at", UtcTime),
-    sa.UniqueConstraint("alert_id", "hook"),
+    sa.Column("message_id", sa.Integer, index=True),
+    sa.UniqueConstraint("alert_id", "hook", "news"),
     sa.Index(None, "state", "next_attempt_at"),
 )
 
