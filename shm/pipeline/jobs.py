@@ -138,8 +138,8 @@ class Jobs:
             return
         ids = [delivery.id for delivery in under_way]
         waits = [wait_after(count, self.workspace.settings) for count in range(_DOUBLINGS)]
-        due = self.store.alerts.list_due_deliveries(self.clock(), 2 * DELIVERIES, ids, waits)
-        due = tuple(each for each in due if each.message_id is not None)
+        now, most = self.clock(), 2 * DELIVERIES
+        due = self.store.alerts.list_due_deliveries(now, most, ids, waits, begun=True)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
         for part in self.store.alerts.list_of_messages([each.id for each in due]) if due else ():
             parts[part.message_id].append(part)

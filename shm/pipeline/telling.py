@@ -114,7 +114,8 @@ def _ready_at(
     since = stored.raised_at
     if delivery.news is News.RESOLVED and resolution is not None:
         since = max(since, resolution.at)
-    since = min(since, now)  # the clock was ahead, and is set right: then it is told at once
+    if since > now:  # the clock was ahead, and is set right: then it is told at once
+        return now - _MOST_WINDOWS * timedelta(seconds=terms.window_s)
     ready_at = max(since, _held_back_until(delivery, silences, now) or since)
     if delivery.news is News.RAISED and delivery.hook in terms.escalation_s:
         ready_at += timedelta(seconds=terms.escalation_s[delivery.hook])

@@ -227,8 +227,12 @@ class Alerts(Repository):
         limit: int,
         excluding: Collection[int] = (),
         waits: Sequence[timedelta] = (),
+        *,
+        begun: bool = False,
     ) -> tuple[Delivery, ...]:
         """Deliveries whose time has come, the longest due first; of each message the first alone.
+
+        With `begun` only of messages: others, which may wait for months, must not fill the limit.
 
         Also those that would wait longer than `waits` says for so many attempts, its last for more:
         the clock was ahead when they were put off.
@@ -238,6 +242,8 @@ class Alerts(Repository):
         too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
         own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
         due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
+        if begun:
+            due &= deliveries.c.message_id.is_not(None)
         query = _outbox.where(due, deliveries.c.id.not_in(excluding))
         return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
 

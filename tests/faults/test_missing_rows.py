@@ -36,7 +36,7 @@ from tests.store.make_released_database import fill
 MAY_GO = ("summaries", "watch_states")
 """Made again by themselves: nothing is lost with a row of these."""
 
-LAST = ("acknowledgements", "archive_copies", "diagnoses", "events", "tokens")
+LAST = ("acknowledgements", "archive_copies", "diagnoses", "events", "silences", "tokens")
 """Of these the last row leaves no gap, and nothing else tells of it: what a person did."""
 
 ON_A_SERVER = ("drifts", "fingerprints", "steps", "watches")
