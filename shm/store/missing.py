@@ -16,6 +16,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row, RowMapping
 
+from shm.store.missing_alert_rules import ALERT_RULES
 from shm.store.missing_rules import (
     HISTORY,
     RESTORE,
@@ -104,7 +105,9 @@ def _by_rules(connection: Connection) -> Iterator[MissingRow]:
 
 @cache
 def _queries() -> tuple[tuple[Rule, sa.TextClause], ...]:
-    return tuple((rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in RULES)
+    return tuple(
+        (rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in (*RULES, *ALERT_RULES)
+    )
 
 
 def _lacking(rule: Rule) -> str:

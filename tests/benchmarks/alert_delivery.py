@@ -167,6 +167,7 @@ def live_in_peace(workspace: Workspace) -> float:
     """A last life that ends when nothing is owed; how long that takes, in s."""
     began = time.monotonic()
     with real_daemon(workspace.folder) as daemon:
+        until_serving(daemon.pid, workspace.folder)  # before, SIGTERM ends it as any program
         while states(workspace)["waiting"]:
             time.sleep(0.2)
         seconds = time.monotonic() - began
