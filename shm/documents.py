@@ -162,4 +162,8 @@ def drift_document(drift: Drift) -> dict[str, Any]:
 def alert_document(alert: Alert) -> dict[str, Any]:
     """What a hook gets on its standard input."""
     tension = alert.tension and averaged_document(alert.tension)
-    return {"schema": "shm.alert/1", **asdict(alert), "tension": tension}
+    document = {"schema": "shm.alert/1", **asdict(alert), "tension": tension}
+    if alert.alerts:
+        return {**document, "alerts": [alert_document(each) for each in alert.alerts]}
+    del document["alerts"]
+    return document

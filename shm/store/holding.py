@@ -17,7 +17,7 @@ from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.files import in_force, write_event, write_step
-from shm.store.outbox import raise_alert
+from shm.store.outbox import raise_alert, resolve
 from shm.store.recording_rows import Decision, HeldTest, Hold
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
@@ -292,6 +292,9 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
         insert(
             connection, acknowledgements, {"alert_id": alert_id, "who": who, "why": told, "at": at}
         )
+    notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
+    if notice is not None:
+        resolve(connection, notice, who, told, at)
     write_event(connection, at, str(hold.decision), hold.recording_id, hold.file_name, told)
     return replace(hold, decided_at=at, who=who, why=why)
 
