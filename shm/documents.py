@@ -86,34 +86,11 @@ def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter |
     except (cattrs.BaseValidationError, ValueError) as error:
         said, _, at = transform_error(error, path, _said)[0].rpartition(" @ ")
     label, _, key = at.rpartition(".")
-    raise Misfit(f"{label and label + ': '}{key} {said}".strip(), key)
+    raise Misfit(f"{label and label + ': '}{key} {said}".strip(), key.partition("[")[0])
 
 
 def _said(error: BaseException, _: object) -> str:
     return "is missing" if isinstance(error, KeyError) else str(error)
-
-
-def reader() -> cattrs.Converter:
-    """A converter of documents to frozen values, which takes nothing for what it is not.
-
-    Null is NaN where a number is meant and a text a time where one is meant; keys that the value
-    does not have are left alone.
-    """
-    made = cattrs.Converter()
-    made.register_structure_hook(float, lambda node, _: number(node))
-    made.register_structure_hook(datetime, lambda node, _: _time(node))
-    for plain, what in ((int, "a whole number"), (bool, "true or false"), (str, "a text")):
-        made.register_structure_hook(plain, _plain(plain, what))
-    made.register_structure_hook_factory(_is_of(np.ndarray), lambda _: _plain(np.ndarray, "arrays"))
-    made.register_structure_hook_factory(_is_of(Literal), _one_of)
-    made.register_structure_hook_factory(
-        is_dataclass, _only(Mapping, "an object", make_dict_structure_fn)
-    )
-    made.register_structure_hook_factory(
-        lambda kind: get_args(kind)[1:] == (...,) and _is_of(tuple)(kind),
-        _only(list | tuple, "a list", homogenous_tuple_structure_factory),
-    )
-    return made
 
 
 def number(node: Any) -> float:
@@ -123,6 +100,29 @@ def number(node: Any) -> float:
     if isinstance(node, int | float) and not isinstance(node, bool):
         return float(node)
     raise ValueError(f"= {node!r} is not a number")
+
+
+def reader(
+    number: Callable[[Any], float] = number, make: Callable[..., _Hook] = make_dict_structure_fn
+) -> cattrs.Converter:
+    """A converter of documents to frozen values, which takes nothing for what it is not.
+
+    `number` says what a number is, `make` makes the hooks of our classes. By them null is NaN where
+    a number is meant, and keys that the value does not have are left alone.
+    """
+    made = cattrs.Converter()
+    made.register_structure_hook(float, lambda node, _: number(node))
+    made.register_structure_hook(datetime, lambda node, _: _time(node))
+    for plain, what in ((int, "a whole number"), (bool, "true or false"), (str, "a text")):
+        made.register_structure_hook(plain, _plain(plain, what))
+    made.register_structure_hook_factory(_is_of(np.ndarray), lambda _: _plain(np.ndarray, "arrays"))
+    made.register_structure_hook_factory(_is_of(Literal), _one_of)
+    made.register_structure_hook_factory(is_dataclass, _only(Mapping, "an object", make))
+    made.register_structure_hook_factory(
+        lambda kind: get_args(kind)[1:] == (...,) and _is_of(tuple)(kind),
+        _only(list | tuple, "a list", homogenous_tuple_structure_factory),
+    )
+    return made
 
 
 def _time(node: Any) -> datetime:
