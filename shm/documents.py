@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 import cattrs
 import numpy as np
 from cattrs.cols import homogenous_tuple_structure_factory
-from cattrs.gen import make_dict_structure_fn
+from cattrs.gen import make_dict_structure_fn, make_hetero_tuple_structure_fn
 from cattrs.v import transform_error
 
 from shm.values import (
@@ -102,6 +102,16 @@ def number(node: Any) -> float:
     raise ValueError(f"= {node!r} is not a number")
 
 
+_LARGEST = 1e300  # technical: a square root or two of what follows from it must not overflow
+
+
+def finite(node: Any) -> float:
+    """A number that a person wrote, where null is what is not known; raises ValueError."""
+    if node is None or (isinstance(node, int | float) and abs(node) < _LARGEST):
+        return number(node)
+    raise ValueError(f"= {node!r} is not a number")
+
+
 def reader(
     number: Callable[[Any], float] = number, make: Callable[..., _Hook] = make_dict_structure_fn
 ) -> cattrs.Converter:
@@ -118,10 +128,7 @@ def reader(
     made.register_structure_hook_factory(_is_of(np.ndarray), lambda _: _plain(np.ndarray, "arrays"))
     made.register_structure_hook_factory(_is_of(Literal), _one_of)
     made.register_structure_hook_factory(is_dataclass, _only(Mapping, "an object", make))
-    made.register_structure_hook_factory(
-        lambda kind: get_args(kind)[1:] == (...,) and _is_of(tuple)(kind),
-        _only(list | tuple, "a list", homogenous_tuple_structure_factory),
-    )
+    made.register_structure_hook_factory(_is_of(tuple), _only(list | tuple, "a list", _row))
     return made
 
 
@@ -168,6 +175,13 @@ def _only(of: Any, what: str, make: Callable[..., _Hook]) -> Callable[..., _Hook
         return hook
 
     return hook_for
+
+
+def _row(kind: Any, by: cattrs.Converter) -> _Hook:
+    long = get_args(kind)[1:] == (...,)
+    make = homogenous_tuple_structure_factory if long else make_hetero_tuple_structure_fn
+    hook: _Hook = make(kind, by)
+    return hook
 
 
 def _is_of(origin: Any) -> Callable[[Any], bool]:

@@ -16,12 +16,11 @@ from typing import Any
 from cattrs import Converter
 from cattrs.gen import make_dict_structure_fn
 
-from shm.documents import Misfit, key_meant, number, reader, value_of
+from shm.documents import Misfit, finite, key_meant, reader, value_of
 from shm.errors import BadInput
 from shm.values import LONGEST_TEST_ID, ModalTest, Mode, is_test_id
 
 MODES_SCHEMA = "shm.modes/1"
-_LARGEST = 1e300  # technical: a square root or two of what follows from it must not overflow
 _HIGHEST_ORDER = 200  # technical: models solve for every order below; no hammer reaches it
 _ORDERS = f"1, 2, 3, ... up to {_HIGHEST_ORDER}"
 _LEAVE_OUT = "Leave it out where unknown."
@@ -179,12 +178,6 @@ def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
     )
 
 
-def _finite(node: Any) -> float:
-    if node is None or (isinstance(node, int | float) and abs(node) < _LARGEST):
-        return number(node)
-    raise ValueError(f"= {node!r} is not a number")
-
-
 def _sparse(kind: Any, by: Converter) -> Callable[[Any, Any], Any]:
     """What is null is as good as left out, and what number is left out is not known."""
     take = make_dict_structure_fn(kind, by)
@@ -194,4 +187,4 @@ def _sparse(kind: Any, by: Converter) -> Callable[[Any, Any], Any]:
     )
 
 
-_READER = reader(_finite, _sparse)
+_READER = reader(finite, _sparse)
