@@ -1,4 +1,8 @@
-"""JSON documents of the values: posteriors, drifts, alerts; unknown numbers are null in JSON."""
+"""JSON documents of the values: posteriors, drifts, alerts; unknown numbers are null in JSON.
+
+What is read becomes a value by the types that its class declares: `value_of`, by cattrs. msgspec
+has no hook for a built-in type, so a null could not be NaN.
+"""
 
 from __future__ import annotations
 
@@ -191,9 +195,6 @@ def _is_of(origin: Any) -> Callable[[Any], bool]:
 _READER = reader()
 
 
-# ---------------------------------------------------------------- posteriors
-
-
 _ALIKE = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
 
 
@@ -205,6 +206,9 @@ def key_meant(key: str, known: Sequence[str]) -> str | None:
     if key in known:
         return None
     return next(iter(get_close_matches(key, known, n=1, cutoff=_ALIKE)), None)
+
+
+# ---------------------------------------------------------------- posteriors
 
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
