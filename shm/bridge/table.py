@@ -68,7 +68,7 @@ class Table:
 
     def not_negative(self, key: str) -> float:
         """A number from 0 up; raises BadInput where it is missing or none."""
-        remedy, wrong = f"Give {key} in SI units.", "is not a number, or negative"
+        remedy, wrong = f"Give {key} in SI units.", "is not a number from 0 up"
         return float(self.value(key, float, wrong, remedy, holds=lambda value: value >= 0))
 
     def fraction(self, key: str, default: float, low: float, high: float) -> float:
