@@ -9,9 +9,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document
+from shm.documents import alert_document, value_of
 from shm.errors import DamagedRow
-from shm.store.blobs import alert_from_document
 from shm.store.checksums import decoding, loads, note_damage
 from shm.store.database import insert
 from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, StoredAlert
@@ -110,7 +109,7 @@ def alert_of(row: Row[Any]) -> Alert:
     """An alert that was raised is told even where its document is damaged: as much as is left."""
     try:
         with decoding(alerts, row, row.hanger):
-            return alert_from_document(loads(row.document))
+            return value_of(Alert, loads(row.document))
     except DamagedRow as error:
         note_damage(error)
         message = f"{row.message} (Details are lost: {error.message})"
