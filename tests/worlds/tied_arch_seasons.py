@@ -75,7 +75,7 @@ REFERENCE_C = 10.0
 GRAVITY = 9.81
 POISSON = 0.3
 COWPER = 6 * (1 + POISSON) / (7 + 6 * POISSON)
-EXPANSION = 1.2e-5  # 1/K, steel and (EN 1991-1-5, table C.1: 1.0e-5 to 1.2e-5) composite decks
+EXPANSION = 1.2e-5  # 1/K, steel (EN 1991-1-5, table C.1; concrete 1.0e-5 there, 0.95 to 1.2 built)
 MODULUS_PER_K = -3.5e-4
 ORDERS = 5  # reported
 SOLVED = ORDERS + 1  # one more, for whom mistakes the order
@@ -105,6 +105,7 @@ class Nuisances:
     softening: float = 1.0  # scale of the joints' 0 to 5 % of fixity per unit of amplitude
     softening_days: float = 0.15
     seating_sd: float = 0.002  # of the fixity, from visit to visit: joints never sit alike
+    cold_joints: float = 1.0  # scale of 0 to 0.06 % of fixity lost per K (sleeves, paint, rust)
     sensor_kg: tuple[float, float] = (0.2, 0.45)
     sensor_place_sd_m: float = 0.12
     forks: float = 1.0  # scale of the ends' additional stiffness and mass
@@ -117,6 +118,7 @@ class Nuisances:
     twice: float = 0.08  # share of days with a second round of tests
     temperature_missing: float = 0.2
     thermometer: float = 1.0  # scale of the error; 0 reads the air exactly, without rounding
+    temperature_typos: float = 0.005  # share of those noted 10 deg C off, or with the other sign
     amplitude_sd: float = 0.5  # ln, of the hits as they were (median 1)
     amplitude_recorded_sd: float = 0.3  # ln, recorded over real
     amplitude_missing: float = 0.2
@@ -152,7 +154,11 @@ class Event:
     other: int = 0  # of neighbour_swap; 0: the neighbour
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS or self.end not in (*ENDS, "both") or set(self.planes) - {*PLANES}:
+        if (
+            self.kind not in KINDS
+            or self.end not in (*ENDS, "both")
+            or set(self.planes) - {*PLANES}
+        ):
             raise ValueError(f"no such event: {self}")
 
 
@@ -205,7 +211,7 @@ class State:
 
 
 @lru_cache(maxsize=1)
-def _reference() -> tuple[Array, Array, Array, Array, Array]:
+def _reference() -> tuple[Any, ...]:
     """Lobatto nodes' Lagrange basis: Gauss points, weights, values, slopes, Legendre transform."""
     inner = legendre.Legendre.basis(DEGREE).deriv().roots()
     nodes = np.concatenate(([-1.0], np.sort(inner.real), [1.0]))
@@ -213,7 +219,7 @@ def _reference() -> tuple[Array, Array, Array, Array, Array]:
     to_legendre = np.linalg.inv(legendre.legvander(nodes, DEGREE))
     values = legendre.legvander(points, DEGREE) @ to_legendre
     slopes = legendre.legval(points, legendre.legder(np.eye(DEGREE + 1))).T @ to_legendre
-    return points, weights, values, slopes, to_legendre
+    return points, weights, values, np.asarray(slopes), to_legendre
 
 
 class Matrices:
@@ -300,7 +306,13 @@ class Matrices:
         return np.asarray(total + (self.turns.T * springs) @ self.turns)
 
     def solve(
-        self, tension: float, springs: Array, temperature_c: float, kg: float, at_m: float, count: int
+        self,
+        tension: float,
+        springs: Array,
+        temperature_c: float,
+        kg: float,
+        at_m: float,
+        count: int,
     ) -> tuple[Array, Array]:
         """Frequencies (Hz) and shapes from the full matrices, one state and plane."""
         row = self.shape(np.array([at_m]))[0]
@@ -387,6 +399,7 @@ class Frame:
     arch: tuple[float, float] = (0.06, 0.008)  # m2, m4
     tie: tuple[float, float] = (0.2, 0.035)
     tie_depth_m: float = 1.3
+    tie_expansion: float = EXPANSION
 
     @property
     def count(self) -> int:
@@ -399,14 +412,6 @@ class Frame:
         return np.asarray(4 * self.rise_m * x * (self.span_m - x) / self.span_m**2)
 
     # Nodes: 0 and n+1 the springings (shared by arch and tie), 1..n the arch, n+2..2n+1 the tie.
-
-    def _members(self) -> list[tuple[int, int, float, float, bool]]:
-        n, tied = self.count, self.count + 2
-        top = [0, *range(1, n + 1), n + 1]
-        low = [0, *range(tied, tied + n), n + 1]
-        arch = [(a, b, *self.arch, False) for a, b in pairwise(top)]
-        return arch + [(a, b, *self.tie, True) for a, b in pairwise(low)]
-
     def nodes(self) -> Array:
         """Coordinates (x, y)."""
         x = np.array(self.places_m)
@@ -414,70 +419,41 @@ class Frame:
         low = np.column_stack((x, np.zeros_like(x)))
         return np.vstack(([[0.0, 0.0]], top, [[self.span_m, 0.0]], low))
 
-    def _element(self, member: tuple[int, int, float, float, bool]) -> tuple[Array, Array, Array]:
-        """Stiffness in its own axes, turn to them, degrees of freedom."""
-        a, b, area, second, _ = member
-        points = self.nodes()
-        delta = points[b] - points[a]
-        length = float(np.hypot(*delta))
-        c, s = delta / length
-        axial, bend = self.modulus_pa * area / length, self.modulus_pa * second / length**3
-        k = np.zeros((6, 6))
-        k[np.ix_([0, 3], [0, 3])] = axial * np.array([[1, -1], [-1, 1]])
-        h = length
-        k[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])] = bend * np.array(
-            [
-                [12, 6 * h, -12, 6 * h],
-                [6 * h, 4 * h * h, -6 * h, 2 * h * h],
-                [-12, -6 * h, 12, -6 * h],
-                [6 * h, 2 * h * h, -6 * h, 4 * h * h],
-            ]
-        )
-        turn = np.kron(np.eye(2), np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
-        where = np.concatenate((np.arange(3 * a, 3 * a + 3), np.arange(3 * b, 3 * b + 3)))
-        return k, turn, where
-
-    def _strained(self, member: tuple[int, int, float, float, bool], load: "Load") -> Array:
-        """Forces at the ends, own axes, that would hold the member at its free strain in place."""
-        _, _, area, second, tie = member
-        axial = self.modulus_pa * area * EXPANSION * (load.tie_k if tie else load.arch_k)
-        curve = -EXPANSION * load.tie_difference_k / self.tie_depth_m if tie else 0.0
-        moment = self.modulus_pa * second * curve  # warm top: ends turn, the middle hogs
+    def _strained(self, member: "_Member", load: "Load") -> Array:
+        """Forces at the ends, own axes, that hold a member with its free strain in place."""
+        warm, expansion, curve = load.arch_k, EXPANSION, 0.0
+        if member.tie:
+            warm, expansion = load.tie_k, self.tie_expansion
+            curve = -expansion * load.tie_difference_k / self.tie_depth_m  # a warm top hogs
+        axial, moment = member.axial_n * expansion * warm, member.bending_nm2 * curve
         return np.array([axial, 0.0, moment, -axial, 0.0, -moment])
 
     def _loads(self, load: "Load") -> Array:
         n = self.count
         force = np.zeros(3 * (2 * n + 2))
-        for member in self._members():
-            k, turn, where = self._element(member)
-            force[where] -= turn.T @ self._strained(member, load)
-        for i in range(n):
-            grown = EXPANSION * load.hanger_k[i] * self.hanger_length_m[i] + load.longer_m[i]
-            push = self.hanger_stiffness_n_m[i] * grown  # a longer hanger pushes its ends apart
-            force[3 * (i + 1) + 1] += push
-            force[3 * (n + 2 + i) + 1] -= push
-        for member in self._members():
-            if not member[4]:
+        for member in _members(self):
+            force[member.where] -= member.turn.T @ self._strained(member, load)
+            if not member.tie:
                 continue
-            k, turn, where = self._element(member)
-            start, end = (float(self.nodes()[m][0]) for m in member[:2])
-            h = end - start
+            h, across = member.length_m, member.where[[1, 2, 4, 5]]
+            force[across] -= load.line_n_m * np.array([h / 2, h**2 / 12, h / 2, -(h**2) / 12])
             for place, down in load.weights:
-                if start <= place < end or place == end == self.span_m:
-                    t = (place - start) / h
+                t = (place - member.start_m) / h
+                if 0 <= t < 1 or place == self.span_m == member.start_m + h:
                     shape = [1 - 3 * t**2 + 2 * t**3, h * (t - 2 * t**2 + t**3)]
                     shape += [3 * t**2 - 2 * t**3, h * (t**3 - t**2)]
-                    force[where[[1, 2, 4, 5]]] -= down * np.array(shape)
-            # a load all along, consistent
-            force[where[[1, 2, 4, 5]]] -= load.line_n_m * np.array([h / 2, h**2 / 12, h / 2, -(h**2) / 12])
+                    force[across] -= down * np.array(shape)
+        free = EXPANSION * np.array(load.hanger_k) * np.array(self.hanger_length_m)
+        push = np.array(self.hanger_stiffness_n_m) * (free + np.array(load.longer_m))
+        force[4 : 3 * n + 4 : 3] += push  # a longer hanger pushes its ends apart
+        force[3 * (n + 2) + 1 :: 3] -= push
         return force
 
     def _assembled(self) -> Array:
         n = self.count
         stiffness = np.zeros((3 * (2 * n + 2),) * 2)
-        for member in self._members():
-            k, turn, where = self._element(member)
-            stiffness[np.ix_(where, where)] += turn.T @ k @ turn
+        for m in _members(self):
+            stiffness[np.ix_(m.where, m.where)] += m.turn.T @ m.stiffness @ m.turn
         for i, k in enumerate(self.hanger_stiffness_n_m):
             at = [3 * (i + 1) + 1, 3 * (n + 2 + i) + 1]
             stiffness[np.ix_(at, at)] += k * np.array([[1, -1], [-1, 1]])
@@ -505,18 +481,59 @@ class Frame:
 
     def arch_end_forces(self, load: "Load", response: "Response") -> Array:
         """What the springings give the arch: (x, y, moment) at the left, at the right."""
+        members = _members(self)
         found = []
-        members = self._members()
-        for member, at in ((members[0], slice(0, 3)), (members[self.count], slice(3, 6))):
-            k, turn, where = self._element(member)
-            own = k @ turn @ response.moved[where] + self._strained(member, load)
-            found.append((turn.T @ own)[at])
+        for m, at in ((members[0], slice(0, 3)), (members[self.count], slice(3, 6))):
+            own = m.stiffness @ m.turn @ response.moved[m.where] + self._strained(m, load)
+            found.append((m.turn.T @ own)[at])
         return np.array(found)
 
     def unit(self, **what: Any) -> "Load":
         """A load of this frame, zero but for what is named."""
         nothing = (0.0,) * self.count
         return replace(Load(hanger_k=nothing, longer_m=nothing), **what)
+
+
+@dataclass(frozen=True)
+class _Member:
+    """An element of arch or tie: stiffness in its own axes, the turn to them, its unknowns."""
+
+    tie: bool
+    start_m: float
+    length_m: float
+    axial_n: float
+    bending_nm2: float
+    stiffness: Array
+    turn: Array
+    where: NDArray[np.int64]
+
+
+@lru_cache(maxsize=16)
+def _members(frame: Frame) -> list[_Member]:
+    n, points = frame.count, frame.nodes()
+    chains = ((range(1, n + 1), frame.arch, False), (range(n + 2, 2 * n + 2), frame.tie, True))
+    members = []
+    for middle, (area, second), tie in chains:
+        for a, b in pairwise([0, *middle, n + 1]):
+            delta = points[b] - points[a]
+            h = float(np.hypot(*delta))
+            c, s = delta / h
+            axial, bend = frame.modulus_pa * area, frame.modulus_pa * second
+            k = np.zeros((6, 6))
+            k[np.ix_([0, 3], [0, 3])] = axial / h * np.array([[1, -1], [-1, 1]])
+            k[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])] = (bend / h**3) * np.array(
+                [
+                    [12, 6 * h, -12, 6 * h],
+                    [6 * h, 4 * h * h, -6 * h, 2 * h * h],
+                    [-12, -6 * h, 12, -6 * h],
+                    [6 * h, 2 * h * h, -6 * h, 4 * h * h],
+                ]
+            )
+            turn = np.kron(np.eye(2), np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+            where = np.concatenate((np.arange(3 * a, 3 * a + 3), np.arange(3 * b, 3 * b + 3)))
+            start = float(points[a][0])
+            members.append(_Member(tie, start, h, axial, bend, k, turn, where))
+    return members
 
 
 @dataclass(frozen=True)
@@ -587,6 +604,7 @@ class Hanger:
     tension_n: float  # at 10 deg C, as built
     springs: Array = field(repr=False)  # (plane, end)
     softening: Array = field(repr=False)  # (plane, end), part of fixity per unit of amplitude
+    cold: Array = field(repr=False)  # (plane, end), part of fixity lost per K
     damping: Array = field(repr=False)  # (plane, order)
     sensor_at_m: float = 1.6
     description: dict[str, float] = field(default_factory=dict)
@@ -618,18 +636,27 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
     rise = float(np.clip(span * rng.uniform(0.15, 0.19), 12.4, 15.6))
     mean = 180e3 * (750 / 180) ** float(rng.random())  # N, of dead load a hanger
     stress = float(rng.uniform(60e6, 130e6))
-    diameter = float(np.clip(round(math.sqrt(4 * mean / (math.pi * stress)) / 5e-3) * 5e-3, 0.04, 0.12))
+    diameter = float(
+        np.clip(round(math.sqrt(4 * mean / (math.pi * stress)) / 5e-3) * 5e-3, 0.04, 0.12)
+    )
     thicker = bool(rng.random() < 0.3)  # the outermost ones
     modulus, density = 2.1e11 if rng.random() < 0.6 else 2.05e11, 7850.0
-    arch_area = mean / (0.78 * span / (n - 1)) * span**2 / (8 * rise) / float(rng.uniform(70e6, 110e6))
+    arch_area = (
+        mean / (0.78 * span / (n - 1)) * span**2 / (8 * rise) / float(rng.uniform(70e6, 110e6))
+    )
     arch = (arch_area, arch_area * (0.38 * span / float(rng.uniform(65, 90))) ** 2)
-    tie_depth = span / float(rng.uniform(50, 70))
-    tie_area = float(rng.uniform(2.0, 4.0)) * arch_area
+    tie_depth = span / float(rng.uniform(40, 95))  # a slim steel tie to a stiff concrete one
+    tie_area = float(rng.uniform(1.3, 6.0)) * arch_area
+    tie_expansion = float(rng.uniform(0.95e-5, 1.2e-5))  # concrete by its aggregate, or steel
     tie = (tie_area, tie_area * (0.35 * tie_depth) ** 2)
     pinned = bool(rng.random() < 0.5)
     heading, gusset = float(rng.uniform(0, 360)), float(rng.uniform(0.5, 0.7))
     sensor = float(rng.uniform(1.3, 2.0))
-    fork = (float(rng.uniform(0.12, 0.3)), float(rng.uniform(1.5, 4.0)), float(rng.uniform(1.2, 2.5)))
+    fork = (
+        float(rng.uniform(0.12, 0.3)),
+        float(rng.uniform(1.5, 4.0)),
+        float(rng.uniform(1.2, 2.5)),
+    )
     frames: list[Frame] = []
     made: list[Hanger] = []
     for side, count in enumerate(sides):
@@ -648,15 +675,15 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
             tension = nominal * (1 + miss * nuisances.nominal_error)
             length = float(heights[i]) - gusset
             scale = nuisances.forks
-            flexible = tuple(1e-9 * 10 ** float(v) for v in one.random(2))
+            flexible = (1e-9 * 10 ** one.random(2) * nuisances.support_flexibility).tolist()
             bar = Bar(
                 length_m=length,
                 diameter_m=d * (1 + 0.005 * float(e[0])),
                 modulus_pa=modulus * (1 + 0.015 * float(e[1])),
                 density_kg_m3=density * (1 + 0.003 * float(e[2])),
                 own_weight=nuisances.own_weight,
-                fork=(fork[0] if scale > 0 else 0.0, *(1 + scale * (f - 1) for f in fork[1:])),
-                flexibility_m_per_n=tuple(nuisances.support_flexibility * f for f in flexible),
+                fork=(fork[0] * (scale > 0), 1 + scale * (fork[1] - 1), 1 + scale * (fork[2] - 1)),
+                flexibility_m_per_n=(flexible[0], flexible[1]),
             )
             taped = length + 0.008 * float(e[3]) + 0.001 * length * float(e[4])
             # A pin leaves longitudinal rotation to friction; a gusset bends across its plane.
@@ -672,6 +699,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
                     tension,
                     springs=fixity / (1 - fixity) * layer,
                     softening=0.05 * one.random((2, 2)),
+                    cold=6e-4 * one.random((2, 2)),
                     damping=0.003 * np.exp(0.35 * one.standard_normal((2, SOLVED))),
                     sensor_at_m=min(sensor + 0.1 * float(one.standard_normal()), 0.45 * length),
                     description={
@@ -695,6 +723,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
                 arch=arch,
                 tie=tie,
                 tie_depth_m=tie_depth,
+                tie_expansion=tie_expansion,
             )
         )
     return Bridge(tuple(frames), tuple(made), heading)
@@ -738,19 +767,26 @@ def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisan
     date = start_day - LEAD_D + hours / DAY_H  # day of the year
     shock = rng.standard_normal(days)
     front = lfilter([math.sqrt(1 - 0.75**2)], [1, -0.75], shock)  # e-folding of 3.5 days
-    clear = np.where(rng.random(days) < 0.35, rng.uniform(0.8, 1.0, days), rng.uniform(0.05, 0.5, days))
+    clear = np.where(
+        rng.random(days) < 0.35, rng.uniform(0.8, 1.0, days), rng.uniform(0.05, 0.5, days)
+    )
     declination = np.radians(23.44) * np.sin(2 * math.pi * (284 + date) / YEAR_D)
     angle = 2 * math.pi * (hours % DAY_H - 12) / DAY_H
     latitude = math.radians(50)
     height = np.sin(latitude) * np.sin(declination)
     height = height + np.cos(latitude) * np.cos(declination) * np.cos(angle)
     up = np.maximum(height, 0.0)
-    azimuth = np.arctan2(-np.cos(declination) * np.sin(angle), np.sin(declination) * np.cos(latitude)
-                         - np.cos(declination) * np.sin(latitude) * np.cos(angle))
+    azimuth = np.arctan2(
+        -np.cos(declination) * np.sin(angle),
+        np.sin(declination) * np.cos(latitude)
+        - np.cos(declination) * np.sin(latitude) * np.cos(angle),
+    )
     beam = n.sun * clear[whole] * 950 * up**0.25 * (up > 0)  # across the ray
     air = -9.5 * np.cos(2 * math.pi * (date - 20) / YEAR_D)
     air = air + 4 * np.interp(hours / DAY_H, np.arange(days) + 0.5, front)
-    air = air + (2 + 4 * clear[whole]) * np.cos(2 * math.pi * (hours % DAY_H - 15) / DAY_H) * (0.4 + 0.6 * up)
+    air = air + (2 + 4 * clear[whole]) * np.cos(2 * math.pi * (hours % DAY_H - 15) / DAY_H) * (
+        0.4 + 0.6 * up
+    )
     air = REFERENCE_C + n.temperature * air
     flat = np.sqrt(1 - np.minimum(up, 1) ** 2)
     arch, lit = [], []
@@ -758,9 +794,13 @@ def weather(seed: int, start_day: float, years: float, heading: float, n: Nuisan
         normal = math.radians(heading + 180 * side)
         face = np.maximum(np.cos(azimuth - normal), 0.0) * flat  # the outer web
         arch.append(_lag(air + 14e-3 * beam * (0.6 * up + 0.7 * face), 1.5))
-        lit.append(beam * flat * np.where(np.cos(azimuth - normal) > -0.7, 1.0, 0.6))  # arch's shade
+        lit.append(
+            beam * flat * np.where(np.cos(azimuth - normal) > -0.7, 1.0, 0.6)
+        )  # arch's shade
     tie = _lag(air + 12e-3 * beam * up, 14.0)
-    difference = _lag(8e-3 * beam * up, 3.0) * 1.6 - n.temperature * 0.5 * (_lag(air, 14.0) - air) / 4
+    difference = (
+        _lag(8e-3 * beam * up, 3.0) * 1.6 - n.temperature * 0.5 * (_lag(air, 14.0) - air) / 4
+    )
     return Weather(air, _lag(air, 1.5), np.array(arch), tie, difference, np.array(lit))
 
 
@@ -843,13 +883,17 @@ def _by_date(rounds: _Rounds, draw: Array) -> Array:
 
 
 def _reference_tensions(
-    b: Bridge, influences: list[_Influence], event: Event, relaxation: float | Mapping[int, float], day: Array
+    b: Bridge,
+    influences: list[_Influence],
+    event: Event,
+    relaxation: float | Mapping[int, float],
+    day: Array,
 ) -> Array:
     """(round, hanger): tensions at 10 deg C without traffic; a lost hanger not yet taken out."""
     built = np.array([h.tension_n for h in b.hangers])
     out = np.tile(built, (len(day), 1))
 
-    def alone(number: int, part: Array) -> None:
+    def alone(number: int, part: Any) -> None:
         h = b.hangers[number - 1]
         c = influences[h.side].longer[:, h.index]
         mates = [g.number - 1 for g in b.hangers if g.side == h.side]
@@ -917,10 +961,10 @@ def season(
             tested[plan["day"] >= event.day] = swapped[number]
         tested[plan["astray"]] = b.neighbour(number)
         if event.kind == "hanger_lost":
-            lost = (tested == event.hanger) & (plan["day"] >= event.day)
+            after = plan["day"] >= event.day
+            tested[(tested == event.hanger) & after] = number
             if number == event.hanger:
-                plan["done"] = plan["done"] & ~lost
-            tested[lost] = number
+                plan["done"] = plan["done"] & ~after
         plan["tested"] = tested
         plan |= _tensions(b, influences, sky, event, relaxation_per_year, plan)
     shape = (count, 2, SOLVED)
@@ -931,11 +975,18 @@ def season(
     share = float(_rng(seed, "mistaken").uniform(*n.mistaken))
     tones = np.sort(_rng(seed, "tones").uniform(4, 60, 4))  # pumps, fans, a crossing line
     first = datetime(2022, 1, 1, tzinfo=UTC) + timedelta(days=start)
+    concerned = _concerned(b, influences, event, swapped)
     out = {
-        h.number: _record(seed, h, plan, common, rounds, event, n, (share, tones, first))
+        h.number: _record(
+            seed, h, plan, common, rounds, n, (share, tones, first), event, concerned[h.number]
+        )
         for h, plan in zip(b.hangers, plans, strict=True)
     }
-    truth = {"event": event, "relaxation_per_year": relaxation_per_year, "mistaken_share": share}
+    truth: dict[str, Any] = {
+        "event": event,
+        "relaxation_per_year": relaxation_per_year,
+        "mistaken_share": share,
+    }
     truth |= {"tones_hz": tones.tolist(), "first_day": first.date().isoformat()}
     return Season(out, event, b, truth)
 
@@ -945,7 +996,9 @@ def _common(seed: int, rounds: _Rounds, n: Nuisances) -> dict[str, Array]:
     rng, count = _rng(seed, "common"), len(rounds.day)
     soft = _by_date(rounds, rng.random(count)) < n.softening_days
     wind = _by_date(rounds, rng.exponential(0.5, count))
-    kits = np.array(n.sensor_kg)[0] + np.ptp(n.sensor_kg) * rng.random(2)  # the usual one, the spare
+    kits = np.array(n.sensor_kg)[0] + np.ptp(n.sensor_kg) * rng.random(
+        2
+    )  # the usual one, the spare
     kit = np.where(_by_date(rounds, rng.random(count)) < 0.8, kits[0], kits[1])
     cars = rng.exponential(150.0, count) * n.traffic  # N/m on both sides together
     unread = _by_date(rounds, rng.random(count)) < 0.7 * n.temperature_missing
@@ -1050,7 +1103,7 @@ def _solve(seed: int, h: Hanger, plans: list[dict[str, Any]], event: Event, n: N
     """Put the exact frequencies of this hanger where it was the one tested."""
     mine = event.hanger == h.number
     layer = math.sqrt(h.tension_n * h.bar.bending_nm2)
-    gather: list[tuple[dict[str, Any], Array, State, Array]] = []
+    gather: list[tuple[dict[str, Any], Any, State, Any]] = []
     for plan in plans:
         which = np.flatnonzero(plan["done"] & (plan["tested"] == h.number))
         if len(which) == 0:
@@ -1058,7 +1111,10 @@ def _solve(seed: int, h: Hanger, plans: list[dict[str, Any]], event: Event, n: N
         day, size = plan["day"][which], len(which)
         after = (day >= event.day) & mine
         springs = np.tile(h.springs, (size, 1, 1))
-        kg, at = plan["kit"][which].copy(), np.minimum(plan["sensor_at_m"][which], 0.9 * h.bar.length_m)
+        kg, at = (
+            plan["kit"][which].copy(),
+            np.minimum(plan["sensor_at_m"][which], 0.9 * h.bar.length_m),
+        )
         if event.kind == "springs":
             for p, plane in enumerate(PLANES):
                 for e, end in enumerate(ENDS):
@@ -1073,13 +1129,19 @@ def _solve(seed: int, h: Hanger, plans: list[dict[str, Any]], event: Event, n: N
             at = np.where(after, np.clip(event.place * h.bar.length_m + scatter, 0.1, None), at)
         fixity = springs / (springs + layer)
         loss = n.softening * h.softening * plan["loud"][which][:, None, None]
-        fixity = fixity * (1 - np.minimum(loss, 0.5)) * np.exp(plan["seating"][which])
+        above = plan["warm"][h.number][which] - REFERENCE_C
+        loss = loss + n.cold_joints * h.cold * above[:, None, None]
+        fixity = fixity * (1 - np.clip(loss, -0.1, 0.5)) * np.exp(plan["seating"][which])
         springs = np.minimum(fixity, 0.999) / (1 - np.minimum(fixity, 0.999)) * layer
         tension = plan["total"][which, h.number - 1]
-        gather.append((plan, which, State(tension, springs, plan["warm"][h.number][which], kg, at), after))
+        gather.append(
+            (plan, which, State(tension, springs, plan["warm"][h.number][which], kg, at), after)
+        )
     if not gather:
         return
-    states = State(*(np.concatenate([getattr(g[2], name) for g in gather]) for name in vars(gather[0][2])))
+    states = State(
+        *(np.concatenate([getattr(g[2], name) for g in gather]) for name in vars(gather[0][2]))
+    )
     after = np.concatenate([g[3] for g in gather])
     exact, seen = np.zeros((len(after), 2, SOLVED)), np.zeros((len(after), 2, SOLVED))
     changed = h.bar
@@ -1096,10 +1158,11 @@ def _solve(seed: int, h: Hanger, plans: list[dict[str, Any]], event: Event, n: N
     begin = 0
     for plan, which, state, _ in gather:
         size = len(which)
-        plan["exact"][which], plan["seen"][which] = exact[begin : begin + size], seen[begin : begin + size]
-        plan.setdefault("state", {}).update(
-            {int(v): state.part(k) for k, v in enumerate(which)}
+        plan["exact"][which], plan["seen"][which] = (
+            exact[begin : begin + size],
+            seen[begin : begin + size],
         )
+        plan.setdefault("state", {}).update({int(v): state.part(k) for k, v in enumerate(which)})
         begin += size
 
 
@@ -1109,9 +1172,10 @@ def _record(
     plan: dict[str, Any],
     common: dict[str, Array],
     rounds: _Rounds,
-    event: Event,
     n: Nuisances,
     season_wide: tuple[float, Array, datetime],
+    event: Event,
+    concerned: str,
 ) -> HangerSeason:
     """What the team hands in for one hanger, and the truth about it."""
     share, tones, first = season_wide
@@ -1124,7 +1188,7 @@ def _record(
     prone = 0.6 + 2.4 * (rng.random(shape[1:]) < 1 / 6)  # some modes are easily taken for others
     shift, highest = rng.random((count, 2)), rng.integers(ORDERS - 1, ORDERS + 1, count)
     thermometer, amplitude = rng.standard_normal(count), rng.standard_normal(count)
-    unread, unheard = rng.random(count), rng.random(count)
+    unread, unheard, typo = rng.random(count), rng.random(count), rng.random(count)
     visits: list[dict[str, Any]] = []
     rows: list[dict[str, Any]] = []
     mistaken: list[dict[str, Any]] = []
@@ -1136,6 +1200,8 @@ def _record(
         if not (common["unread"][v] or unread[v] < 0.35 * n.temperature_missing):
             felt = float(plan["shade"][v] + common["thermometer"][v] + 0.5 * thermometer[v])
             felt = air + n.thermometer * (felt - air)
+            if typo[v] < n.temperature_typos:
+                felt = -felt if typo[v] < n.temperature_typos / 2 else felt + 10
             visit["temperature_c"] = float(round(felt)) if n.thermometer else felt
         if unheard[v] >= n.amplitude_missing:
             read = float(plan["amplitude"][v] * math.exp(n.amplitude_recorded_sd * amplitude[v]))
@@ -1159,8 +1225,10 @@ def _record(
                 if moved:
                     truth_hz, kind = float(exact[p, k + 1]), "order_shift"
                 elif wrong[v, p, k] < max(share - 0.003, 0.0) * prone[p, k]:
-                    truth_hz, kind = _mistake(exact, p, k, which_kind[v, p, k], which_way[v, p, k], tones)
-                read = truth_hz * (clock if kind != "tone" else clock) * (1 + float(error[p, k]))
+                    truth_hz, kind = _mistake(
+                        exact, p, k, which_kind[v, p, k], which_way[v, p, k], tones
+                    )
+                read = truth_hz * clock * (1 + float(error[p, k]))
                 sd = read * float(stated[p, k])
                 damping = float(zeta[p, k]) * math.exp(0.25 * n.scatter * float(rub[v, p, k]))
                 modes.append(
@@ -1206,7 +1274,7 @@ def _record(
         )
     truth = {
         "event": event,
-        "concerned": _concerned(h.number, event, plan),
+        "concerned": concerned,
         "built_tension_n": h.tension_n,
         "bar": h.bar,
         "springs_nm_rad": h.springs.tolist(),
@@ -1222,16 +1290,21 @@ def _astray(rows: list[dict[str, Any]], plan: dict[str, Any]) -> list[tuple[dict
     return [(row, row["day"] in strayed and row["tested_hanger"] != plan["hanger"]) for row in rows]
 
 
-def _concerned(number: int, event: Event, plan: dict[str, Any]) -> str:
-    """"event", "by the frame" (a neighbour's tension moved by more than 0.1 %) or ""."""
+def _concerned(
+    b: Bridge, influences: list[_Influence], event: Event, swapped: dict[int, int]
+) -> dict[int, str]:
+    """Which hangers an event moves: "event", "frame" (tension by more than 0.1 %) or ""."""
+    out = {h.number: "event" if event.kind == "clock" else "" for h in b.hangers}
     if event.kind == "none":
-        return ""
-    if event.kind == "clock" or number == event.hanger:
-        return "event"
-    if event.kind == "neighbour_swap":
-        after = (plan["day"] >= event.day) & ~plan["astray"]
-        return "event" if (plan["tested"][after] != number).any() else ""
-    return ""
+        return out
+    own = b.hangers[event.hanger - 1]
+    part = -1.0 if event.kind == "hanger_lost" else event.size
+    if event.kind in ("tension_step", "tension_ramp", "retensioned", "hanger_lost"):
+        c = influences[own.side].longer[:, own.index]
+        for h in (h for h in b.hangers if h.side == own.side):
+            change = part * own.tension_n * c[h.index] / c[own.index] / h.tension_n
+            out[h.number] = "frame" if abs(change) > 1e-3 else ""
+    return out | dict.fromkeys((event.hanger, *swapped), "event")
 
 
 def _mistake(
