@@ -109,7 +109,7 @@ class Nuisances:
     softening: float = 1.0  # scale of the joints' 0 to 5 % of fixity per unit of amplitude
     softening_days: float = 0.15
     seating_sd: float = 0.002  # of the fixity, from visit to visit: joints never sit alike
-    cold_joints: float = 1.0  # scale of 0 to 0.06 % of fixity lost per K (sleeves, paint, rust)
+    cold_joints: float = 1.0  # scale of 0 to 0.03 % of fixity lost per K (sleeves, paint, rust)
     sensor_kg: tuple[float, float] = (0.2, 0.45)
     sensor_place_sd_m: float = 0.15
     sensor_elsewhere: float = 0.15  # share of visits with the sensor anywhere in reach of a ladder
@@ -230,7 +230,7 @@ def _reference() -> tuple[Any, ...]:
 class Matrices:
     """Stiffness and mass of a bar: elastic, per newton of tension, from own weight, mass."""
 
-    def __init__(self, bar: Bar, elements: int = 4) -> None:
+    def __init__(self, bar: Bar, elements: int = 5) -> None:
         self.bar, length = bar, bar.length_m
         points, weights, value, slope, self._to_legendre = _reference()
         fork, stiffer, heavier = bar.fork
@@ -344,7 +344,7 @@ def frequencies(bar: Bar, state: State, count: int = SOLVED) -> tuple[Array, Arr
     """Frequencies (visit, plane, order) of all visits and how well the sensor saw each mode.
 
     Modes of the extreme states (least and most tension and springs, either plane) span a basis of
-    some 25 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it, and the
+    some 40 vectors, orthonormal in the bar's mass; the stiffness of a visit is a sum in it, and the
     sensor, a rank-one mass, is taken out in closed form.
     """
     m = Matrices(bar)
@@ -360,10 +360,14 @@ def frequencies(bar: Bar, state: State, count: int = SOLVED) -> tuple[Array, Arr
                 seen.add(key)
                 heavy = float(state.sensor_kg.mean()), float(state.sensor_at_m.mean())
                 span.append(m.solve(tension, k, warm, *heavy, number)[1])
+    # A light bar bends visibly about its sensor: the deflections under a force where it was put.
+    forces = m.shape(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
+    middle = m.stiffness(sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
+    span.append(np.linalg.solve(middle, forces))
     raw = np.hstack(span)
     raw /= np.sqrt(np.einsum("ij,ij->j", raw, m.mass @ raw))
     values, vectors = np.linalg.eigh(raw.T @ m.mass @ raw)
-    keep = values > 1e-9 * values[-1]
+    keep = values > 1e-11 * values[-1]
     basis = raw @ (vectors[:, keep] / np.sqrt(values[keep]))
     elastic, string, weight = (basis.T @ k @ basis for k in (m.elastic, m.string, m.weight))
     turns = m.turns @ basis
@@ -704,7 +708,7 @@ def bridge(seed: int, hangers: int, nuisances: Nuisances) -> Bridge:
                     tension,
                     springs=fixity / (1 - fixity) * layer,
                     softening=0.05 * one.random((2, 2)),
-                    cold=6e-4 * one.random((2, 2)),
+                    cold=3e-4 * one.random((2, 2)),
                     damping=0.003 * np.exp(0.35 * one.standard_normal((2, SOLVED))),
                     sensor_at_m=min(sensor + 0.1 * float(one.standard_normal()), 0.45 * length),
                     description={
@@ -866,7 +870,7 @@ def _rounds(seed: int, years: float, n: Nuisances) -> _Rounds:
     days, hours, operators, stretches = [], [], [], []
     now, stretch = float(rng.uniform(0, 5)), 0
     while now < total:
-        operator, hour = int(rng.choice(3, p=(0.55, 0.3, 0.15))), float(rng.uniform(7.5, 13.0))
+        operator, hour = int(rng.choice(3, p=(0.55, 0.3, 0.15))), float(rng.uniform(7.5, 14.0))
         again, later = rng.random(), float(rng.uniform(2.5, 4.5))
         for each in (hour, hour + later) if again < n.twice else (hour,):
             days.append(math.floor(now))
