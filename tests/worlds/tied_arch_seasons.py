@@ -363,7 +363,7 @@ def frequencies(bar: Bar, state: State, count: int = SOLVED) -> tuple[Array, Arr
     # A light bar bends visibly about its sensor: the deflections under a force where it was put.
     forces = m.shape(np.quantile(state.sensor_at_m, np.linspace(0, 1, 7))).T
     middle = m.stiffness(sum(tensions) / 2, state.springs.mean(axis=(0, 1)), warm)
-    span.append(np.linalg.solve(middle, forces))
+    span.append(np.asarray(np.linalg.solve(middle, forces), dtype=float))
     raw = np.hstack(span)
     raw /= np.sqrt(np.einsum("ij,ij->j", raw, m.mass @ raw))
     values, vectors = np.linalg.eigh(raw.T @ m.mass @ raw)
