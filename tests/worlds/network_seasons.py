@@ -42,6 +42,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -277,7 +278,7 @@ def dynamic_stiffness_hz(
     def smallest(hz: float) -> float:
         square = (2 * np.pi * hz) ** 2
         total = np.zeros((2 * len(x), 2 * len(x)))
-        for i, (low, high) in enumerate(zip(x, x[1:], strict=False)):
+        for i, (low, high) in enumerate(pairwise(x)):
             middle, h = (low + high) / 2, high - low
             ei = beam.bending_nm2 * factors["bend"]
             mass, ga = beam.mass_kg_m, beam.shear_n * factors["fit"]
@@ -326,7 +327,7 @@ class Reduced:
         discrete = Discrete(beam, states[0].tension_n)
         shapes = [full_modes(discrete, state, count)[1] for state in states]
         factors = _coefficients(beam, states[0])
-        stiff = sum(factors[name] * part for name, part in discrete.k.items())
+        stiff = np.asarray(sum(factors[name] * part for name, part in discrete.k.items()))
         free = discrete.free
         loads = [discrete.at(place) for place in beam.marks_m]
         for node in (0, discrete.size - 1):
@@ -425,10 +426,11 @@ class Nuisances:
     @classmethod
     def none(cls) -> "Nuisances":
         """The textbook: uniform hanger as described, constant state, exact frequencies."""
-        return cls(**{
+        off: dict[str, Any] = {
             name: (0.0, 0.0) if isinstance(value, tuple) else 0.0
             for name, value in vars(cls()).items()
-        })  # fmt: skip
+        }
+        return cls(**off)
 
 
 @dataclass(frozen=True)
@@ -572,13 +574,13 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             lengths = np.minimum((2.5 + 1.5 * u[8:10]) * diameter, 0.08 * length)
             zones.append(Zone(0.0, float(lengths[0]), bend, heavy, np.sqrt(bend)))
             zones.append(Zone(length - float(lengths[1]), length, bend, heavy, np.sqrt(bend)))
-        known = {}
+        known: dict[str, float] = {}
         sleeve = _stream(seed, "sleeve", i).uniform(size=4)
         if sleeve[0] < n.sleeve_share:
             start = 0.12 * length + 0.1 * sleeve[1] * length
             long = (4 + 3 * sleeve[2]) * diameter
             zones.append(Zone(start, start + long, 3 + 3 * sleeve[3], 2.5, 2.0))
-            known = {"sleeve_at_m": start + long / 2, "sleeve_length_m": long}
+            known = {"sleeve_at_m": float(start + long / 2), "sleeve_length_m": float(long)}
         j = i + 1
         if j < count and i not in partners and draws[i, 0] < n.crossing_share:
             soft = float(np.exp(np.interp(draws[i, 3], (0, 1), np.log([200.0, 3000.0]))))
@@ -586,7 +588,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             partners[i], partners[j] = (j, mine, other, soft), (i, other, mine, soft)
         crossing = partners.get(i)
         if crossing:
-            known["crossing_at_m"] = crossing[1] * length
+            known["crossing_at_m"] = float(crossing[1] * length)
         description = {
             **({"diameter_m": diameter} if rod else {"area_m2": area}),
             "second_moment_m4": moment,
@@ -599,7 +601,7 @@ def bridge(seed: int, count: int, nuisances: Nuisances) -> list[Hanger]:
             **known,
         }
         hangers.append(Hanger(
-            name=f"H{i + 1:02d}", kind=description["kind"], diameter_m=diameter,
+            name=f"H{i + 1:02d}", kind="rod" if rod else "strand", diameter_m=diameter,
             area_m2=area * grown, second_moment_m4=moment * grown**2, modulus_pa=true_modulus,
             density_kg_m3=true_density, mass_kg_m=true_density * area * grown, length_m=length,
             inclination_rad=float(np.deg2rad(55 + 30 * _stream(seed, "slope", i).uniform())),
@@ -786,17 +788,17 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
         other, who = rng.uniform(size=size), rng.integers(3, size=size)
         for k, day in enumerate(np.floor(planned + jitter)):
             if not skip[k] and 0 <= day < days - 1:
-                person = int(who[k]) if other[k] < 0.25 else own
-                visits.append(_Visit(float(day + hours[k] / 24), person, i, i))
+                comes = int(who[k]) if other[k] < 0.25 else own
+                visits.append(_Visit(float(day + hours[k] / 24), comes, i, i))
     batch = _stream(seed, "campaigns")
     for year in range(int(np.ceil(days / 365.25))):  # spring and autumn, every hanger in a day
         for start in (15.0, 150.0):
-            late, who = 20 * n.irregular * batch.uniform(), int(batch.integers(3))
+            late, person = 20 * n.irregular * batch.uniform(), int(batch.integers(3))
             day = np.floor(365.25 * year + start + late)
             for i in range(count):
                 if day < days - 1:
                     time = float(day + (8 + 9 * i / count) / 24)
-                    visits.append(_Visit(time, who, i, i))
+                    visits.append(_Visit(time, person, i, i))
     rng = _stream(seed, "winter")
     kept = []
     for visit in sorted(visits, key=lambda v: (v.day, v.named)):
@@ -807,8 +809,9 @@ def _schedule(seed: int, count: int, days: float, n: Nuisances) -> list[_Visit]:
     for visit in kept:
         draw, side = mix.uniform(), int(mix.integers(2))
         if draw < n.swapped and count > 1:
-            other = visit.named + (1 if side else -1)
-            visit.measured = other if 0 <= other < count else visit.named - (1 if side else -1)
+            step = 1 if side else -1
+            inside = 0 <= visit.named + step < count
+            visit.measured = visit.named + (step if inside else -step)
     return kept
 
 
@@ -951,7 +954,7 @@ def true_frequencies(
             ties.append((soft, np.concatenate((here, -there), axis=1)))
         if mine and event.kind == "damper":
             weight = (1 - DAMPER_CLAMP_SHARE) * event.size
-            since = np.array([v.day >= event.day for v in visits])[:, None]
+            since = np.array([[1.0 * (v.day >= event.day)] for v in visits])
             here = own.at(event.at_share * h.length_m, shapes) * since
             others = [np.zeros((len(visits), part.shape[1])) for part in squares[1:]]
             free = -since / np.sqrt(weight)
@@ -985,7 +988,7 @@ def _mistakes(
     comes, start, length = rng.uniform(size=3)
     mode = (int(rng.integers(2)), int(rng.integers(table.shape[2])))
     out, causes = table.copy(), {}
-    visits, planes, orders = table.shape
+    visits, _, orders = table.shape
     for v, p, o in zip(*np.nonzero(draws[..., 0] < share), strict=True):
         kind, side = draws[v, p, o, 1], draws[v, p, o, 2]
         tone = _tone(table[v, p, o], deck_hz)
@@ -1010,7 +1013,7 @@ def _mistakes(
 
 def _scatter(rng: np.random.Generator, shape: tuple[int, int, int], n: Nuisances) -> Array:
     """Unit-variance errors: a part of the visit, of an order in both planes, of a mode alone."""
-    visits, planes, orders = shape
+    visits, _, orders = shape
     whole = rng.standard_normal((visits, 1, 1))
     both = rng.standard_normal((visits, 1, orders))
     alone = rng.standard_normal(shape)
@@ -1123,8 +1126,8 @@ def _measure(
             "time": (START + timedelta(days=visit.day)).strftime("%Y-%m-%dT%H:%M:%SZ")
         }
         if noted[k] >= n.temperature_missing:
-            read = truth["air_c"] + person.thermometer_k + 0.4 * n.operators * air[k]
-            test["temperature_c"] = round(read, 1)
+            felt = truth["air_c"] + person.thermometer_k + 0.4 * n.operators * air[k]
+            test["temperature_c"] = round(float(felt), 1)
         if told[k] >= n.amplitude_missing:
             test["amplitude"] = float(
                 truth["amplitude"] * np.exp(0.1 * n.operators * amplitude_error[k])
@@ -1223,7 +1226,7 @@ def ambient(
     0 C, where asphalt and bearings stiffen, in a deck temperature Td that lags the air by a day
     (Peeters and De Roeck, Earthquake Eng. Struct. Dyn. 30, 2001, for bridge Z24: 14-18 % over
     the year in modes 1, 3 and 4 and a knee at 0 C; slopes here -2 to -5e-4 / K above, so 1-2 %
-    a summer, 3-8 % in a frost).  Traffic mass by weekday -1e-3 at most, and random; moisture of
+    a summer, 1-4 % in a frost).  Traffic mass by weekday -1e-3 at most, and random; moisture of
     the deck, slow, -1e-3.  Bending across the bridge is "transverse", vertical "longitudinal".
     """
     n = nuisances or AmbientNuisances()
@@ -1273,7 +1276,9 @@ def ambient(
         gone[first_day : first_day + int(n.outages * 28 * length)] = True
     orders = [1 + planes[:k].count(planes[k]) for k in range(count)]
     error = n.scatter * noise * (0.9 * z + 0.4 * common[:, None])
-    tests, kept, swaps = [], [], []
+    tests: list[dict[str, Any]] = []
+    kept: list[int] = []
+    swaps: list[int] = []
     for d in np.nonzero(~gone)[0]:
         read = true[d] * (1 + error[d])
         if drawn[d, 7] < n.mode_swaps:
