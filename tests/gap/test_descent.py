@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from shm.gap.descent import Optimum, optima
-from shm.gap.landscape import Landscape
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.coordinates import Branch, Coordinates
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
+from shm.gap.objective import Landscape
+from shm.gap.optimiser import Optimum, optima
 from shm.models.effects import Parameter
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import logsumexp
-from shm.gap.chances import Tried, log_prior
 
 from shm.gap import search as searching
 from shm.gap.contract import GapOptions, Hypothesis, silent
+from shm.gap.model_probabilities import ScoredHypothesis, log_prior
 from shm.gap.search import Search
 from shm.models.effects import EFFECTS, Variant
 from tests.helpers.gap_campaigns import campaign, problem_of
@@ -20,7 +20,7 @@ CATALOGUE = ("effective_length", "bending_stiffness", "point_mass")
 CLAMP, STIFFER = ("point_mass", Variant()), ("bending_stiffness", Variant())
 MASS = Hypothesis((CLAMP,))
 NOTHING = Hypothesis()
-Step = Callable[[Search, list[Tried]], list[Tried]]
+Step = Callable[[Search, list[ScoredHypothesis]], list[ScoredHypothesis]]
 STEPS: dict[str, Step] = {
     "unknown": Search.with_unknown,
     "pairs": Search.with_pairs,
@@ -52,7 +52,7 @@ def clamped(told: list[tuple[str, float]]) -> Search:
 
 
 @pytest.fixture(scope="module")
-def steps(clamped: Search) -> dict[str, list[Tried]]:
+def steps(clamped: Search) -> dict[str, list[ScoredHypothesis]]:
     """What was tried after each step, of a bar with a clamp."""
     found = {"singles": clamped.singles()}
     tried = found["singles"]
@@ -62,12 +62,12 @@ def steps(clamped: Search) -> dict[str, list[Tried]]:
 
 
 @pytest.fixture(scope="module")
-def sound() -> tuple[Search, list[Tried]]:
+def sound() -> tuple[Search, list[ScoredHypothesis]]:
     search = begun((), ())
     return search, search.singles()
 
 
-def of(tried: Sequence[Tried]) -> dict[Hypothesis, Tried]:
+def of(tried: Sequence[ScoredHypothesis]) -> dict[Hypothesis, ScoredHypothesis]:
     return {each.hypothesis: each for each in tried}
 
 
@@ -75,12 +75,12 @@ def parts(pair: Hypothesis) -> set[Hypothesis]:
     return {Hypothesis((effect,)) for effect in pair.effects}
 
 
-def weight(search: Search, each: Tried) -> float:
+def weight(search: Search, each: ScoredHypothesis) -> float:
     return each.log_evidence + log_prior(each.hypothesis, search.variants)
 
 
 def test_every_step_keeps_what_was_tried_and_tries_nothing_twice(
-    steps: dict[str, list[Tried]],
+    steps: dict[str, list[ScoredHypothesis]],
 ) -> None:
     before: set[tuple[frozenset[object], bool]] = set()
     for name, tried in steps.items():
@@ -91,7 +91,7 @@ def test_every_step_keeps_what_was_tried_and_tries_nothing_twice(
 
 
 def test_singles_are_no_gap_and_every_effect_at_every_place(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     tried = steps["singles"]
     assert tried[0].hypothesis == NOTHING
@@ -107,7 +107,7 @@ def test_singles_are_no_gap_and_every_effect_at_every_place(
 
 
 def test_what_stands_a_chance_is_fitted_and_the_rest_screened(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     """A planted clamp explains 14 more than anything else that acts alone."""
     tried = of(steps["singles"])
@@ -119,7 +119,7 @@ def test_what_stands_a_chance_is_fitted_and_the_rest_screened(
 
 
 def test_of_a_sound_bar_nothing_leads_and_no_pair_is_called_for(
-    sound: tuple[Search, list[Tried]],
+    sound: tuple[Search, list[ScoredHypothesis]],
 ) -> None:
     search, tried = sound
     assert len([each for each in tried if each.fit is not None]) > 2
@@ -127,7 +127,7 @@ def test_of_a_sound_bar_nothing_leads_and_no_pair_is_called_for(
 
 
 def test_a_second_effect_is_called_for_where_a_first_one_is_supported(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     tried = steps["singles"]
     assert clamped.calls_for_pairs(tried)
@@ -141,7 +141,7 @@ def test_a_second_effect_is_called_for_where_a_first_one_is_supported(
 
 
 def test_something_unknown_is_added_to_no_gap_and_to_fitted_leaders_alone(
-    steps: dict[str, list[Tried]],
+    steps: dict[str, list[ScoredHypothesis]],
 ) -> None:
     added = [each.hypothesis for each in steps["unknown"] if each.hypothesis.flexible]
     assert added == [replace(NOTHING, flexible=True), replace(MASS, flexible=True)]
@@ -149,7 +149,7 @@ def test_something_unknown_is_added_to_no_gap_and_to_fitted_leaders_alone(
 
 
 def test_pairs_are_of_a_leader_with_each_other_effect_and_fitted(
-    steps: dict[str, list[Tried]],
+    steps: dict[str, list[ScoredHypothesis]],
 ) -> None:
     known, after = of(steps["unknown"]), of(steps["pairs"])
     pairs = [each for h, each in after.items() if h not in known and not h.flexible]
@@ -164,7 +164,7 @@ def test_pairs_are_of_a_leader_with_each_other_effect_and_fitted(
 
 
 def test_in_the_end_every_single_effect_has_a_fit_no_worse_than_its_scan(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     scanned, fits = of(steps["other pairs"]), of(steps["every effect"])
     assert all(each.fit is not None for each in fits.values())
@@ -175,7 +175,7 @@ def test_in_the_end_every_single_effect_has_a_fit_no_worse_than_its_scan(
 
 
 def test_pairs_of_all_kinds_are_tried_once_and_few_of_each(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     known = of(steps["every effect"])
     added = [e.hypothesis for e in steps["many pairs"] if e.hypothesis not in known]
@@ -203,7 +203,7 @@ def test_two_planted_effects_are_found_as_a_pair_that_no_leader_held() -> None:
 
 
 def test_a_fit_of_a_pair_is_no_worse_than_where_its_effects_lie_alone(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     tried = of(steps["every effect"])
     for pair in (h for h in tried if len(h.effects) == 2 and not h.flexible):
@@ -221,7 +221,7 @@ def test_a_fit_of_a_pair_is_no_worse_than_where_its_effects_lie_alone(
 
 
 def test_the_likeliest_are_sampled_and_the_others_stay(
-    clamped: Search, steps: dict[str, list[Tried]]
+    clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     before, after = of(steps["many pairs"]), of(steps["sampled"])
     first = max(weight(clamped, each) for h, each in before.items() if not h.flexible)
@@ -238,7 +238,7 @@ def test_the_likeliest_are_sampled_and_the_others_stay(
 
 
 def test_no_more_than_five_are_sampled_the_likeliest_first(
-    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[Tried]]
+    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     sampled: list[Hypothesis] = []
 
@@ -259,11 +259,13 @@ def test_no_more_than_five_are_sampled_the_likeliest_first(
     assert set(sampled) == {each.hypothesis for each in alike[: searching.MOST_SAMPLED]}
 
 
-def test_laws_are_allowed_for_where_an_effect_was_fitted(steps: dict[str, list[Tried]]) -> None:
+def test_laws_are_allowed_for_where_an_effect_was_fitted(
+    steps: dict[str, list[ScoredHypothesis]],
+) -> None:
     before, after = of(steps["sampled"]), of(steps["laws"])
     for h, each in after.items():
         has_laws = bool(h.effects) and not h.flexible
-        assert (each.log_passing is not None) is has_laws
+        assert (each.log_mimic is not None) is has_laws
         assert (each.draws is not None) is has_laws
         if not has_laws:
             assert each is before[h]
@@ -272,7 +274,7 @@ def test_laws_are_allowed_for_where_an_effect_was_fitted(steps: dict[str, list[T
 
 
 def test_what_lies_hopelessly_far_behind_keeps_the_letter_of_its_law(
-    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[Tried]]
+    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     tried = steps["every effect"]
     first = max(each.log_evidence for each in tried)
@@ -288,11 +290,11 @@ def test_what_lies_hopelessly_far_behind_keeps_the_letter_of_its_law(
         monkeypatch.setattr(searching, "LAWS_WITHIN", within)
         monkeypatch.setattr(searching, "LAWS_WITHIN_SHARE", share)
         found = of(clamped.with_laws(tried))[far.hypothesis]
-        assert (found.log_passing is not None) is looked_at
+        assert (found.log_mimic is not None) is looked_at
 
 
 def test_the_mean_over_laws_gives_half_to_an_effects_own(
-    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[Tried]]
+    monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:
     """p = 1/2 p(own) e^gain + 1/2n sum of p(other) e^gain, and the same of what passes for it."""
     tried = of(steps["every effect"])[MASS]
@@ -304,21 +306,21 @@ def test_the_mean_over_laws_gives_half_to_an_effects_own(
     class Found:
         def __init__(self, fit):  # type: ignore[no-untyped-def]
             self.fit, self.draws = fit, fit.draws
-            self.gain, self.passing = gains[id(fit)]
+            self.gain, self.mimic = gains[id(fit)]
 
     monkeypatch.setattr(searching, "by_its_laws", lambda p, b, fit, rng: Found(fit))
     monkeypatch.setattr(clamped, "_by_other_laws", lambda fit: others)
     found = clamped._by_its_laws(tried, anew=True)
     base = np.array([0, 1.0, -2.0]) + own.log_evidence + np.log([0.5, 0.25, 0.25])
     assert found.log_evidence == pytest.approx(logsumexp(base + np.array([0.3, -0.4, 0.5])))
-    assert found.log_passing == pytest.approx(logsumexp(base + np.array([0.1, 0.2, -0.6])))
+    assert found.log_mimic == pytest.approx(logsumexp(base + np.array([0.1, 0.2, -0.6])))
     assert found.fit is own  # the likeliest of the three
     alone = clamped._by_its_laws(tried, anew=False)
     assert alone.log_evidence == pytest.approx(own.log_evidence + 0.3)
 
 
 def test_progress_never_goes_back_and_names_what_is_done(
-    steps: dict[str, list[Tried]], told: list[tuple[str, float]]
+    steps: dict[str, list[ScoredHypothesis]], told: list[tuple[str, float]]
 ) -> None:
     assert steps
     labels, done = zip(*told, strict=True)

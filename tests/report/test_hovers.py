@@ -9,14 +9,14 @@ from datetime import datetime
 from typing import Any
 
 import pytest
-from shm.report.figures.sheet_spectra import Shown
-from tests.report.test_sheet_figures import CASES as SHEETS
 
 from shm.report.contents import HangerReport
 from shm.report.figures import gap_before_and_after, gap_causes, gap_map, parameter_pairs
-from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_SHEET
+from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
+from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.specification import Panel, Points, Rule, Specification
 from tests.report.diagnoses import CASES, sheet
+from tests.report.test_modal_test_figures import CASES as SHEETS
 
 Told = tuple[str, Specification, Panel, Any]
 _FIELD = re.compile(r"%\{(\w+)(?::([^}]+))?\}")
@@ -28,7 +28,7 @@ def specifications(season: HangerReport) -> Iterator[tuple[str, Specification]]:
     drawn: list[tuple[str, Any]] = []
     for case, make in SHEETS.items():
         shown = Shown.of(make())
-        drawn += [(f"{case}: {member.name}", member.draw(shown)) for member in OF_SHEET]
+        drawn += [(f"{case}: {member.name}", member.draw(shown)) for member in OF_MODAL_TEST]
     for case in CASES:
         made = sheet(case)
         drawn += [(f"{case}: {member.name}", member.draw(made)) for member in OF_DIAGNOSIS]
