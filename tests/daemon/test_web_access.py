@@ -191,7 +191,7 @@ def test_whom_a_stranger_names_is_not_believed() -> None:
 def test_the_wrong_tokens_of_many_addresses_take_little_memory() -> None:
     now = [0.0]
     wrong = WrongTokens(lambda: now[0])
-    for number in range(20_000):
+    for number in range(6_000):
         wrong.note_wrong(f"10.{number >> 16}.{number >> 8 & 255}.{number & 255}")
         wrong.note_right(f"token {number}")
     assert len(wrong._wrong) <= 4096

@@ -37,7 +37,10 @@ from tests.helpers.workspaces import START, make_workspace
 _FASTER = 600.0
 """A minute of the daemon's waiting passes in a tenth of a second."""
 
-_LONGEST_S = 6.0
+_FULL_S = 2.0
+"""A disk that stays full is met for so long: twenty of the daemon's minutes."""
+_LONGEST_S = 60.0
+"""A daemon on a disk with room, in time, ends by itself long before."""
 _FOR_EVER = 2**40
 _ENDED, _TOLD, _UNTOLD = 0, 3, 4
 
@@ -68,15 +71,13 @@ def _daemon(workspace: Workspace, moment: Moment | None) -> int:
     loop.time = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))  # type: ignore[assignment]
     wait = wakeup.wait
     wakeup.wait = lambda seconds: wait(min(seconds / _FASTER, 0.05))  # type: ignore[method-assign]
-    timer = threading.Timer(_LONGEST_S, wakeup.stop)
-    timer.daemon = True
-    timer.start()
 
     def clock() -> object:
         return START + timedelta(days=100, seconds=_FASTER * (time.monotonic() - began))
 
     if moment is not None:
         recorder.record_fill(ctypes.c_long(moment.first), ctypes.c_long(moment.last))
+    threading.Thread(target=_end, args=(wakeup, moment), daemon=True).start()
     try:
         loop.run(
             workspace,
@@ -89,6 +90,16 @@ def _daemon(workspace: Workspace, moment: Moment | None) -> int:
     except ShmError:
         return _TOLD
     return _ENDED
+
+
+def _end(wakeup: Wakeup, moment: Moment | None) -> None:
+    """Ends a daemon that will not end by itself, a while after it met the full disk."""
+    recorder, latest = ctypes.CDLL(None), time.monotonic() + _LONGEST_S
+    full = _FOR_EVER if moment is None or moment.last < _FOR_EVER else moment.first
+    while recorder.record_asked() < full and time.monotonic() < latest:
+        time.sleep(0.05)
+    time.sleep(_FULL_S)
+    wakeup.stop()
 
 
 def _in_a_process(workspace: Workspace, moment: Moment | None) -> int:
