@@ -20,7 +20,6 @@ from shm.plausibility import FIRST_DAY
 from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
 from shm.store.holding import discarded_reason, taking_back
 from shm_cli.common import paragraph, show
-from shm_cli.working import LEFT_TO_IT, finish, working
 
 
 def show_held(workspace: Workspace, as_json: bool) -> int:
@@ -57,6 +56,9 @@ def decide(
 
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
+    # It brings the hooks' libraries; `shm status` and `shm ingest --held` only tell.
+    from shm_cli.working import LEFT_TO_IT, finish, working
+
     _refuse_impossible(time, workspace.bridge.built)
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:

@@ -11,14 +11,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import timedelta
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
-from shm.pipeline.adopting import GapWatch, gap_watch
 from shm.report.formatting import model_class
 from shm.store import (
     ENDED,
@@ -35,6 +34,9 @@ from shm_cli.held import hold_document
 from shm_cli.silences import said_of
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import never_taken, scan
+
+if TYPE_CHECKING:
+    from shm.pipeline.adopting import GapWatch
 
 
 @click.command()
@@ -152,6 +154,13 @@ def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
     }
 
 
+def _gap_watch(store: Store, hanger: int) -> GapWatch | None:
+    # It brings the whole pipeline, and of few hangers an effect is adopted.
+    from shm.pipeline.adopting import gap_watch
+
+    return gap_watch(store, hanger)
+
+
 def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
     """Which classes compete and why others do not, each with the hangers that it is true of."""
     found: dict[str, list[str]] = {}
@@ -216,9 +225,10 @@ def _hangers(
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
         try:
-            baseline, watch = store.watch.baseline(hanger.id), gap_watch(store, hanger.id)
+            baseline = store.watch.baseline(hanger.id)
             of_baseline = store.tests.of_baseline(baseline) if baseline else ()
             adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
+            watch = _gap_watch(store, hanger.id) if adopted else None
         except DamagedRow as error:
             damage[hanger.id] = str(error)
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])

@@ -134,7 +134,7 @@ class _Worker:
         from shm.pipeline import steps  # in a thread: nobody waits for it
 
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload([steps.__name__])
+        context.set_forkserver_preload([steps.__name__, "scipy.optimize"])
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
         try:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from shm.values import FloatArray, Prior
 
@@ -35,7 +35,7 @@ _LOG_10 = np.log(10)  # the exponential is much quicker than a power of ten
 
 def quantile(share: FloatArray) -> FloatArray:
     """Standard normal z of shares of a prior's range, kept off its ends."""
-    return np.asarray(ndtri(share.clip(_EDGE, 1 - _EDGE)))
+    return np.asarray(scipy.special.ndtri(share.clip(_EDGE, 1 - _EDGE)))
 
 
 def log_normal(z: FloatArray) -> FloatArray:
@@ -60,7 +60,7 @@ class Coordinates:
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Parameters (n, d) of places (n, d); a place outside of the prior gets a near one's."""
-        share = ndtr(z)
+        share = scipy.special.ndtr(z)
         theta = np.asarray(self.prior.lower + self._width * share)
         for one, other in self._pairs:
             weaker = self._weaker(theta[:, one], theta[:, other])
@@ -100,8 +100,8 @@ class Coordinates:
         """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
         density = log_normal(z)
         for one, other in self._pairs:
-            stronger = self.prior.lower[one] + self._width[one] * ndtr(z[:, one])
-            mixed = self.prior.lower[other] + self._width[other] * ndtr(z[:, other])
+            stronger = self.prior.lower[one] + self._width[one] * scipy.special.ndtr(z[:, one])
+            mixed = self.prior.lower[other] + self._width[other] * scipy.special.ndtr(z[:, other])
             weaker = self._weaker(stronger, mixed)
             inside = (weaker <= stronger) & (weaker >= self.prior.lower[other])
             stretch = -np.log(self._mixed(stronger, weaker)[1])

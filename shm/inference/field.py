@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.errors import BadInput
 from shm.inference.likelihood import conditions_of, predicted_hz
@@ -190,7 +190,7 @@ class FieldLikelihood:
         """tau (n,) from its posterior given each prediction (n, data)."""
         tau, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
         joint = _log_sum(self._nodes(predicted, _STEP_IN_SD_TO_DRAW), axis=2) + log_share[:, 0]
-        share = np.exp(joint - logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
+        share = np.exp(joint - scipy.special.logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
         node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(tau) - 1)
         jitter = np.log(tau[1] / tau[0]) * (rng.random(len(node)) - 0.5)
         return np.asarray((tau[node] * np.exp(jitter)).clip(TAU_LOWER, TAU_UPPER))
@@ -312,9 +312,9 @@ def _sd_factors(scatter: float, freedom: int) -> tuple[FloatArray, FloatArray]:
     """
     grid = np.linspace(-1.5, 2.5, 401)
     log = -(_SD_FREEDOM + 1) / 2 * np.log1p((grid / _SD_SPREAD) ** 2 / _SD_FREEDOM)
-    prior = log - logsumexp(log)
+    prior = log - scipy.special.logsumexp(log)
     joint = prior - freedom * grid - 0.5 * scatter * np.exp(-2 * grid)
-    total = float(logsumexp(joint))
+    total = float(scipy.special.logsumexp(joint))
     share = np.exp(joint - total).cumsum()
     middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
     nodes = np.interp(middle, share, grid)

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.inference.mixture import Pool, TMixture
 from shm.inference.problem import Points, Problem
@@ -71,7 +71,7 @@ class Weighted:
     @property
     def log_evidence(self) -> float:
         """log of the mean weight."""
-        return float(logsumexp(self.log_weights) - np.log(self.draws))
+        return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
 
     @property
     def log_evidence_sd(self) -> float:

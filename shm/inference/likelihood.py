@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.errors import BadInput
 from shm.models import Model
@@ -97,7 +97,8 @@ class Likelihood:
         """sigma (n,) from its posterior given each prediction (n, measurements)."""
         log_sigma, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
         joint = self._joint(predicted, np.exp(log_sigma), 0.0) + log_share
-        shares = np.exp(joint - logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
+        total = scipy.special.logsumexp(joint, axis=1, keepdims=True)
+        shares = np.exp(joint - total).cumsum(axis=1)
         node = (shares < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(log_sigma) - 1)
         jitter = (log_sigma[1] - log_sigma[0]) * (rng.random(len(node)) - 0.5)
         return np.asarray(np.exp((log_sigma[node] + jitter).clip(None, 0.0)))

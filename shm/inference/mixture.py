@@ -12,7 +12,6 @@ from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 import scipy
-from scipy.special import gammaln, logsumexp
 
 from shm.values import FloatArray
 
@@ -66,7 +65,11 @@ class TMixture:
         self._whitening = np.vstack([part.inverse_factor for part in parts])
         self._centres = np.concatenate([part.inverse_factor @ part.mean for part in parts])
         log_volume = np.array([np.log(np.diag(part.factor)).sum() for part in parts])
-        constant = gammaln((nu + d) / 2) - gammaln(nu / 2) - d / 2 * np.log(nu * np.pi)
+        constant = (
+            scipy.special.gammaln((nu + d) / 2)
+            - scipy.special.gammaln(nu / 2)
+            - d / 2 * np.log(nu * np.pi)
+        )
         self._log_height = np.log(self.shares) + constant - log_volume
 
     @classmethod
@@ -207,4 +210,4 @@ class Pool(Generic[P, B]):
     def _drawn(self, proposals: list[tuple[P, int]], batch: B) -> FloatArray:
         """Log of how many draws per volume (n,) the proposals, each of so many, put there."""
         parts = [np.log(draws) + self._log_density(each, batch) for each, draws in proposals]
-        return np.asarray(logsumexp(parts, axis=0))
+        return np.asarray(scipy.special.logsumexp(parts, axis=0))

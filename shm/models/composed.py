@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from shm.errors import UsageError
 from shm.models.as_made import TENSION_RATIO, AsMade
@@ -246,11 +246,13 @@ class Deviation(Parameter):
     """A parameter with a normal prior: `lower` and `upper` are one standard deviation off."""
 
     def value(self, share: FloatArray) -> FloatArray:
-        return np.asarray(self._mean + self._sd * ndtri(share))
+        return np.asarray(self._mean + self._sd * scipy.special.ndtri(share))
 
     def share(self, value: FloatArray) -> FloatArray:
         away = value - self._mean
-        return np.asarray(ndtr(away / self._sd) if self._sd else np.full_like(value, 0.5))
+        return np.asarray(
+            scipy.special.ndtr(away / self._sd) if self._sd else np.full_like(value, 0.5)
+        )
 
     @property
     def _mean(self) -> float:

@@ -19,15 +19,15 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
+from shm.pipeline.clock import Clock, utc_now
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import (
     DELIVERIES,
-    Clock,
     DeliveryRefused,
     Job,
     Jobs,
@@ -55,11 +55,6 @@ _NO_MORE = (
 )
 
 log = logging.getLogger(__name__)
-
-
-def utc_now() -> datetime:
-    """The time, in UTC."""
-    return datetime.now(UTC)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
+from shm.pipeline.clock import Clock
 from shm.pipeline.ending import gap_stands as watch_gap_stands
 from shm.pipeline.ending import why_over
 from shm.pipeline.judging import judge
@@ -40,7 +41,6 @@ _DELIVERIES_A_HOOK = 4  # technical: a quarter, so that a hook that hangs leaves
 _LONGEST_S = 86400.0  # judgement: a hook mended within a day is told the day after at the latest
 _DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
 
-Clock = Callable[[], datetime]
 Notifier = Callable[[Hook, Alert], object]
 
 

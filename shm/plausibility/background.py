@@ -12,10 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
-from scipy.optimize import linear_sum_assignment
 
 from shm.values import BoolArray, Fingerprint, FloatArray, IntArray
 
@@ -144,7 +143,7 @@ def _signs(row: FloatArray, starts: Sequence[int]) -> BoolArray:
     for _ in range(_ROUNDS):
         filter_ = np.append(-_prediction(before[near]), 1.0)
         error = before @ filter_
-        local = np.sqrt(uniform_filter1d(error**2, _LOCAL, axis=1))
+        local = np.sqrt(scipy.ndimage.uniform_filter1d(error**2, _LOCAL, axis=1))
         floor = float(np.quantile(local, _FLOOR))
         near = local < _NEAR * floor
         if near.sum() < _SHORTEST:
@@ -203,6 +202,6 @@ def _pairs(
     ours, theirs = lengths
     return {
         (int(i), int(j)): min(ours[int(i)], theirs[int(j)] + lag) - max(0, lag)
-        for i, j in zip(*linear_sum_assignment(alike, maximize=True), strict=True)
+        for i, j in zip(*scipy.optimize.linear_sum_assignment(alike, maximize=True), strict=True)
         if enough[i, j]
     }

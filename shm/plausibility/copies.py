@@ -19,8 +19,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from shm.plausibility import background
 from shm.plausibility.candidate import Candidate
@@ -341,7 +341,8 @@ def _reach(likeness: FloatArray) -> IntArray:
     reach = 2 * _HALF
     while len(likeness) > 2 * reach:
         inside = slice(reach, len(likeness) - reach)
-        highest = (maximum_filter1d(likeness, 2 * reach + 1) == likeness) & (likeness > 0)
+        around = scipy.ndimage.maximum_filter1d(likeness, 2 * reach + 1)
+        highest = (around == likeness) & (likeness > 0)
         found[inside][highest[inside]] = reach
         reach *= 2
     return found

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
+import scipy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
@@ -84,7 +84,7 @@ FORMAT = Format(
 )
 
 
-_matlab: Any = scipy.io  # its stubs know no streams
+_scipy: Any = scipy  # the stubs of its `io` know no streams
 _MOST_VARIABLES = 1000
 _KINDS = {
     "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
@@ -99,7 +99,7 @@ def arrays_in(path: Path) -> Arrays:
     with guarded(path):
         elements = tuple(elements_of(content))
         complexities = [element.is_complex for element in elements]
-        listed = _matlab.whosmat(io.BytesIO(content))
+        listed = _scipy.io.whosmat(io.BytesIO(content))
         if len(listed) != len(elements) or len(listed) > _MOST_VARIABLES:
             raise ValueError("there are not as many variables as elements")
     _refuse_doubles([name for name, _, _ in listed], path)
@@ -129,7 +129,7 @@ def _variable(
 
     def load() -> NDArray[Any]:
         element.refuse_damaged(shape, is_text)
-        found = _matlab.loadmat(io.BytesIO(content), variable_names=[name])
+        found = _scipy.io.loadmat(io.BytesIO(content), variable_names=[name])
         return np.asarray(found[name])
 
     letter = "c" if is_complex and not is_text else letter

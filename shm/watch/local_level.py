@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from shm.values import FloatArray
 
@@ -78,7 +78,7 @@ class LocalLevels:
     def fitted(self) -> FloatArray:
         """z (2 q,) of the largest posterior density: the likelihood times the weak prior."""
         count = 2 * self.course.seen.shape[1]
-        found = minimize(
+        found = scipy.optimize.minimize(
             self._misfit_and_slope,
             np.zeros(count),
             jac=True,

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from shm.errors import BadInput
 from shm.models import Model, class_of, described
@@ -307,7 +307,7 @@ def _credible_share(misfit: FloatArray, fitted: int) -> float:
     free = len(misfit) - fitted
     if free < 1:
         return 1.0
-    most = float(chdtri(free, _SELDOM))
+    most = float(scipy.special.chdtri(free, _SELDOM))
     return most / max(most, float(misfit @ misfit))
 
 

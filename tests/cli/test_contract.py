@@ -65,6 +65,25 @@ def test_what_is_told_in_words_is_told_without_loading_what_draws() -> None:
     assert ended.returncode == 0
 
 
+def test_the_status_is_told_without_loading_what_reads_computes_or_delivers(
+    bridge: Workspace,
+) -> None:
+    unused = {
+        "alembic", "h5py", "matplotlib", "nptdms", "pandas", "pyoma2", "requests", "scipy.fft",
+        "scipy.io", "scipy.linalg", "scipy.ndimage", "scipy.optimize", "scipy.signal",
+        "scipy.sparse", "scipy.special", "scipy.stats", "shm.pipeline.flow", "shm.read.registry",
+    }  # fmt: skip
+    asked = (
+        f"import sys; from shm_cli.main import run; run(['--workspace', '{bridge.folder}', "
+        "'status']); print(*sys.modules, file=sys.stderr)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", asked], capture_output=True, text=True, check=True
+    )
+    assert "3 done" in ended.stdout
+    assert not unused & set(ended.stderr.split())
+
+
 def test_the_version_is_that_of_the_package(shm: Shm) -> None:
     assert package.__version__ in shm("--version").out
 

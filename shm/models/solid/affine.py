@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+import scipy
 
 from shm.values import FloatArray
 
@@ -21,11 +20,11 @@ class AffineSystem:
     `axis_m` (points,) from the deck end.
     """
 
-    stiffness: csr_array
-    initial_stress: csr_array
-    springs: Mapping[str, csr_array]
-    mass: csr_array
-    axis_deflection: csr_array
+    stiffness: scipy.sparse.csr_array
+    initial_stress: scipy.sparse.csr_array
+    springs: Mapping[str, scipy.sparse.csr_array]
+    mass: scipy.sparse.csr_array
+    axis_deflection: scipy.sparse.csr_array
     axis_m: FloatArray
 
     @property
@@ -45,12 +44,14 @@ class Modes:
         return np.asarray(np.sqrt(self.eigenvalues) / (2 * np.pi))
 
 
-def stiffness(system: AffineSystem, tension_n: float, springs_n_m: FloatArray) -> csc_array:
+def stiffness(
+    system: AffineSystem, tension_n: float, springs_n_m: FloatArray
+) -> scipy.sparse.csc_array:
     """K(theta) for the springs (springs,) per node, in the order of the system's."""
     total = system.stiffness + tension_n * system.initial_stress
     for spring, value in zip(system.springs.values(), springs_n_m, strict=True):
         total = total + value * spring
-    return csc_array(total)
+    return scipy.sparse.csc_array(total)
 
 
 def natural_modes(
@@ -58,19 +59,19 @@ def natural_modes(
 ) -> Modes:
     """The lowest modes, by Lanczos iterations with the factorised stiffness."""
     matrix = stiffness(system, tension_n, springs_n_m)
-    inverse = LinearOperator(matrix.shape, matvec=factorised(matrix).solve)
+    inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factorised(matrix).solve)
     # A fixed start makes the result the same each time.
     start = np.ones(system.unknowns)
-    eigenvalues, vectors = eigsh(
-        matrix, k=modes, M=csc_array(system.mass), sigma=0.0, OPinv=inverse, v0=start
+    eigenvalues, vectors = scipy.sparse.linalg.eigsh(
+        matrix, k=modes, M=scipy.sparse.csc_array(system.mass), sigma=0.0, OPinv=inverse, v0=start
     )
     order = np.argsort(eigenvalues)
     return Modes(eigenvalues[order], vectors[:, order])
 
 
-def factorised(matrix: csc_array) -> SuperLU:
+def factorised(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU:
     """The factors of a symmetric positive definite matrix."""
-    return splu(
+    return scipy.sparse.linalg.splu(
         matrix,
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,

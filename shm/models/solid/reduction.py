@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from shm.models.solid.affine import AffineSystem, Modes, natural_modes, stiffness
 from shm.values import BoolArray, FloatArray
@@ -62,7 +62,7 @@ class Reservoir:
     """The span of all modes computed so far, orthonormal in the energy of a reference."""
 
     system: AffineSystem
-    reference: csc_array
+    reference: scipy.sparse.csc_array
     vectors: FloatArray = field(init=False)
     coordinates: FloatArray = field(init=False)
     matrices: FloatArray = field(init=False)

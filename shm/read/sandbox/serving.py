@@ -14,6 +14,7 @@ import socket
 import struct
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ def serve() -> None:
     """Answers requests until the asking process is gone."""
     requests = socket.socket(fileno=0)
     pythons_own()  # found once, for all children
+    import_module("scipy.io")  # likewise: else each would load it within its limits
     gc.freeze()
     with suppress(ConnectionError):  # it was killed meanwhile
         requests.sendall(b"+")

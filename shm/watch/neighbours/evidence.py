@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp, ndtr
+import scipy
 
 from shm.values import FloatArray, IntArray
 from shm.watch.neighbours.pattern_types import HangerShift, NeighbourOptions
@@ -101,7 +101,7 @@ def with_sign(found: Weighed, members: IntArray, sign: int) -> FloatArray:
     """
     rows = np.arange(len(members))[:, None]
     mean, sd = found.mean_n[rows, members], found.sd_n[rows, members]
-    kept = log_ndtr(sign * mean / np.maximum(sd, 1e-300)).sum(axis=1)
+    kept = scipy.special.log_ndtr(sign * mean / np.maximum(sd, 1e-300)).sum(axis=1)
     return np.asarray(found.log_evidence + kept + members.shape[1] * np.log(2), np.float64)
 
 
@@ -147,14 +147,14 @@ def independent(bridge: Bridge, options: NeighbourOptions) -> Independent:
     spread = (np.array(options.sizes_fraction)[:, None] * bridge.baseline_n) ** 2
     by_size = _log_density(left[:, None], spread + bridge.sd_n**2) - np.log(len(spread))
     chance, chance_weight = (1 + _FRACTION_NODES) / 2, _FRACTION_WEIGHTS / 2
-    moving = logsumexp(by_size, axis=1)
+    moving = scipy.special.logsumexp(by_size, axis=1)
     no, yes = np.log1p(-chance)[:, None, None] + still, np.log(chance)[:, None, None] + moving
     either = np.logaddexp(no, yes)
     weight = np.log(chance_weight)[:, None] + common_weight
     whole, none = weight + either.sum(axis=2), weight + no.sum(axis=2)
-    log_whole = float(logsumexp(whole))
+    log_whole = float(scipy.special.logsumexp(whole))
     # Were nothing moved counted in here, it would be counted twice.
-    log_none = min(float(logsumexp(none)), log_whole - 1e-9)
+    log_none = min(float(scipy.special.logsumexp(none)), log_whole - 1e-9)
     some = log_whole + np.log(-np.expm1(log_none - log_whole))
     kept = np.exp(whole - some)
     by_node = np.einsum("qc,qcn->cn", kept, np.exp(yes - either))
@@ -171,7 +171,7 @@ def independent(bridge: Bridge, options: NeighbourOptions) -> Independent:
 
 def _normal_weights() -> FloatArray:
     weights = -0.5 * _COMMON_NODES**2
-    return np.asarray(weights - logsumexp(weights), np.float64)
+    return np.asarray(weights - scipy.special.logsumexp(weights), np.float64)
 
 
 def _log_density(left: FloatArray, variance: FloatArray) -> FloatArray:
@@ -190,4 +190,4 @@ def _signs(
 def beyond(mean: FloatArray, sd: FloatArray, least: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Probabilities that a normal variable lies above `least`, and below minus `least`."""
     width = np.maximum(sd, 1e-300)
-    return ndtr((mean - least) / width), ndtr((-mean - least) / width)
+    return scipy.special.ndtr((mean - least) / width), scipy.special.ndtr((-mean - least) / width)

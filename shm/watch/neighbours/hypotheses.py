@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.values import FloatArray, IntArray
 from shm.watch.neighbours.evidence import (
@@ -59,7 +59,7 @@ def hypotheses(
         bridge = Bridge.of(shifts, options, scale)
         for part in _at_one_scale(bridge, causes, options):
             parts.append(replace(part, log_weight=part.log_weight + math.log(prior)))
-    total = float(logsumexp(np.concatenate([part.log_weight for part in parts])))
+    total = float(scipy.special.logsumexp(np.concatenate([part.log_weight for part in parts])))
     return tuple(replace(part, log_weight=part.log_weight - total) for part in parts)
 
 
@@ -144,7 +144,8 @@ def _moves(bridge: Bridge, options: NeighbourOptions) -> tuple[Part, Part, Part]
 
 def _pairs(logs_of_one: FloatArray, count: int) -> IntArray:
     """Pairs (p, 2) of hangers of which one is among the likeliest to have shed load by itself."""
-    first = logsumexp(logs_of_one.reshape(-1, count), axis=0).argsort()[-_FIRST_OF_TWO:].tolist()
+    of_each = scipy.special.logsumexp(logs_of_one.reshape(-1, count), axis=0)
+    first = of_each.argsort()[-_FIRST_OF_TWO:].tolist()
     return np.array([(i, j) for i in first for j in range(count) if i < j or j not in first])
 
 

@@ -9,7 +9,7 @@ from datetime import timedelta
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray
@@ -206,7 +206,7 @@ def _mixed(
     log_weights: FloatArray, means: FloatArray, sds: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Mean and standard deviation (m,) of a mixture of h normal distributions (h, m)."""
-    weights = np.exp(log_weights - logsumexp(log_weights))
+    weights = np.exp(log_weights - scipy.special.logsumexp(log_weights))
     mean = weights @ means
     return mean, np.sqrt(np.maximum(weights @ (sds**2 + means**2) - mean**2, 0))
 
@@ -217,7 +217,7 @@ def _alike(
     """The likeliest common cause, with the mean fraction of the hangers that it moves."""
     alike = [part for part in parts if part.name == "all alike"]
     logs = np.array([part.log_weight for part in alike]).reshape(-1, len(causes))
-    best = int(logsumexp(logs, axis=0).argmax())
+    best = int(scipy.special.logsumexp(logs, axis=0).argmax())
     touched = causes[best].fractions != 0
     baseline = np.array([each.baseline_n for each in shifts])
     means, sds = (

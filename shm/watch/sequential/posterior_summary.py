@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from shm.values import (
     NAN,
@@ -282,8 +282,8 @@ def beyond(
     weights, mean = weights[kept], mean[kept] * quantity.step_sd
     sd = np.maximum(sd[kept] * quantity.step_sd, 1e-12)
     low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
-    down = float(weights @ ndtr((low - mean) / sd))
-    up = float(weights @ ndtr((mean - high) / sd))
+    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
+    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
     return min(max(down, up), 1.0)
 
 
