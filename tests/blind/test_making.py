@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -12,13 +13,14 @@ import numpy as np
 import pytest
 
 from shm.blind.layout import read_trial
+from shm.blind.making import case as one_case
 from shm.blind.making import make_trial, of_one_instant, padded
 from shm.blind.making.case import PLANS, Site, make_case, planted_effects
 from shm.blind.making.mix import WAYS, Draft
 from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
 from shm.errors import UsageError
-from shm.models.effects import EFFECTS
+from shm.models.effects import EFFECTS, Survey
 from shm.modes_document import load_modes
 from shm.read import read
 from shm.simulate import (
@@ -28,11 +30,13 @@ from shm.simulate import (
     HangerState,
     PlantedEffect,
     campaign_with_truth,
+    choices,
     drawn_hanger,
 )
 from shm.simulate.campaign import Campaign
-from shm.values import Hanger, PlantedKind, Recording, TrueCase, Way
+from shm.values import PLANES, Hanger, PlantedKind, Recording, TrueCase, Way
 from tests.helpers.blind_workers import in_this_process
+from tests.helpers.hangers import HANGER_3
 
 KINDS: tuple[PlantedKind, ...] = get_args(PlantedKind)
 
@@ -219,6 +223,42 @@ def test_what_cannot_be_planted_has_an_infinite_size() -> None:
 def test_every_effect_of_the_catalogue_can_be_planted_and_no_other_stands_in_it() -> None:
     assert set(PLANTED) == set(EFFECTS)
     assert not set(UNLISTED) & set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_an_effect_is_planted_wherever_the_diagnosis_looks_for_it_and_nowhere_else(
+    name: str,
+) -> None:
+    """Both are told the same sensors and tests; a plane of its own counts as two at once."""
+    places_m, tests = (1.5, 4.0), ("t1", "t2")
+    survey = Survey(tests, PLANES, places_m, True, (5.0, 15.0), (0.5, 1.0), ())
+    sought = {variant.at for variant in EFFECTS[name].variants(HANGER_3, survey)}
+    planted = choices(name, places_m, tests)
+    assert sorted(planted) == sorted({at for at in sought if "planes alike" not in at})
+
+
+@pytest.mark.parametrize("name", ["effective_length", "sensor_misalignment", "timebase", "sag"])
+def test_any_place_where_an_effect_may_act_is_drawn(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the sensors and tests of the case's own plan; one that cannot be is drawn anew."""
+    hanger, state = drawn_hanger(np.random.default_rng(3))
+    site, seen, refused = Site(hanger, state, PLANS["everything"]), set(), set()
+
+    def scaled(size, hanger, state, effect, plan):  # type: ignore[no-untyped-def]
+        refused.add(effect.at)
+        return effect if rng.uniform() < 0.5 else None
+
+    monkeypatch.setattr(one_case, "scaled_to", scaled)
+    monkeypatch.setattr(Site, "size", lambda site, effects: 10.0)
+    draft = replace(draft_of("one", effects=(name,)), share=1 / 3)  # a size of 10
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        (found,) = planted_effects(draft, site, rng)
+        assert found.name == name
+        seen.add(found.at)
+    tests = [test.id for test in site.plan.tests(hanger)]
+    assert seen == refused == set(choices(name, site.plan.places_m(hanger), tests))
 
 
 def test_the_same_seed_gives_the_same_cases_whatever_the_number_of_processes(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shm.pipeline import adopting
-from shm.store import Workspace
+from shm.store import Store, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
 
@@ -98,6 +98,26 @@ def test_of_several_adoptions_one_is_dropped_by_its_number(shm: Shm, workspace: 
     assert shm(*drop, "--number", 7).code == 4
     assert "has the class beam1+distributed_mass@everywhere again" in shm(*drop, "--number", 1).out
     assert "has the class beam1 again" in shm(*drop).out
+
+
+def test_the_gap_now_stands_beside_the_adoption_that_is_watched_and_no_other(
+    shm: Shm, workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(adopting, "gap_percent", lambda found: 0.2 if "+" in found.model else 2.0)
+    shm("--workspace", workspace, *ADOPT, "--why", "a")
+    shm("--workspace", workspace, *ADOPT[:-4], "--effect", "distributed_mass", "--why", "b")
+
+    def watch(store: Store, hanger: int) -> adopting.GapWatch:
+        return adopting.GapWatch(store.posteriors.list_adoptions(hanger)[-1], 4.321, True)
+
+    monkeypatch.setattr("shm_cli.adopt.gap_watch", watch)
+    listed = shm("--workspace", workspace, "gap", "adopted", "--json").document["adoptions"]
+    assert [each["gap_now_percent"] for each in listed] == [None, 4.321]
+    assert [each["gap_has_grown"] for each in listed] == [None, True]
+    rows = shm("--workspace", workspace, "gap", "adopted").out
+    assert "2.00, 0.20, none" in rows
+    assert "0.20, 0.20, 4.32" in rows
+    assert "gap before, with it, now (%)" in " ".join(rows.split())
 
 
 def test_select_lets_the_adopted_classes_of_the_hanger_compete(

@@ -70,6 +70,7 @@ def test_status_counts_open_alerts_of_each_hanger(shm: Shm, bridge: Workspace) -
 def test_the_daemon_prints_its_unit_and_does_not_begin(shm: Shm, empty: Workspace) -> None:
     ended = shm("--workspace", empty.folder, "daemon", "--standby", "--workers", 2, "--print-unit")
     assert ended.code == 0
+    assert ended.out == ended.out.rstrip() + "\n"  # as a file is kept
     assert "ExecStart=/usr/bin/env shm daemon --standby --workers 2" in ended.out.splitlines()
     assert f"Environment=SHM_WORKSPACE={empty.folder}" in ended.out.splitlines()
     assert not (empty.folder / "daemon.heartbeat").exists()

@@ -41,10 +41,6 @@ def test_a_token_given_once_opens_the_pages(browser: httpx.Client, elsewhere: Se
     assert 'name="next" value="/alerts"' in refused.text
     entered = sign_in(browser, elsewhere.read_token, "/alerts")
     assert (entered.status_code, entered.headers["Location"]) == (303, "/alerts")
-    cookie = entered.headers["Set-Cookie"]
-    assert "HttpOnly" in cookie
-    assert "SameSite=strict" in cookie
-    assert "Secure" not in cookie
     assert browser.get("/alerts").status_code == 200
     assert browser.get("/api/status").status_code == 200
 
@@ -54,6 +50,18 @@ def test_over_https_the_cookie_never_travels_in_clear(
 ) -> None:
     entered = sign_in(browser, elsewhere.read_token, **{"X-Forwarded-Proto": "https"})
     assert "; Secure" in entered.headers["Set-Cookie"]
+
+
+def test_the_cookie_lasts_a_month_for_this_site_alone_and_out_of_reach_of_scripts(
+    browser: httpx.Client, elsewhere: Served
+) -> None:
+    def attributes(answer: httpx.Response) -> set[str]:
+        found = answer.headers["Set-Cookie"].split("; ")[1:]
+        return {each.lower() for each in found if not each.lower().startswith("expires=")}
+
+    kept = {"httponly", "path=/", "samesite=strict"}
+    assert attributes(sign_in(browser, elsewhere.read_token)) == kept | {"max-age=2592000"}
+    assert attributes(browser.post("/sign-out")) == kept | {"max-age=0"}
 
 
 def test_a_wrong_token_is_said_on_the_page(browser: httpx.Client) -> None:

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from shm.errors import BadInput
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.coordinates import Branch, Coordinates
+from shm.gap.fit import fitted
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
 from shm.gap.objective import Landscape
@@ -40,6 +42,7 @@ class Bent:
     slopes: FloatArray
     bend: Bend
     last: Parameter
+    baseline: str = "beam1"
 
     def predict(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
         bent = np.column_stack([z[:, :-1], self.bend(z[:, -1])])
@@ -221,3 +224,10 @@ def test_starts_that_cannot_be_predicted_are_passed_over() -> None:
     (alone,) = optima(of, starts(1.0))
     assert both.log_posterior == alone.log_posterior
     assert np.isfinite(both.residual).all()
+
+
+def test_where_nothing_can_be_predicted_the_fit_says_so_and_what_to_check() -> None:
+    of = landscape(straight, 1.2)
+    of.problem.bend = lambda z: np.full_like(z, np.nan)  # type: ignore[attr-defined]
+    with pytest.raises(BadInput, match=r"cannot be solved anywhere for beam1.*description"):
+        fitted(of.problem, Hypothesis(), np.random.default_rng(1), starts(-1.0, 1.0))

@@ -153,6 +153,32 @@ def test_the_gap_is_told_before_with_and_since_the_adoption(begun: Workspace) ->
         assert report.baseline.model == report.posterior.model == MASS_MODEL
 
 
+def test_the_gap_that_is_watched_is_that_of_the_class_adopted_last_and_in_force(
+    begun: Workspace,
+) -> None:
+    """Neither the gap of a test before the adoption is told nor that of a test in another class."""
+
+    def watched() -> tuple[str, float]:
+        with begun.store() as store:
+            watch = gap_watch(store, 3)
+        assert watch is not None
+        assert ("no test since" in str(watch)) is math.isnan(watch.now_percent)
+        return watch.adopted.adoption.model, watch.now_percent
+
+    adopted(begun, "point_mass")
+    second = adopted(begun, "bending_stiffness", at=["everywhere"])
+    assert watched() == (STIFFNESS, pytest.approx(math.nan, nan_ok=True))
+    spool(begun, "t2", day=1)
+    ingest(begun)
+    assert watched() == (STIFFNESS, pytest.approx(0.2))
+    with begun.store() as store:
+        store.posteriors.drop_adoption(second.id, "a rod after all", "engineer", START)
+    assert watched() == (MASS_MODEL, pytest.approx(math.nan, nan_ok=True))
+    spool(begun, "t3", day=2)
+    ingest(begun)
+    assert watched() == (MASS_MODEL, pytest.approx(0.2))
+
+
 def test_a_gap_that_opens_again_is_one_alert(
     begun: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:

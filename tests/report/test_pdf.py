@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from shm.report.as_pdf import WIDTH, as_pdf, widths
+from shm.report import colours
+from shm.report.as_pdf import WIDTH, _rules, as_pdf, widths
 from shm.report.contents import HangerReport
 from shm.report.hanger_report import hanger_paper
 from shm.report.paper import Paper, Part, Table
@@ -124,3 +125,22 @@ def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerR
     paper = hanger_paper(replace(season, drifts=(), diagnosis=UNEXPLAINED))
     (gap,) = [part for part in paper.parts if part.title == "Gap diagnosis"]
     assert (paper.style, gap.style) == ("steady", "alert")
+
+
+@pytest.mark.parametrize(("columns", "marked"), [(1, 0), (2, 1), (3, 1), (5, 1)])
+def test_a_rows_mark_stands_before_its_second_cell_in_the_colour_of_its_verdict(
+    columns: int, marked: int
+) -> None:
+    verdicts = ("good", "unknown", "refused", "best", "warning")
+    row = ("x",) * columns
+    table = Table("t", row, (row,) * len(verdicts), marks=verdicts)
+    drawn = [
+        (*at, colour.hexval()[2:])
+        for name, at, _, *_, colour in _rules(table)
+        if name == "LINEBEFORE"
+    ]
+    coloured = [(n, v) for n, v in enumerate(verdicts, 1) if v not in ("unknown", "best")]
+    assert drawn == [
+        (marked, line, colours.VERDICT_COLOURS[verdict][1:].lower())  # type: ignore[index]
+        for line, verdict in coloured
+    ]

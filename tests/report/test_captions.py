@@ -1,0 +1,63 @@
+"""The words beside every figure, letter by letter: `data/captions.txt`.
+
+Who changes them on purpose writes that file anew: `python -m tests.report.test_captions`.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from shm.report.contents import HangerReport
+from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST, OF_TRIAL
+from shm.report.figures.modal_test_spectra import Shown
+from tests.report.conftest import bare, hanger, season
+from tests.report.diagnoses import sheet
+from tests.report.test_modal_test_figures import CASES as SHEETS
+from tests.report.test_trial_page import make_score
+
+KEPT = Path(__file__).parent / "data" / "captions.txt"
+
+
+def written(season: HangerReport, bare: HangerReport) -> str:
+    """Caption and description of each figure of each report, for data that have it."""
+    shown: list[tuple[str, Any, Any]] = [
+        *(("test", each, Shown.of(SHEETS["warned"]())) for each in OF_MODAL_TEST),
+        *(("ambient test", each, Shown.of(SHEETS["ambient"]())) for each in OF_MODAL_TEST),
+        *((f"diagnosis, {case}", each, sheet(case)) for case in ("blunder", "alike")
+          for each in OF_DIAGNOSIS),
+        *(("season", each, season) for each in OF_HANGER),
+        *(("first test", each, bare) for each in OF_HANGER),
+        *(("trial", each, make_score("plausible")) for each in OF_TRIAL),
+    ]  # fmt: skip
+    return "\n".join(
+        line
+        for of, member, data in shown
+        if member.draw(data) is not None
+        for line in _lines(f"{member.name} ({of})", member.caption(data), member.alt(data))
+    )
+
+
+def _lines(name: str, *texts: str) -> Iterator[str]:
+    yield f"{name}: "
+    for text in texts:
+        yield from textwrap.wrap(text, 96, initial_indent="  ", subsequent_indent="    ")
+    yield ""
+
+
+def test_the_words_beside_every_figure_are_those_that_were_agreed(
+    season: HangerReport, bare: HangerReport
+) -> None:
+    assert written(season, bare) == KEPT.read_text(encoding="utf-8")
+
+
+def _plain(fixture: Any) -> Any:
+    """What a fixture calls."""
+    return getattr(fixture, "__wrapped__", None) or fixture.__pytest_wrapped__.obj
+
+
+if __name__ == "__main__":
+    made = _plain(hanger)()
+    KEPT.write_text(written(_plain(season)(made), _plain(bare)(made)), encoding="utf-8")
