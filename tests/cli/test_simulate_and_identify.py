@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from shm.bridge import load_hanger
+from shm.errors import NothingThere
+from shm.identify import IdentifyOptions
 from shm.models import THESIS, build
 from shm.modes_document import load_modes
 from shm.read import read
@@ -156,3 +158,25 @@ def test_a_recording_that_cannot_be_used_is_bad_input(
     ended = shm("identify", path, "--json")
     assert (ended.code, ended.out) == (3, "")
     assert said in ended.err
+
+
+def test_every_choice_of_the_command_reaches_the_identification(
+    shm: Shm, recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[IdentifyOptions] = []
+
+    def stop(group: object, hanger: object, options: IdentifyOptions) -> None:
+        seen.append(options)
+        raise NothingThere("seen.", remedy="None.")
+
+    monkeypatch.setattr("shm_cli.identify._identified", stop)
+    shm(
+        "identify", recording, "--band", 3, 70, "--identifier", "frf", "--cross-check", "ssi",
+        "--estimator", "hv", "--reference-force", 500, "--frequency-allowance", 0.002, "--mains",
+        60, "--window", 1.5,
+    )  # fmt: skip
+    expected = IdentifyOptions(
+        band_low_hz=3, band_high_hz=70, identifier="frf", cross_check="ssi", estimator="hv",
+        reference_force_n=500, frequency_allowance=0.002, mains_hz=60, window_time_constant_s=1.5,
+    )  # fmt: skip
+    assert seen == [expected]
