@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Literal
 
-from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
 from shm.values.posterior import Averaged
 
 if TYPE_CHECKING:
@@ -47,6 +47,23 @@ class WatchedQuantity:
 
 
 @dataclass(frozen=True, eq=False)
+class ModeReading:
+    """One test mode by mode: log frequencies (modes,) of the baseline's modes beside the model's.
+
+    `values` are about `slopes` (modes, q) times the coordinates: linearised where the test lies.
+    `variances` are infinite of a mode that the test lacks, or that is taken for a mistaken one
+    (`mistaken`). `per_kelvin` (modes,) is what a kelvin does to each as steel softens, taken off
+    where the temperature is known.
+    """
+
+    values: FloatArray
+    variances: FloatArray
+    slopes: FloatArray
+    per_kelvin: FloatArray
+    mistaken: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
 class Reading:
     """What one test by itself says of the watched quantities of a hanger, without any prior.
 
@@ -55,7 +72,8 @@ class Reading:
     in every comparison and is left out. `information` (q, q) is singular where a test cannot tell
     quantities apart; `mean` (q,) is then 0 along what it does not see. `per_kelvin` (q,) is
     what a kelvin of warmth has moved `mean` by, as steel softens, where that was not taken off for
-    want of a temperature; else None.
+    want of a temperature; else None. `modes` is the same mode by mode, `amplitude` the excitation
+    over the reference (NaN: not known).
     """
 
     test: str
@@ -64,6 +82,8 @@ class Reading:
     mean: FloatArray
     information: FloatArray
     per_kelvin: FloatArray | None = None
+    modes: ModeReading | None = None
+    amplitude: float = NAN
 
 
 @dataclass(frozen=True)

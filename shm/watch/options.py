@@ -22,13 +22,19 @@ class WatchOptions:
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     outlier_probability: float = 0.01
-    tension_scatter: tuple[float, ...] = (0.001, 0.0018, 0.0032, 0.0056, 0.01)
-    spring_scatter_of_step: tuple[float, ...] = (0.01, 0.06, 0.2)
+    tension_scatter: tuple[float, ...] = (0.0012, 0.003, 0.006, 0.012)
+    spring_scatter_of_step: tuple[float, ...] = (0.05, 0.25)
     tension_per_kelvin_sd: float = 0.001
     spring_per_kelvin_sd_of_step: float = 0.1
+    tension_per_amplitude_sd: float = 0.002
+    spring_per_amplitude_sd_of_step: float = 0.1
+    creep_per_year_sd: float = 0.002
     unknown_temperature_sd_k: float = 10.0
+    thermometer_sd_k: float = 1.5
+    unknown_log_amplitude_sd: float = 0.5
+    clock_sd: float = 1e-4
     baseline_tests: int = 1
-    beginnings: int = 40
+    beginnings: int = 60
 
     def __post_init__(self) -> None:
         if not self.tension_scatter or not self.spring_scatter_of_step:

@@ -38,7 +38,7 @@ from shm.values import (
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
+from shm.watch.watcher import Watch, Watcher, WatchState, watched
 from shm.watch.wording import message_of, short_name, suspects
 
 DatedTest = tuple[ModalTest, datetime]
@@ -87,7 +87,8 @@ def watch_hanger(
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = _options_of(hanger, len(baseline_tests), options)
-    return Watched(reader, readings, watch_over(readings, reader.quantities, hanger, options))
+    watch = watched(readings, reader.quantities, reader.columns, hanger, options)
+    return Watched(reader, readings, watch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ def watch_newest(
     """
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = _options_of(hanger, len(baseline_tests), options)
-    watcher = Watcher(reader.quantities, hanger, options)
+    watcher = Watcher(reader.quantities, reader.columns, hanger, options)
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
         state, watch = watcher.begin(readings)

@@ -1,0 +1,421 @@
+"""The watch of one hanger, test by test: what stands after each rests on the tests up to it alone.
+
+After a call the called change is part of what is known, and a further one is looked for.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from datetime import datetime
+from functools import cached_property
+
+import numpy as np
+
+from shm.errors import BadInput, UsageError
+from shm.values import (
+    TENSION,
+    BoolArray,
+    Change,
+    FloatArray,
+    Hanger,
+    Reading,
+    WatchedQuantity,
+    WatchedTest,
+)
+from shm.watch.causes import Columns, Structure, structure_of
+from shm.watch.change_point import (
+    SIZES,
+    Evidence,
+    Sums,
+    Told,
+    covariance_of,
+    evidence_of,
+    sums_of,
+)
+from shm.watch.conditions import Warmth, years_between
+from shm.watch.isolated_tests import Seen, counted, outlier_probability
+from shm.watch.options import WatchOptions
+from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
+
+# To be raised whenever the same readings give other results than before: kept states are void then.
+_VERSION = 3
+_LEAST_SCATTER, _MOST_SCATTER = 0.003, 0.02  # judgement: of the tension, between two tests
+_MAD = 1.4826  # of a normal law
+_LEAST_SHARE = 1e-3  # judgement: of a cause in a call, which later tests may yet speak for
+_FEW = 6  # differences: fewer say nothing of a scatter
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A change that was called after the test at `index` of the watch; `change` as it was then."""
+
+    index: int
+    change: Change
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """The result after each reading, and the changes called on the way, in the order of time."""
+
+    tests: tuple[WatchedTest, ...]
+    calls: tuple[Call, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class WatchState:
+    """All that the next result rests on, of T tests so far, in plain arrays.
+
+    It goes on only where `key` is that of the watch which is to go on. `told` is text that goes
+    with it, `still_same` the probability that nothing had changed before the last call.
+    `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
+    (calls, n + q, n + q) what called it. `sums` need not be kept.
+    """
+
+    key: str
+    start: datetime
+    last_time: datetime
+    reference_c: float
+    values: FloatArray
+    variances: FloatArray
+    slopes: FloatArray
+    per_kelvin: FloatArray
+    coordinates: FloatArray
+    years: FloatArray
+    kelvin: FloatArray
+    log_amplitude: FloatArray
+    doubt: FloatArray
+    unknown_years: FloatArray
+    counted: BoolArray
+    coefficients: FloatArray
+    called: FloatArray
+    called_precision: FloatArray
+    still_same: float = 1.0
+    told: str = ""
+    sums: Sums | None = field(default=None, repr=False)
+
+    @property
+    def tests(self) -> int:
+        return len(self.years)
+
+    def to_bytes(self) -> bytes:
+        """The state as a file of numpy arrays, without any pickled object."""
+        kept = io.BytesIO()
+        plain = {
+            each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
+            for each in fields(self)
+            if (value := getattr(self, each.name)) is not None and each.name != "sums"
+        }
+        np.savez_compressed(kept, **plain)
+        return kept.getvalue()
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> WatchState:
+        """The state back; raises BadInput where the content is no such state."""
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as kept:
+                found = dict(kept)
+            for name in ("key", "told"):
+                found[name] = str(found[name])
+            for name in ("start", "last_time"):
+                found[name] = datetime.fromisoformat(str(found[name]))
+            for name in ("reference_c", "still_same"):
+                found[name] = float(found[name])
+            return cls(**found)
+        except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
+            raise BadInput(
+                f"A kept state of the watch cannot be read: {error}.",
+                remedy="Drop it: the watch then goes over all tests again.",
+            ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class Watcher:
+    """Watches one hanger, test by test: `begin` with its baseline, `after` for each one later.
+
+    Raises BadInput without any quantity.
+    """
+
+    quantities: tuple[WatchedQuantity, ...]
+    columns: Columns
+    hanger: Hanger
+    options: WatchOptions = field(default_factory=WatchOptions)
+
+    def __post_init__(self) -> None:
+        if not self.quantities:
+            raise BadInput("The watch was given no quantity.", remedy="Watch the tension at least.")
+
+    @cached_property
+    def key(self) -> str:
+        """Names what a state rests on beside the readings: the rules, options and quantities."""
+        given = [_VERSION, asdict(self.options), [_told(each) for each in self.quantities]]
+        return hashlib.sha256(json.dumps(given).encode()).hexdigest()
+
+    @cached_property
+    def structure(self) -> Structure:
+        """The hypotheses."""
+        return structure_of(self.quantities, self.columns, self.options)
+
+    def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
+        """The state after the readings of the baseline, by time, and a result for each of them.
+
+        Raises UsageError where these are more than the options' `baseline_tests`, or none. Where
+        they are fewer, the state cannot go on.
+        """
+        if not 0 < len(readings) <= self.options.baseline_tests:
+            raise UsageError(
+                f"The watch was to begin with {len(readings)} readings; its baseline has "
+                f"{self.options.baseline_tests}."
+            )
+        time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
+        warmth = Warmth.at([reading.temperature_c for reading in readings])
+        state = WatchState(
+            key=self.key,
+            start=time,
+            last_time=time,
+            reference_c=warmth.reference_c,
+            values=np.zeros((0, n)),
+            variances=np.zeros((0, n)),
+            slopes=np.zeros((0, n, q)),
+            per_kelvin=np.zeros((0, n)),
+            coordinates=np.zeros((0, q)),
+            years=np.zeros(0),
+            kelvin=np.zeros(0),
+            log_amplitude=np.zeros(0),
+            doubt=np.zeros((0, n)),
+            unknown_years=np.zeros(0),
+            counted=np.zeros(0, bool),
+            coefficients=np.zeros(q),
+            called=np.zeros((0, 3)),
+            called_precision=np.zeros((0, n + q, n + q)),
+        )
+        tests = []
+        for reading in readings:
+            state, found = self._next(state, reading)
+            tests.append(found)
+        return state, Watch(tuple(tests), ())
+
+    def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        """The state after one more reading, and the result.
+
+        Raises BadInput where the reading is older than the last, or of other quantities, UsageError
+        where the state is that of another watch, or its baseline is not complete.
+        """
+        if state.key != self.key or state.tests < self.options.baseline_tests:
+            raise UsageError(
+                "This state of a watch is not of this hanger, baseline and options.",
+                remedy="Begin the watch anew.",
+            )
+        return self._next(state, reading)
+
+    def _next(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        if reading.time < state.last_time:
+            raise BadInput(
+                f"The watch was given test {reading.test} after one that is later.",
+                remedy="Sort the tests by time.",
+            )
+        state = self._with(state, reading)
+        rows = np.flatnonzero(state.counted)
+        evidence = self._evidence(state, rows)
+        subject = Subject(self.quantities, self.hanger, self.options, state.start)
+        last = state.tests - 1
+        outlier = 0.0 if state.counted[-1] else self._outlier(state, last)
+        found = WatchedTest(
+            test=reading.test,
+            time=reading.time,
+            temperature_c=reading.temperature_c,
+            drifts=drifted(subject, evidence, reading),
+            change=changed(subject, evidence, reading, 1 - state.still_same, outlier),
+        )
+        coefficients = self._coefficients(evidence)
+        if found.change.called and state.counted[-1]:
+            still = state.still_same * (1 - probability_of_change(evidence, self.options))
+            begun = np.append(state.called, [_begun(evidence, rows, found.change)], axis=0)
+            sizes = np.append(state.called_precision, [_size_of(evidence)], axis=0)
+            state = replace(state, called=begun, called_precision=sizes, still_same=still)
+        return replace(state, coefficients=coefficients), found
+
+    def _with(self, state: WatchState, reading: Reading) -> WatchState:
+        """The state with one more test in it, and who counts now."""
+        n, q = self.structure.layout.n, self.structure.layout.q
+        if reading.mean.shape != (q,):
+            raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
+        years = years_between(state.start, reading.time)
+        known = state.kelvin[~np.isin(state.years, state.unknown_years)]
+        warmth = Warmth(state.reference_c, known, state.unknown_years)
+        warmth, kelvin, sd = warmth.after(reading.temperature_c, years, self.options)
+        modes = reading.modes
+        values = np.zeros(n) if modes is None else modes.values
+        variances = np.full(n, np.inf) if modes is None else modes.variances
+        slopes = np.zeros((n, q)) if modes is None else modes.slopes
+        softening = np.zeros(n) if modes is None else modes.per_kelvin
+        level = math.log(reading.amplitude) if reading.amplitude > 0 else math.nan
+        doubt = sd * (softening + slopes @ state.coefficients)
+        rows = {
+            "values": values - kelvin * softening,
+            "variances": variances,
+            "slopes": slopes,
+            "per_kelvin": softening,
+            "coordinates": reading.mean,
+            "years": years,
+            "kelvin": kelvin,
+            "log_amplitude": level,
+            "doubt": doubt,
+        }
+        grown = {
+            name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
+            for name, row in rows.items()
+        }
+        grown["unknown_years"] = warmth.unknown_years
+        later = replace(
+            state, last_time=reading.time, reference_c=warmth.reference_c, sums=None, **grown
+        )
+        counts = counted(self._seen(later), state.counted, self.options.baseline_tests)
+        sums = self._sums(later, state)
+        return replace(later, counted=counts, sums=sums)
+
+    def _seen(self, state: WatchState) -> Seen:
+        """All tests so far, their swing with the temperature taken off as far as it is known."""
+        at_rest = state.values - state.kelvin[:, None] * (state.slopes @ state.coefficients)
+        tension = [each.name == TENSION for each in self.quantities]
+        steps = np.array([each.step_sd for each in self.quantities])
+        known = state.coordinates[: len(state.counted)][state.counted][:, tension]
+        apart = np.abs(np.diff(known, axis=0))
+        scatter = _LEAST_SCATTER
+        if len(apart) >= _FEW:
+            scatter = float(np.median(apart)) * _MAD / math.sqrt(2)
+        scatter = min(max(scatter, _LEAST_SCATTER), _MOST_SCATTER)
+        of_springs = max(self.options.spring_scatter_of_step)
+        sds = np.where(tension, scatter, of_springs * steps)
+        return Seen(
+            values=at_rest,
+            variances=state.variances,
+            doubt=state.doubt,
+            factors=state.slopes[-1] if state.slopes[-1].any() else state.slopes.mean(axis=0),
+            sds=sds,
+            common=self.structure.common,
+        )
+
+    def _sums(self, state: WatchState, before: WatchState) -> Sums:
+        """Of all tests; those of the tests `before` are taken from there, where it has them."""
+        known = before.sums
+        first = 0 if known is None or len(known.constant) != before.tests else before.tests
+        new = [self._sums_of(state, test) for test in range(first, state.tests)]
+        found = new[0] if first == 0 or known is None else known.with_more(new[0])
+        for each in new[1:]:
+            found = found.with_more(each)
+        return found
+
+    def _sums_of(self, state: WatchState, test: int) -> Sums:
+        structure, slopes = self.structure, state.slopes[test]
+        kelvin, level = state.kelvin[test], state.log_amplitude[test]
+        doubt = state.doubt[test]
+        common = structure.common + np.outer(doubt, doubt)
+        if not math.isfinite(level):
+            level = 0.0
+            of_level = structure.layout.prior_sd[-1 - len(self.quantities) : -1]
+            unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
+            common = common + unknown @ unknown.T
+        tension = slopes[:, [each.name == TENSION for each in self.quantities]]
+        columns = np.hstack(
+            [
+                np.eye(structure.layout.n),
+                slopes,
+                slopes * kelvin,
+                slopes * level,
+                tension.sum(axis=1, keepdims=True) * state.years[test],
+            ]
+        )
+        covariance = covariance_of(state.variances[test], slopes, structure.scatter, common)
+        return sums_of(columns, state.values[test], covariance)
+
+    def _evidence(self, state: WatchState, rows: np.ndarray) -> Evidence:  # type: ignore[type-arg]
+        """Of the tests that count."""
+        assert state.sums is not None
+        called = [
+            Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
+            for (first, years, is_ramp), precision in zip(
+                state.called.tolist(), state.called_precision, strict=True
+            )
+        ]
+        first = int((rows < self.options.baseline_tests).sum())
+        return evidence_of(
+            state.sums.taken(rows),
+            state.years[rows],
+            max(first, 1),
+            self.structure.layout,
+            self.structure.directions,
+            called,
+            self.options.beginnings,
+        )
+
+    def _coefficients(self, evidence: Evidence) -> FloatArray:
+        """How far each quantity goes with a kelvin (q,), by the likeliest scatter."""
+        n, q = self.structure.layout.n, self.structure.layout.q
+        return np.asarray(evidence.null_mean[int(evidence.log_null.argmax()), n : n + q])
+
+    def _outlier(self, state: WatchState, test: int) -> float:
+        before = np.flatnonzero(state.counted[:test])
+        prior = self.options.outlier_probability
+        if not len(before):
+            return prior
+        return outlier_probability(self._seen(state), test, int(before[-1]), prior)
+
+
+def watched(
+    readings: Sequence[Reading],
+    quantities: tuple[WatchedQuantity, ...],
+    columns: Columns,
+    hanger: Hanger,
+    options: WatchOptions | None = None,
+) -> Watch:
+    """One result a reading, each of which rests on the readings up to it alone.
+
+    The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
+    time or not of these quantities.
+    """
+    watcher = Watcher(quantities, columns, hanger, options or WatchOptions())
+    if not readings:
+        return Watch((), ())
+    count = watcher.options.baseline_tests
+    state, begun = watcher.begin(readings[:count])
+    tests = list(begun.tests)
+    for reading in readings[count:]:
+        state, found = watcher.after(state, reading)
+        tests.append(found)
+    calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
+    return Watch(tuple(tests), tuple(calls))
+
+
+def _begun(evidence: Evidence, rows: np.ndarray, change: Change) -> list[float]:  # type: ignore[type-arg]
+    """The likeliest first test of a called change, when it began, and whether it goes on."""
+    share = evidence.shares.sum(axis=(1, 2, 3, 4))
+    first = int(evidence.beginnings[int(share.argmax())])
+    is_ramp = bool(change.sudden < 0.5)
+    return [float(rows[first]), float(evidence.years[first - 1]), float(is_ramp)]
+
+
+def _size_of(evidence: Evidence) -> FloatArray:
+    """Precision (n + q, n + q) of a called change's size: each cause as probable as it was then."""
+    layout = evidence.layout
+    least = np.concatenate(
+        [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
+    )
+    covariance = np.diag(least**2)
+    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
+    for direction, by_size in zip(evidence.directions, shares, strict=True):
+        for share, size in zip(by_size, SIZES, strict=True):
+            covariance += share * size**2 * direction.factor @ direction.factor.T
+    return np.asarray(np.linalg.inv(covariance))
+
+
+def _told(quantity: WatchedQuantity) -> list[object]:
+    """All of a quantity, its table as a digest."""
+    table = np.array([quantity.coordinates, quantity.values]).tobytes()
+    plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))
+    return [*plain, *quantity.parameters, hashlib.sha256(table).hexdigest()]
