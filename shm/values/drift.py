@@ -139,7 +139,8 @@ class Change:
     `probability` is that of any change since the baseline, `sudden` that it was a step and no
     ramp, given a change. `began_after` and `began_by` hold the beginning with 90 % probability.
     `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
-    of this test's reading being a blunder.
+    of this test's reading being a blunder. `material_probability` is that the change moves a first
+    frequency, or the mean of all, by more than the watch is asked to tell; less is not called.
     """
 
     evidence_years: float
@@ -150,11 +151,12 @@ class Change:
     began_by: datetime
     moved: tuple[Moved, ...]
     outlier_probability: float = NAN
+    material_probability: float = 1.0
 
     @property
     def called(self) -> bool:
-        """Whether the evidence is beyond its limit."""
-        return self.evidence_years > self.limit_years
+        """Whether the evidence is beyond its limit, and what changed is no trifle."""
+        return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,6 +50,7 @@ _LOSS = 0.05
 _STIFFER = 0.03
 _CLOCK = 1e-3
 _UNEXPLAINED = 3e-3
+_SEEN_OF_SENSORS = 1e-2  # technical: of the largest; the rest is within a mode's own scatter
 _STEP_TO = 0.1  # technical: causes are linear to a tenth of a unit and beyond
 _NOWHERE = np.empty(0)
 _ENDS: tuple[End, ...] = ("deck", "arch")
@@ -124,15 +125,16 @@ def columns_of(
 class Structure:
     """What is watched: the layout of columns, directions of change, and scatters.
 
-    `scatter` (K, q) are the sds of the quantities' test-to-test scatter in their coordinates.
-    `common` (n, n) is the covariance of what any two tests differ by in their modes beside it.
+    Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
+    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that.
     """
 
     layout: Layout
     directions: tuple[Direction, ...]
-    scatter: FloatArray
-    common: FloatArray
     quantities: tuple[WatchedQuantity, ...]
+    scattering: FloatArray
+    scatter_variance: FloatArray
+    scales: FloatArray
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -159,18 +161,31 @@ def structure_of(
     prior_sd = np.concatenate(
         [np.ones(n), steps, per_kelvin, per_amplitude, [options.creep_per_year_sd]]
     )
-    grid = [
-        np.where(is_tension, tension, springs * steps)
-        for tension in options.tension_scatter
-        for springs in (options.spring_scatter_of_step if q > 1 else (0.0,))
-    ]
-    clock = np.full((n, n), options.clock_sd**2)
+    strength, axes = np.linalg.eigh(columns.sensors)
+    kept = strength > _SEEN_OF_SENSORS * strength[-1]
+    scattering = np.hstack(
+        [
+            axes[:, kept] * np.sqrt(strength[kept]),
+            columns.by_cause[BENDING_STIFFNESS].T,
+            np.ones((n, 1)),
+            np.eye(n),
+        ]
+    )
+    sds = np.concatenate(
+        [
+            np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
+            np.ones(int(kept.sum())),
+            [options.bending_scatter / _STIFFER, options.clock_scatter],
+            np.full(n, options.mode_scatter),
+        ]
+    )
     return Structure(
-        Layout(n, q, prior_sd),
-        tuple(_directions(quantities, columns)),
-        np.array(grid),
-        columns.sensors + clock,
-        tuple(quantities),
+        layout=Layout(n, q, prior_sd),
+        directions=tuple(_directions(quantities, columns)),
+        quantities=tuple(quantities),
+        scattering=scattering,
+        scatter_variance=sds**2,
+        scales=np.array(options.scatter_scales),
     )
 
 
@@ -197,7 +212,7 @@ def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list
             may_ramp = cause != TIMEBASE
             found.append(Direction(cause, factor, (), log_prior, may_ramp))
     strength, axes = np.linalg.eigh(2 * columns.sensors)
-    kept = strength > 1e-3 * strength[-1]
+    kept = strength > _SEEN_OF_SENSORS * strength[-1]
     moved = np.zeros((n + q, int(kept.sum())))
     moved[:n] = axes[:, kept] * np.sqrt(strength[kept])
     sensor = Direction(SENSOR_MASS, moved, (), float(np.log(_SHARES[SENSOR_MASS])), False)

@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shm.values import BoolArray, FloatArray, IntArray
+from shm.values import FloatArray, IntArray
 
 STEP, RAMP = 0, 1
 SIZES = np.array([1.0, 6.0])
@@ -96,37 +96,24 @@ class Sums:
     cross: FloatArray
     constant: FloatArray
 
-    def taken(self, rows: IntArray | BoolArray) -> Sums:
-        return Sums(self.square[rows], self.cross[rows], self.constant[rows])
 
-    def with_more(self, other: Sums) -> Sums:
-        """These tests, then the others."""
-        return Sums(
-            np.concatenate([self.square, other.square]),
-            np.concatenate([self.cross, other.cross]),
-            np.concatenate([self.constant, other.constant]),
-        )
-
-
-def sums_of(columns: FloatArray, values: FloatArray, covariance: FloatArray) -> Sums:
-    """Of one test: `columns` (n, z), `values` (n,), `covariance` (K, n, n) by each scatter."""
-    weight = np.linalg.inv(covariance)
-    weighted = weight @ columns
-    of_values = weight @ values
-    constant = -(values @ of_values.T + np.linalg.slogdet(covariance)[1]) / 2
-    return Sums(
-        (columns.T @ weighted)[None], (of_values @ columns)[None], np.asarray(constant)[None]
-    )
-
-
-def covariance_of(
-    variances: FloatArray, factors: FloatArray, sds: FloatArray, common: FloatArray
-) -> FloatArray:
-    """(K, n, n) of a test's errors: its modes' own, scatter along `factors` (n, c) with `sds`
-    (K, c), and what is `common` (n, n) to every scatter."""
-    spread = (factors * sds[:, None, :]) @ np.swapaxes(factors * sds[:, None, :], 1, 2)
+def sums_of(
+    columns: FloatArray, values: FloatArray, variances: FloatArray, covariance: FloatArray
+) -> Sums:
+    """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
+    not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
     own = np.where(np.isfinite(variances), variances, _ABSENT)
-    return np.asarray(spread + common + np.diag(own))
+    n = values.shape[1]
+    joint = covariance + own[:, None, :, None] * np.eye(n)
+    weight = np.linalg.inv(joint)
+    weighted = weight @ columns[:, None]
+    of_values = np.einsum("tkij,tj->tki", weight, values)
+    constant = -(np.einsum("tki,ti->tk", of_values, values) + np.linalg.slogdet(joint)[1]) / 2
+    return Sums(
+        np.swapaxes(columns, 1, 2)[:, None] @ weighted,
+        np.einsum("tki,tiz->tkz", of_values, columns),
+        constant,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +156,18 @@ class Evidence:
         if not self.log_mass.size:
             return self.log_mass
         return np.exp(self.log_mass - self.log_statistic)
+
+    @property
+    def log_of_last(self) -> float:
+        """By how much the last test alone speaks for any change: the largest log Bayes factor."""
+        if not len(self.beginnings) or self.beginnings[-1] != len(self.years) - 1:
+            return 0.0
+        waited = math.log(max(float(_waited(self.years, self.beginnings)[-1]), 1e-12))
+        prior = np.array([each.log_prior for each in self.directions])[:, None] + LOG_SHARES
+        own = self.log_mass[-1, :, STEP] - waited - prior - self.log_null[:, None, None]
+        kinds = np.log([1 + each.may_ramp for each in self.directions])[:, None]
+        by_scatter = (own + kinds).max(axis=(1, 2))
+        return float(np.exp(self.log_null) @ by_scatter)
 
     def by_direction(self) -> FloatArray:
         """Probability (D,) of each direction, given a change."""

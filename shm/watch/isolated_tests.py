@@ -25,8 +25,8 @@ _WIDER, _TAIL = 10.0, 2.0  # judgement: how a blunder lies, ten times as wide an
 class Seen:
     """Tests (T,) mode by mode: `values` and `variances` (T, n), infinite where not measured.
 
-    `factors` (n, c) with `sds` (c,) is the scatter of two tests of one state, `common` (n, n) more
-    of it, and `doubt` (T, n) what an unknown temperature does.
+    `factors` (n, c) with `sds` (c,) are what tests of one state scatter along, and by; `doubt`
+    (T, n) is what an unknown temperature does.
     """
 
     values: FloatArray
@@ -34,7 +34,6 @@ class Seen:
     doubt: FloatArray
     factors: FloatArray
     sds: FloatArray
-    common: FloatArray
 
     def distance(self, one: int, other: int) -> tuple[float, int, float]:
         """Squared length of the difference, its modes, and the log determinant of its covariance."""
@@ -42,7 +41,7 @@ class Seen:
         if not both.any():
             return 0.0, 0, 0.0
         scatter = self.factors[both] * self.sds
-        covariance = 2 * (scatter @ scatter.T + self.common[np.ix_(both, both)])
+        covariance = 2 * scatter @ scatter.T
         apart = (self.doubt[one] - self.doubt[other])[both]
         for doubt in (self.doubt[one][both], self.doubt[other][both], apart):
             covariance += np.outer(doubt, doubt) / 2

@@ -56,10 +56,16 @@ def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
 
 
 def changed(
-    subject: Subject, evidence: Evidence, reading: Reading, before: float, outlier: float
+    subject: Subject,
+    evidence: Evidence,
+    reading: Reading,
+    before: float,
+    outlier: float,
+    effects: FloatArray,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
-    `outlier` that of this test being a blunder."""
+    `outlier` that of this test being a blunder. `effects` (r, n + q) are what a change does to the
+    frequencies that owners look at."""
     now = probability_of_change(evidence, subject.options)
     began_after, began_by = _began(subject, evidence, reading)
     return Change(
@@ -71,7 +77,24 @@ def changed(
         began_by=began_by,
         moved=_moved(subject.quantities, evidence),
         outlier_probability=outlier,
+        material_probability=_material(subject, evidence, effects),
     )
+
+
+def _material(subject: Subject, evidence: Evidence, effects: FloatArray) -> float:
+    """The probability that a change, if there is one, moves one of the frequencies of `effects` by
+    more than what is to be told."""
+    if not len(evidence.beginnings):
+        return 0.0
+    weights, changes = _leading(evidence, np.ones(len(evidence.directions), bool))
+    least, beyond_it = subject.options.least_frequency_shift, []
+    for each in changes:
+        mean, factor = evidence.change_at(each)
+        middle = effects @ mean
+        sd = np.maximum(np.sqrt(np.square(effects @ factor).sum(axis=1)), 1e-12)
+        tails = ndtr((-least - middle) / sd) + ndtr((middle - least) / sd)
+        beyond_it.append(float(tails.max()))
+    return float(weights @ np.array(beyond_it))
 
 
 def _sudden(evidence: Evidence) -> float:
@@ -338,13 +361,13 @@ class Shift:
 def shift_of_mixture(
     quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
 ) -> Shift:
-    """Of normal distributions (B,) in units of a step; no shift at all with what `weights` leave.
+    """Of normal distributions (B,) in the coordinate; no shift at all with what `weights` leave.
 
     By Gauss-Hermite quadrature of seven nodes in each.
     """
     kept = weights > _NEGLIGIBLE
     weights = weights[kept]
-    mean, sd = mean[kept] * quantity.step_sd, sd[kept] * quantity.step_sd
+    mean, sd = mean[kept], sd[kept]
     shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
     first = float(weights @ shifts @ _WEIGHTS)
     second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
@@ -361,8 +384,8 @@ def beyond(
 ) -> float:
     """Probability of a shift beyond a threshold, the likelier way, by the same mixture."""
     kept = weights > _NEGLIGIBLE
-    weights, mean = weights[kept], mean[kept] * quantity.step_sd
-    sd = np.maximum(sd[kept] * quantity.step_sd, 1e-12)
+    weights, mean = weights[kept], mean[kept]
+    sd = np.maximum(sd[kept], 1e-12)
     low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
     down = float(weights @ ndtr((low - mean) / sd))
     up = float(weights @ ndtr((mean - high) / sd))

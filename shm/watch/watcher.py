@@ -34,7 +34,6 @@ from shm.watch.change_point import (
     Evidence,
     Sums,
     Told,
-    covariance_of,
     evidence_of,
     sums_of,
 )
@@ -42,13 +41,11 @@ from shm.watch.conditions import Warmth, years_between
 from shm.watch.isolated_tests import Seen, counted, outlier_probability
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
+from shm.watch.scatter import differences, learnt
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 3
-_LEAST_SCATTER, _MOST_SCATTER = 0.003, 0.02  # judgement: of the tension, between two tests
-_MAD = 1.4826  # of a normal law
 _LEAST_SHARE = 1e-3  # judgement: of a cause in a call, which later tests may yet speak for
-_FEW = 6  # differences: fewer say nothing of a scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +70,9 @@ class WatchState:
 
     It goes on only where `key` is that of the watch which is to go on. `told` is text that goes
     with it, `still_same` the probability that nothing had changed before the last call.
+    `weight` (T,) is what is left of tests that alone would say more than one test may.
     `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
-    (calls, n + q, n + q) what called it. `sums` need not be kept.
+    (calls, n + q, n + q) what called it. `scatter_variance` is what tests scatter by.
     """
 
     key: str
@@ -90,14 +88,15 @@ class WatchState:
     kelvin: FloatArray
     log_amplitude: FloatArray
     doubt: FloatArray
+    weight: FloatArray
     unknown_years: FloatArray
     counted: BoolArray
     coefficients: FloatArray
+    scatter_variance: FloatArray
     called: FloatArray
     called_precision: FloatArray
     still_same: float = 1.0
     told: str = ""
-    sums: Sums | None = field(default=None, repr=False)
 
     @property
     def tests(self) -> int:
@@ -109,7 +108,7 @@ class WatchState:
         plain = {
             each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
             for each in fields(self)
-            if (value := getattr(self, each.name)) is not None and each.name != "sums"
+            for value in [getattr(self, each.name)]
         }
         np.savez_compressed(kept, **plain)
         return kept.getvalue()
@@ -188,9 +187,11 @@ class Watcher:
             kelvin=np.zeros(0),
             log_amplitude=np.zeros(0),
             doubt=np.zeros((0, n)),
+            weight=np.zeros(0),
             unknown_years=np.zeros(0),
             counted=np.zeros(0, bool),
             coefficients=np.zeros(q),
+            scatter_variance=self.structure.scatter_variance,
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),
         )
@@ -222,6 +223,12 @@ class Watcher:
         state = self._with(state, reading)
         rows = np.flatnonzero(state.counted)
         evidence = self._evidence(state, rows)
+        alone = evidence.log_of_last if state.counted[-1] else 0.0
+        if alone > self.options.most_of_one_test_nats:
+            weight = state.weight.copy()
+            weight[-1] = self.options.most_of_one_test_nats / alone
+            state = replace(state, weight=weight)
+            evidence = self._evidence(state, rows)
         subject = Subject(self.quantities, self.hanger, self.options, state.start)
         last = state.tests - 1
         outlier = 0.0 if state.counted[-1] else self._outlier(state, last)
@@ -230,7 +237,9 @@ class Watcher:
             time=reading.time,
             temperature_c=reading.temperature_c,
             drifts=drifted(subject, evidence, reading),
-            change=changed(subject, evidence, reading, 1 - state.still_same, outlier),
+            change=changed(
+                subject, evidence, reading, 1 - state.still_same, outlier, self._effects(state)
+            ),
         )
         coefficients = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
@@ -266,77 +275,86 @@ class Watcher:
             "kelvin": kelvin,
             "log_amplitude": level,
             "doubt": doubt,
+            "weight": 1.0,
         }
         grown = {
             name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
             for name, row in rows.items()
         }
         grown["unknown_years"] = warmth.unknown_years
-        later = replace(
-            state, last_time=reading.time, reference_c=warmth.reference_c, sums=None, **grown
-        )
+        later = replace(state, last_time=reading.time, reference_c=warmth.reference_c, **grown)
         counts = counted(self._seen(later), state.counted, self.options.baseline_tests)
-        sums = self._sums(later, state)
-        return replace(later, counted=counts, sums=sums)
+        later = replace(later, counted=counts)
+        return replace(later, scatter_variance=self._scatter(later))
+
+    def _factors(self, state: WatchState) -> FloatArray:
+        """Along what each test scatters (T, n, q + c)."""
+        fixed = np.broadcast_to(
+            self.structure.scattering, (state.tests, *self.structure.scattering.shape)
+        )
+        return np.concatenate([state.slopes, fixed], axis=2)
 
     def _seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
         at_rest = state.values - state.kelvin[:, None] * (state.slopes @ state.coefficients)
-        tension = [each.name == TENSION for each in self.quantities]
-        steps = np.array([each.step_sd for each in self.quantities])
-        known = state.coordinates[: len(state.counted)][state.counted][:, tension]
-        apart = np.abs(np.diff(known, axis=0))
-        scatter = _LEAST_SCATTER
-        if len(apart) >= _FEW:
-            scatter = float(np.median(apart)) * _MAD / math.sqrt(2)
-        scatter = min(max(scatter, _LEAST_SCATTER), _MOST_SCATTER)
-        of_springs = max(self.options.spring_scatter_of_step)
-        sds = np.where(tension, scatter, of_springs * steps)
+        factors = self._factors(state)
+        measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
+        variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
             values=at_rest,
             variances=state.variances,
             doubt=state.doubt,
-            factors=state.slopes[-1] if state.slopes[-1].any() else state.slopes.mean(axis=0),
-            sds=sds,
-            common=self.structure.common,
+            factors=factors[measured[-1]] if len(measured) else factors[-1],
+            sds=np.sqrt(variance),
         )
 
-    def _sums(self, state: WatchState, before: WatchState) -> Sums:
-        """Of all tests; those of the tests `before` are taken from there, where it has them."""
-        known = before.sums
-        first = 0 if known is None or len(known.constant) != before.tests else before.tests
-        new = [self._sums_of(state, test) for test in range(first, state.tests)]
-        found = new[0] if first == 0 or known is None else known.with_more(new[0])
-        for each in new[1:]:
-            found = found.with_more(each)
-        return found
+    def _scatter(self, state: WatchState) -> FloatArray:
+        """What the counted tests so far say of the scatter (q + c,)."""
+        seen = self._seen(state)
+        rows = state.counted
+        doubted = np.square(state.doubt[rows])
+        found = differences(
+            seen.values[rows], state.variances[rows] + doubted, self._factors(state)[rows]
+        )
+        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
-    def _sums_of(self, state: WatchState, test: int) -> Sums:
-        structure, slopes = self.structure, state.slopes[test]
-        kelvin, level = state.kelvin[test], state.log_amplitude[test]
-        doubt = state.doubt[test]
-        common = structure.common + np.outer(doubt, doubt)
-        if not math.isfinite(level):
-            level = 0.0
-            of_level = structure.layout.prior_sd[-1 - len(self.quantities) : -1]
-            unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
-            common = common + unknown @ unknown.T
-        tension = slopes[:, [each.name == TENSION for each in self.quantities]]
-        columns = np.hstack(
+    def _sums(self, state: WatchState) -> Sums:
+        """Of the tests that count."""
+        structure, layout = self.structure, self.structure.layout
+        rows = np.flatnonzero(state.counted)
+        slopes, level = state.slopes[rows], state.log_amplitude[rows]
+        known = np.isfinite(level)
+        usual = float(np.median(level[known])) if known.any() else 0.0
+        level = np.where(known, level - usual, 0.0)
+        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
+        unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
+        unknown[known] = 0.0
+        doubt = state.doubt[rows]
+        common = unknown @ np.swapaxes(unknown, 1, 2) + doubt[:, :, None] * doubt[:, None, :]
+        tension = [each.name == TENSION for each in self.quantities]
+        columns = np.concatenate(
             [
-                np.eye(structure.layout.n),
+                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
                 slopes,
-                slopes * kelvin,
-                slopes * level,
-                tension.sum(axis=1, keepdims=True) * state.years[test],
-            ]
+                slopes * state.kelvin[rows, None, None],
+                slopes * level[:, None, None],
+                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+            ],
+            axis=2,
         )
-        covariance = covariance_of(state.variances[test], slopes, structure.scatter, common)
-        return sums_of(columns, state.values[test], covariance)
+        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
+        spread = factors @ np.swapaxes(factors, 1, 2)
+        covariance = common[:, None] + structure.scales[:, None, None] ** 2 * spread[:, None]
+        wider = 1 / state.weight[rows]
+        return sums_of(
+            columns,
+            state.values[rows],
+            wider[:, None] * state.variances[rows],
+            wider[:, None, None, None] * covariance,
+        )
 
     def _evidence(self, state: WatchState, rows: np.ndarray) -> Evidence:  # type: ignore[type-arg]
         """Of the tests that count."""
-        assert state.sums is not None
         called = [
             Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
             for (first, years, is_ramp), precision in zip(
@@ -345,7 +363,7 @@ class Watcher:
         ]
         first = int((rows < self.options.baseline_tests).sum())
         return evidence_of(
-            state.sums.taken(rows),
+            self._sums(state),
             state.years[rows],
             max(first, 1),
             self.structure.layout,
@@ -353,6 +371,16 @@ class Watcher:
             called,
             self.options.beginnings,
         )
+
+    def _effects(self, state: WatchState) -> FloatArray:
+        """What a change does to each plane's first frequency and to the mean (r, n + q)."""
+        measured = np.isfinite(state.variances)
+        count = np.maximum(measured.sum(axis=0), 1)[:, None]
+        slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
+        of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
+        planes = [plane for plane, _ in self.columns.modes]
+        firsts = [planes.index(plane) for plane in dict.fromkeys(planes)]
+        return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
 
     def _coefficients(self, evidence: Evidence) -> FloatArray:
         """How far each quantity goes with a kelvin (q,), by the likeliest scatter."""
