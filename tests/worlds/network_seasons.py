@@ -463,6 +463,10 @@ class Event:
     def __post_init__(self) -> None:
         if self.kind not in EVENTS:
             raise ValueError(f"no event {self.kind!r}: one of {EVENTS}")
+        if self.size == 0.0 and self.kind not in ("none", "springs"):
+            raise ValueError(f"{self.kind} of size 0 is no event")
+        if self.kind == "sensor_moved" and not 0.0 < self.size < 1.0:
+            raise ValueError("a sensor sits between the ends")
 
     def after(self, days: Array) -> NDArray[np.bool_]:
         return np.asarray(days) >= self.day

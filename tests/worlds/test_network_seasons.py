@@ -1,0 +1,279 @@
+"""The world of network-arch seasons against closed forms, a second route, and its own promises."""
+
+import json
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.worlds.network_seasons import (
+    PLANES,
+    AmbientNuisances,
+    Beam,
+    Discrete,
+    Event,
+    Nuisances,
+    Reduced,
+    Season,
+    State,
+    StiffnessLoss,
+    _coupled,
+    ambient,
+    bridge,
+    dynamic_stiffness_hz,
+    full_modes,
+    natural_frequencies_hz,
+    reduced,
+    season,
+)
+
+ORDERS = np.arange(1, 6)
+BAR = Beam(
+    length_m=10.0,
+    mass_kg_m=20.0,
+    bending_nm2=1e5,
+    shear_n=1e11,  # stiffer costs digits
+    rotary_kg_m=0.0,
+    rotation_nm=(0.0, 0.0),
+)
+ALONE = replace(Nuisances(), crossing_share=0.0)
+
+
+def test_a_limp_hanger_is_a_string() -> None:
+    limp = replace(BAR, bending_nm2=1e-1, shear_n=1e9)
+    found = natural_frequencies_hz(limp, State(4e5), 5)
+    assert found == pytest.approx(ORDERS / 20 * np.sqrt(4e5 / 20), rel=1e-5)
+
+
+def test_pinned_beam_under_tension() -> None:
+    waves = ORDERS * np.pi / 10
+    expected = np.sqrt((4e5 * waves**2 + 1e5 * waves**4) / 20) / (2 * np.pi)
+    assert natural_frequencies_hz(BAR, State(4e5), 5) == pytest.approx(expected, rel=1e-6)
+
+
+def test_clamped_beam_without_tension() -> None:
+    roots = np.array([4.730040745, 7.853204624, 10.995607838])  # cos x cosh x = 1
+    clamped = replace(BAR, rotation_nm=(1e11, 1e11))
+    expected = (roots / 10) ** 2 * np.sqrt(1e5 / 20) / (2 * np.pi)
+    found = natural_frequencies_hz(clamped, State(1e-6), 3)
+    assert found == pytest.approx(expected, rel=3e-6)
+
+
+def test_pinned_timoshenko_beam_under_tension() -> None:
+    # one wave of sin and cos: a quadratic in omega^2
+    beam = replace(BAR, shear_n=2e7, rotary_kg_m=0.5)
+    waves = ORDERS * np.pi / 10
+    a, b = 20 * 0.5, beam.shear_n + 1e5 * waves**2
+    c = (beam.shear_n + 4e5) * waves**2
+    middle, last = -(20 * b + 0.5 * c), c * b - (beam.shear_n * waves) ** 2
+    squares = (-middle - np.sqrt(middle**2 - 4 * a * last)) / (2 * a)
+    found = natural_frequencies_hz(beam, State(4e5), 5)
+    assert found == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-6)
+
+
+@pytest.mark.parametrize("place", [0, 9, 15])
+def test_another_route_finds_the_same_frequencies(place: int) -> None:
+    hanger = bridge(3, 20, Nuisances())[place]
+    beam = replace(hanger.beam("transverse", Event(), ()), sag_n_m3=0.0)
+    at = round(0.23 * hanger.length_m, 9)
+    state = State(0.95 * hanger.tension_n, 0.7, (0.8, 0.6), 15.0, ((0.4, at),))
+    for hz in natural_frequencies_hz(beam, state, 5)[[0, 4]]:
+        assert dynamic_stiffness_hz(beam, state, hz) == pytest.approx(hz, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["none", "section_loss", "lamp"])
+def test_the_fast_map_is_the_full_solve(kind: str) -> None:
+    rng = np.random.default_rng(5)
+    event = Event(kind, size=0.2 if kind != "none" else 0.0)
+    for i, hanger in enumerate(bridge(4, 12, Nuisances())[::3]):
+        fast = reduced(hanger, PLANES[i % 2], event, True, 8)
+        whole = Discrete(fast.beam, hanger.tension_n)
+        places = list(fast.points)
+        for _ in range(3):
+            state = State(
+                hanger.tension_n * rng.uniform(0.85, 1.1),
+                rng.uniform(hanger.slip_factor, hanger.stick_factor),
+                (rng.uniform(0.3, 1.2), rng.uniform(0.3, 1.2)),
+                rng.uniform(-20, 30),
+                ((0.45, places[int(rng.integers(len(places)))]),),
+                kind == "section_loss",
+            )
+            expected = full_modes(whole, state, 6)[0]
+            assert fast.modes([state], 6)[0][0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_sag_stiffens_the_first_mode_of_its_plane() -> None:
+    sagging = replace(BAR, sag_n_m3=1e12)
+    taut, low = (natural_frequencies_hz(beam, State(4e5), 3) for beam in (BAR, sagging))
+    assert low[0] > taut[0] * 1.0005
+    assert low[1] == pytest.approx(taut[1], rel=1e-8)  # antisymmetric
+
+
+def test_a_soft_tie_between_two_hangers_adds_its_energy() -> None:
+    # to first order omega^2 grows by k phi^2, phi = sqrt(2 / m L) sin(pi n x / L)
+    beam = replace(BAR, marks_m=(4.0,))
+    one = Reduced(beam, [State(4e5), State(3e5)], 8)
+    hz, shapes = one.modes([State(4e5)], 10)
+    at = one.at(4.0, shapes)
+    other = 1.03 * hz  # a partner tuned apart
+    squares = (2 * np.pi * np.concatenate((hz, other), axis=1)) ** 2
+    tied = _coupled(squares, [(30.0, np.concatenate((at, -at), axis=1))], 5)[0]
+    gained = (2 * np.pi * tied) ** 2 - squares[0, :5]
+    assert gained == pytest.approx(30 * np.sin(np.pi * ORDERS * 0.4) ** 2 / 100, rel=0.02, abs=1e-4)
+
+
+def test_a_damper_splits_a_mode_as_two_masses_do() -> None:
+    squares = np.array([[70.0**2, 0.0]])
+    weight, spring, phi = 3.0, 3.0 * 75.0**2, 0.1
+    v = np.array([[phi, -1 / np.sqrt(weight)]])
+    a, b, c = 70.0**2 + spring * phi**2, 75.0**2, -spring * phi / np.sqrt(weight)
+    roots = (a + b) / 2 + np.array([-1, 1]) * np.sqrt((a - b) ** 2 / 4 + c * c)
+    found = float(_coupled(squares, [(spring, v)], 1)[0, 0]) * 2 * np.pi
+    assert np.abs(np.sqrt(roots) / found - 1).min() < 1e-9
+
+
+def test_without_nuisances_the_frequencies_are_exact_and_constant() -> None:
+    calm = season(7, hangers=5, nuisances=Nuisances.none())
+    hangers = bridge(7, 5, Nuisances.none())
+    for record, hanger in zip(calm.hangers, hangers, strict=True):
+        assert record.description["length_m"] == hanger.length_m
+        assert record.truth["tension_n"] == pytest.approx(hanger.description["nominal_tension_n"])
+        for plane in PLANES:
+            beam = hanger.beam(plane, Event(), ())
+            expected = natural_frequencies_hz(beam, State(hanger.tension_n), 6)
+            for visit in record.visits:
+                modes = [m for m in visit["modes"] if m["plane"] == plane]
+                assert len(modes) >= 4
+                read = [m["frequency_hz"] for m in modes]
+                assert read == pytest.approx(expected[: len(read)], rel=1e-5)
+        assert not record.truth["mistaken"]
+
+
+def _flat(of: Season) -> list[Any]:
+    return [(h.name, h.description, h.visits, h.operators) for h in of.hangers]
+
+
+def test_same_seed_same_season_and_plain_json() -> None:
+    first, second, other = season(11, 6), season(11, 6), season(12, 6)
+    assert json.dumps(_flat(first)) == json.dumps(_flat(second)) != json.dumps(_flat(other))
+
+
+def _shift(kind: str, size: float, **more: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Relative shifts (visit, plane, order) of the event's hanger 3; of hangers 0 to 7 (max)."""
+    event = Event(kind, 3, 400.0, size, **more)
+    plain, struck = (season(21, 8, event=e, nuisances=ALONE) for e in (None, event))
+    shifts = []
+    for a, b in zip(plain.hangers, struck.hangers, strict=True):
+        assert [v["time"] for v in a.visits] == [v["time"] for v in b.visits]
+        rows = [b.truth["frequency_hz"][p] / a.truth["frequency_hz"][p] - 1 for p in PLANES]
+        swapped = {k for k, _ in b.truth["swapped"]}
+        own = np.array([v["id"] not in swapped for v in b.visits])
+        shifts.append(np.stack(rows, axis=1) * own[:, None, None])
+    days = np.array(struck.hangers[3].truth["day"])
+    assert np.abs(shifts[3][days < 400]).max() < 1e-5
+    return shifts[3][days >= 400], days, np.array([np.abs(s).max() for s in shifts])
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [("springs", 0.3), ("lamp", 4.0), ("section_loss", 0.2), ("broken_wires", 0.2),
+     ("damper", 5.0), ("sensor_moved", 0.25)],
+)  # fmt: skip
+def test_a_local_event_stays_in_its_hanger(kind: str, size: float) -> None:
+    own, _, largest = _shift(kind, size)
+    assert np.abs(own).max() > 2e-4
+    if kind != "broken_wires":  # those shed load to the neighbours
+        assert np.delete(largest, 3).max() == 0.0
+    if kind == "springs":
+        assert own.max() < 1e-5
+
+
+def test_a_spring_in_one_plane_leaves_the_other() -> None:
+    own, _, _ = _shift("springs", 0.2, plane="longitudinal")
+    assert np.abs(own[:, 0]).max() < 1e-5
+    assert own[:, 1].max() < -1e-4
+
+
+def test_a_step_of_tension_is_carried_by_the_neighbours() -> None:
+    own, _, largest = _shift("tension_step", -0.05)
+    assert np.median(own[:, :, 0]) == pytest.approx(-0.025, rel=0.15)
+    assert 0 < largest[4] < 0.4 * largest[3]
+    alone = season(21, 8, event=Event("tension_step", 3, 400.0, -0.05), nuisances=ALONE)
+    truth = alone.hangers[3].truth
+    base, days = truth["baseline_tension_n"], np.array(truth["day"])
+    years = days / 365.25
+    expected = truth["reference_tension_n"] * (1 + truth["settlement_per_year"] * years)
+    assert base == pytest.approx(expected * np.where(days >= 400, 0.95, 1.0), rel=1e-9)
+
+
+def test_the_clock_moves_readings_and_no_truth() -> None:
+    plain, late = season(5, 4), season(5, 4, event=Event("clock", day=300.0, size=2e-3))
+    for a, b in zip(plain.hangers, late.hangers, strict=True):
+        assert np.array_equal(
+            a.truth["frequency_hz"]["transverse"], b.truth["frequency_hz"]["transverse"]
+        )
+        for day, v, w in zip(a.truth["day"], a.visits, b.visits, strict=True):
+            ratio = w["modes"][0]["frequency_hz"] / v["modes"][0]["frequency_hz"]
+            assert ratio == pytest.approx(1.002 if day >= 300 else 1.0, rel=1e-6)
+
+
+def test_relaxation_and_ramp_lower_the_baseline() -> None:
+    quiet = replace(Nuisances.none(), tension_sd=(0.05, 0.1))
+    drifting = season(5, 3, event=Event("tension_ramp", 1, 500.0, -0.02), nuisances=quiet,
+                      relaxation_per_year=0.01)  # fmt: skip
+    truth = drifting.hangers[1].truth
+    years = np.array(truth["day"]) / 365.25
+    since = np.clip(years - 500 / 365.25, 0, None)
+    expected = (1 - 0.01 * years) * (1 - 0.02 * since)
+    assert truth["baseline_tension_n"] / truth["reference_tension_n"] == pytest.approx(expected)
+
+
+def test_thirty_hangers_are_fast_and_as_faulty_as_promised() -> None:
+    start = time.perf_counter()
+    whole = season(1)
+    assert time.perf_counter() - start < 15  # about 1.2 s alone
+    visits = [v for h in whole.hangers for v in h.visits]
+    modes = sum(len(v["modes"]) for v in visits)
+    wrong = sum(len(h.truth["mistaken"]) for h in whole.hangers)
+    assert 0.02 < wrong / modes < 0.06
+    assert 0.1 < np.mean(["temperature_c" not in v for v in visits]) < 0.3
+    counts = sorted(len(h.visits) for h in whole.hangers)
+    assert counts[0] < 20
+    assert counts[-1] > 100
+    for visit in visits:
+        names = [(m["plane"], m["order"]) for m in visit["modes"]]
+        assert len(set(names)) == len(names)
+        assert all(m["frequency_sd_hz"] > 0 for m in visit["modes"])
+
+
+def test_a_switch_moves_only_its_own_law() -> None:
+    still = season(9, 6, nuisances=replace(Nuisances(), mistaken=(0.0, 0.0), persistent=0.0))
+    for a, b in zip(season(9, 6).hangers, still.hangers, strict=True):
+        wrong = {(m["id"], m["plane"], m["order"]) for m in a.truth["mistaken"]}
+        assert not b.truth["mistaken"]
+        for v, w in zip(a.visits, b.visits, strict=True):
+            for m, o in zip(v["modes"], w["modes"], strict=True):
+                if (v["id"], m["plane"], m["order"]) not in wrong and not a.truth["swapped"]:
+                    assert m == o
+
+
+def test_ambient_without_nuisances_shows_the_loss_alone() -> None:
+    off = AmbientNuisances.none()
+    tests, truth = ambient(3, 2.0, StiffnessLoss(1, 400.0, 0.01, others=0.2), off)
+    hz = np.array([[m["frequency_hz"] for m in t["modes"]] for t in tests])
+    assert np.ptp(hz[:400], axis=0).max() < 1e-12
+    share = np.full(hz.shape[1], 0.2)
+    share[1] = 1.0
+    assert hz[-1] / hz[0] == pytest.approx(1 - 0.01 * share, rel=1e-12)
+    assert not truth["swapped"]
+
+
+def test_ambient_has_a_knee_at_freezing() -> None:
+    tests, truth = ambient(2)
+    assert json.dumps(tests) == json.dumps(ambient(2)[0])
+    assert len(tests) < 0.97 * 1095
+    deck, hz = truth["deck_c"], np.log(truth["frequency_hz"][:, 0])
+    cold, warm = (np.polyfit(deck[rows], hz[rows], 1)[0] for rows in (deck < 0, deck > 0))
+    assert cold < 3 * warm < 0
