@@ -26,8 +26,8 @@ test: lint
 # and a warning is an error here, of names that it does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
 SLOW := $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
-	$(patsubst %,tests/gap/test_%.py,allowances attribution diagnose faint fit flexible laws numbering \
-		outliers places readings sampled) \
+	$(patsubst %,tests/gap/test_%.py,attribution diagnose discrepancy fit importance_sampling \
+		law_allowances law_error minor_cause numbering outliers places readings) \
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
 	$(patsubst %,tests/watch/test_%.py,bridge_drifts neighbours sequential sequential_rate \
 		state watching)

@@ -18,6 +18,8 @@ ShmError                      exit code 1
 from __future__ import annotations
 
 import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -159,3 +161,15 @@ class GateNotMet(ShmError):
     """A measured figure missed the mark that was set for it."""
 
     exit_code = 6
+
+
+@contextmanager
+def needing(extra: str) -> Iterator[None]:
+    """Says which extra to install where an import in this context fails."""
+    try:
+        yield
+    except ImportError as error:
+        raise UsageError(
+            f"{error.name or 'a library'} is not installed.",
+            remedy=f"Install it with `pip install 'shm[{extra}]'`.",
+        ) from error

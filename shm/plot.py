@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from shm import __version__
 from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
-from shm.report.contents import DiagnosisSheet, HangerReport, TestSheet, TrendRow, trend_row
+from shm.report.contents import DiagnosisSheet, HangerReport, ModalTestReport, TrendRow, trend_row
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
@@ -26,11 +26,11 @@ from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.illustration import Member
+from shm.report.figures.modal_test_response import FIGURE as RESPONSE
+from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
+from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
 from shm.report.figures.parameter_pairs import FIGURE as PAIRS
-from shm.report.figures.sheet_response import FIGURE as RESPONSE
-from shm.report.figures.sheet_shapes import FIGURE as SHAPES
-from shm.report.figures.sheet_spectra import Shown
-from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
 from shm.values import Diagnosis, Hanger, ModalTest, Posterior
 
 __all__ = [
@@ -123,7 +123,7 @@ def frequency_response(test: Identification, hanger: Hanger | None = None) -> Fi
         >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
         >>> figure = shm.plot.frequency_response(test)
     """
-    return _drawn(RESPONSE, Shown.of(TestSheet(test, hanger=hanger)))
+    return _drawn(RESPONSE, Shown.of(ModalTestReport(test, hanger=hanger)))
 
 
 def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
@@ -132,7 +132,7 @@ def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
     Example:
         >>> figure = shm.plot.stabilisation(test)
     """
-    return _drawn(STABILISATION, Shown.of(TestSheet(test, hanger=hanger)))
+    return _drawn(STABILISATION, Shown.of(ModalTestReport(test, hanger=hanger)))
 
 
 def shapes(test: Identification, hanger: Hanger) -> Figure:
@@ -141,7 +141,7 @@ def shapes(test: Identification, hanger: Hanger) -> Figure:
     Example:
         >>> figure = shm.plot.shapes(test, hanger)
     """
-    return _drawn(SHAPES, Shown.of(TestSheet(test, hanger=hanger)))
+    return _drawn(SHAPES, Shown.of(ModalTestReport(test, hanger=hanger)))
 
 
 def gap(diagnosis: Diagnosis, hanger: Hanger) -> Figure:

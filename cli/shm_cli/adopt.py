@@ -23,7 +23,7 @@ from shm_cli.common import (
     show_table,
     table,
 )
-from shm_cli.record import Words
+from shm_cli.parameter_types import Words
 
 _why_option = click.option("--why", type=Words(), required=True, help="For the record.")
 _who_option = click.option("--who", show_default="the user's name", help="For the record.")

@@ -30,7 +30,7 @@ from shm_cli.common import (
     show_table,
     table,
 )
-from shm_cli.record import Words
+from shm_cli.parameter_types import Words
 
 
 @click.command("ack")

@@ -13,7 +13,7 @@ import rich_click as click
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
 from shm_cli.common import counting_bar, json_option, readable_width, show, show_table, table
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial

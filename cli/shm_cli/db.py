@@ -36,7 +36,7 @@ from shm_cli.common import (
     table,
     waiting,
 )
-from shm_cli.record import Words
+from shm_cli.parameter_types import Words
 
 _copies_option = click.option(
     "--archive",

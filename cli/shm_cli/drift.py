@@ -41,8 +41,7 @@ from shm_cli.common import (
     show_texts,
     table,
 )
-from shm_cli.record import Words
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile, Words
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 

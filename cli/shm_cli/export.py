@@ -10,7 +10,7 @@ from shm import export
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Posterior
 from shm_cli.common import hanger_option, json_option, opened_store, show, waiting
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 
 @click.command()

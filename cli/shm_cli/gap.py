@@ -12,7 +12,7 @@ from shm.errors import NothingThere
 from shm.gap import GapOptions
 from shm.gap import diagnose as diagnosed
 from shm.pipeline import utc_now
-from shm.pipeline.terms import diagnosis_lineage
+from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
@@ -37,8 +37,8 @@ from shm_cli.common import (
     told_doubts,
 )
 from shm_cli.effects import effects
+from shm_cli.parameter_types import NewFile
 from shm_cli.update import modes_argument
-from shm_cli.writable import NewFile
 
 _DEFAULT = GapOptions()
 

@@ -15,12 +15,12 @@ from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
-from shm.read.apart import read_test
+from shm.read.sandbox import read_test
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
-from shm.report.contents import TestSheet
-from shm.report.figures.every_figure import sheet_figures
-from shm.report.sheet_report import sheet_paper
+from shm.report.contents import ModalTestReport
+from shm.report.figures.every_figure import modal_test_figures
+from shm.report.modal_test_report import modal_test_paper
 from shm.settings import Settings
 from shm.values import Hanger, Recording
 from shm_cli.common import (
@@ -34,7 +34,7 @@ from shm_cli.common import (
     show,
     told_doubts,
 )
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 _DEFAULT = Settings()
 
@@ -171,7 +171,7 @@ def command(
         show(_document(sheets))
     else:
         for sheet in sheets:
-            click.echo(as_text(sheet_paper(sheet), readable_width()).rstrip())
+            click.echo(as_text(modal_test_paper(sheet), readable_width()).rstrip())
 
 
 def _options(
@@ -199,7 +199,7 @@ def _options(
 
 def _identified(
     group: Sequence[Path], hanger: Hanger | None, options: IdentifyOptions
-) -> TestSheet:
+) -> ModalTestReport:
     """One test; it is of the described hanger where its records do not say."""
     records = [record for path in group for record in read_test(path)]
     for doubt in signal_doubts([r for r in records if isinstance(r, Recording)], hanger):
@@ -216,10 +216,10 @@ def _identified(
         )
     if hanger is not None:
         told_doubts([found.test], hanger)
-    return TestSheet(found, records, hanger, (options.band_low_hz, options.band_high_hz))
+    return ModalTestReport(found, records, hanger, (options.band_low_hz, options.band_high_hz))
 
 
-def _refuse_several_hangers(sheets: Sequence[TestSheet]) -> None:
+def _refuse_several_hangers(sheets: Sequence[ModalTestReport]) -> None:
     named = {sheet.identification.test.hanger for sheet in sheets}
     if len(named) > 1:
         listed = ", ".join(sorted("none" if n is None else str(n) for n in named))
@@ -229,7 +229,7 @@ def _refuse_several_hangers(sheets: Sequence[TestSheet]) -> None:
         )
 
 
-def _document(sheets: Sequence[TestSheet]) -> dict[str, Any]:
+def _document(sheets: Sequence[ModalTestReport]) -> dict[str, Any]:
     """The modal-tests document, each test with its quality and what was set aside."""
     found = [sheet.identification for sheet in sheets]
     document = modes_document([each.test for each in found])
@@ -240,14 +240,14 @@ def _document(sheets: Sequence[TestSheet]) -> dict[str, Any]:
 
 
 def _write(
-    sheets: Sequence[TestSheet], out: Path | None, html: Path | None, figures: Path | None
+    sheets: Sequence[ModalTestReport], out: Path | None, html: Path | None, figures: Path | None
 ) -> None:
     if out is not None:
         out.write_text(dump(_document(sheets)) + "\n", encoding="utf-8")
     if html is not None:
-        html.write_text(as_html(sheet_paper(sheets[0])), encoding="utf-8")
+        html.write_text(as_html(modal_test_paper(sheets[0])), encoding="utf-8")
     for sheet in sheets if figures is not None else ():
-        for illustration in sheet_figures(sheet):
+        for illustration in modal_test_figures(sheet):
             assert figures is not None
             figures.mkdir(parents=True, exist_ok=True)
             name = f"{sheet.identification.test.id}-{illustration.name}.png"

@@ -20,7 +20,7 @@ from shm.documents import alert_document
 from shm.errors import BadInput, ShmError, StoreError, UsageError
 from shm.pipeline import Flow
 from shm.read import Peek, PeekChannel, bundle
-from shm.read.apart import load_modes, peek_test
+from shm.read.sandbox import load_modes, peek_test
 from shm.store import (
     AGAIN_FROM,
     Decision,
@@ -33,7 +33,6 @@ from shm.store import (
 )
 from shm.store.archive import refuse_oversize
 from shm.values import Alert
-from shm_cli.again import rerun_document, send_back
 from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.held import (
     Time,
@@ -43,7 +42,8 @@ from shm_cli.held import (
     hold_document,
     show_held,
 )
-from shm_cli.record import Words
+from shm_cli.parameter_types import Words
+from shm_cli.reprocess import rerun_document, send_back
 from shm_cli.working import finish, working
 
 

@@ -15,15 +15,15 @@ from shm.documents import dump
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
-from shm.pipeline.reporting import hanger_report, test_sheet
+from shm.pipeline.reporting import hanger_report, modal_test_report
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.report.period import Period, period_since
-from shm.report.sheet_report import sheet_json, sheet_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
-from shm_cli.writable import NewFile
+from shm_cli.parameter_types import NewFile
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 
@@ -121,8 +121,8 @@ def _gathered(
         if test_id is None:
             of_hanger = hanger_report(workspace, store, hanger_id, now, period)
             return _Report(of_hanger, hanger_paper, hanger_json)
-        sheet = test_sheet(workspace, store, hanger_id, test_id)
-        return _Report(replace(sheet, generated_at=now), sheet_paper, sheet_json)
+        sheet = modal_test_report(workspace, store, hanger_id, test_id)
+        return _Report(replace(sheet, generated_at=now), modal_test_paper, modal_test_json)
 
 
 def _write(written: str | bytes, out: Path | None) -> None:

@@ -14,7 +14,6 @@ from shm.settings import load_settings
 from shm.values import Limits, Selection
 from shm.values.force_units import force_unit
 from shm_cli import completion
-from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -33,7 +32,14 @@ from shm_cli.common import (
     told_doubts,
     update_options,
 )
-from shm_cli.update import modes_argument, show_stated, tell_irregular, tell_poor_fit
+from shm_cli.update import (
+    calibrated,
+    calibrated_by_option,
+    modes_argument,
+    show_stated,
+    tell_irregular,
+    tell_poor_fit,
+)
 
 
 @click.command()

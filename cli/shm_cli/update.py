@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, summary
-from shm.inference import update
-from shm.models import build
-from shm.values import Averaged, Limits, ModalTest, Posterior
+from shm.errors import BadInput, UsageError
+from shm.inference import Progress, UpdateOptions, select, update
+from shm.models import DESCRIPTION, Model, build
+from shm.modes_document import load_modes
+from shm.pipeline.calibrating import calibration
+from shm.pipeline.lineage import Taught
+from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
 from shm.values.force_units import force_unit
 from shm.values.stated_tension import averaged_now, stated
 from shm_cli import completion
-from shm_cli.calibrated import calibrated, calibrated_by_option
 from shm_cli.common import (
     hanger_file_option,
     hanger_option,
@@ -34,6 +39,55 @@ from shm_cli.common import (
     told_doubts,
     update_options,
 )
+
+calibrated_by_option = click.option(
+    "--calibrated-by",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="MODES.json",
+    help="Tests with a measured tension (tension_read_n) of this hanger, or of one of its family.",
+)
+
+
+def calibrated(
+    options: UpdateOptions,
+    path: Path | None,
+    hanger: Hanger,
+    models: Sequence[Model],
+    progress: Progress,
+) -> UpdateOptions:
+    """The options with what the tests of `path` teach, by the most probable of the classes.
+
+    Raises UsageError where the priors leave nothing to learn, BadInput where no tension was read,
+    or one that contradicts the frequencies.
+    """
+    if path is None:
+        return options
+    if any(model.priors != DESCRIPTION for model in models):
+        raise UsageError(
+            "--calibrated-by needs priors of the description: the thesis's take it as exact.",
+            remedy="Leave --priors thesis out.",
+        )
+    tests = load_modes(path)
+    if not any(math.isfinite(test.tension_read_n) for test in tests):
+        raise BadInput(
+            "no test has a tension_read_n to calibrate by.",
+            file=path,
+            remedy="Give the tension that a load cell or a lift-off showed, and its sd.",
+        )
+
+    def tell(label: str, fraction: float) -> None:
+        progress(f"{label} (calibrating)", fraction)
+
+    posterior = select(tests, models, options, tell).selected
+    if posterior.faults:
+        raise BadInput(
+            f"the tension read does not fit the frequencies. {posterior.faults[0]}",
+            file=path,
+            remedy="Check the reading (in N), the orders and the description.",
+        )
+    own = tests[0].hanger in (None, hanger.id)
+    return replace(options, calibration=calibration(Taught(posterior, own), hanger))
+
 
 _POOR_FIT = 0.05
 """Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""

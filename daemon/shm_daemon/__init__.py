@@ -10,14 +10,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shm_daemon.bell import Bell as Bell
     from shm_daemon.execution import process_pool as process_pool
     from shm_daemon.hooks import HookFailed as HookFailed
     from shm_daemon.hooks import HookNotifier as HookNotifier
     from shm_daemon.loop import run as run
+    from shm_daemon.wakeup import Wakeup as Wakeup
 
 _HOMES = {
-    "Bell": "bell",
+    "Wakeup": "wakeup",
     "HookFailed": "hooks",
     "HookNotifier": "hooks",
     "process_pool": "execution",

@@ -22,13 +22,13 @@ from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.active import ActiveLock
-from shm_daemon.bell import SPOOL, Bell, rung_by_changes, stopped_by_signals
 from shm_daemon.execution import children_ended, executor_of
 from shm_daemon.heartbeat import Pulse, longest_wait_s, tell_systemd, turn_failed
 from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
+from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0
@@ -43,33 +43,33 @@ def run(
     workspace: Workspace,
     *,
     clock: Clock = utc_now,
-    bell: Bell | None = None,
+    wakeup: Wakeup | None = None,
     once: bool = False,
     standby: bool = False,
     make_executor: Callable[[Settings], Executor] = executor_of,
     notifier: Notifier | None = None,
 ) -> None:
-    """Serves a workspace until SIGTERM, SIGINT or `bell.stop()`; with `once` until all is done.
+    """Serves a workspace until SIGTERM, SIGINT or `wakeup.stop()`; with `once` until all is done.
 
     With `standby` it waits while another process serves the store and takes over when that one has
     ended; else that raises StoreBusy. Raises SchemaOutdated and other errors of the store that
     waiting cannot mend.
     """
-    bell = bell or Bell()
-    patience = Patience(bell, standby)
-    with stopped_by_signals(bell), last_words():
-        while not bell.stopped:
+    wakeup = wakeup or Wakeup()
+    patience = Patience(wakeup, standby)
+    with stopped_by_signals(wakeup), last_words():
+        while not wakeup.stopped:
             try:
                 with workspace.lock(patience) as lock, ExitStack() as stack:
-                    daemon = _begin(stack, workspace, lock, bell, clock, make_executor, notifier)
+                    daemon = _begin(stack, workspace, lock, wakeup, clock, make_executor, notifier)
                     if daemon.serve(once):
                         return
             except StoreError as error:
                 waiting_helps = error.retry_after_s is not None
                 if once and isinstance(error, StoreDamaged):
                     raise
-                if not bell.stopped and not (waiting_helps and patience(error)):
-                    if waiting_helps and bell.stopped:  # meanwhile: that is no failure
+                if not wakeup.stopped and not (waiting_helps and patience(error)):
+                    if waiting_helps and wakeup.stopped:  # meanwhile: that is no failure
                         return
                     raise
 
@@ -86,8 +86,8 @@ def last_words() -> Iterator[None]:
 class Patience:
     """Waits for a store that is another's, or whose server does not answer, and says so once."""
 
-    def __init__(self, bell: Bell, standby: bool):
-        self._bell, self._standby, self._said = bell, standby, ""
+    def __init__(self, wakeup: Wakeup, standby: bool):
+        self._wakeup, self._standby, self._said = wakeup, standby, ""
 
     def __call__(self, error: StoreError) -> bool:
         """Whether to try again, after a while: not where it is another's and we do not stand by."""
@@ -97,15 +97,15 @@ class Patience:
             self._said = error.message
             log.info("standing by: %s", error.message)
         tell_systemd("READY=1", "WATCHDOG=1", f"STATUS=standing by: {one_line(error.message)}")
-        self._bell.wait(_STANDING_BY_S)
-        return not self._bell.stopped
+        self._wakeup.wait(_STANDING_BY_S)
+        return not self._wakeup.stopped
 
 
 def _begin(
     stack: ExitStack,
     workspace: Workspace,
     lock: ActiveLock,
-    bell: Bell,
+    wakeup: Wakeup,
     clock: Clock,
     make_executor: Callable[[Settings], Executor],
     notifier: Notifier | None,
@@ -125,13 +125,13 @@ def _begin(
         notifier=notifier,
         clock=clock,
         lanes=settings.workers + 1,
-        wake=bell.ring,
+        wake=wakeup.ring,
         meanwhile=(pulse := Pulse(workspace)),
     )
     stack.callback(flow.close)
-    stack.enter_context(rung_by_changes(bell, workspace.spool))
+    stack.enter_context(rung_by_changes(wakeup, workspace.spool))
     stack.enter_context(messages(workspace))
-    daemon = Daemon(flow, bell, lock, pulse, lambda: make_executor(settings))
+    daemon = Daemon(flow, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -143,12 +143,12 @@ class Daemon:
     def __init__(
         self,
         flow: Flow,
-        bell: Bell,
+        wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._bell, self._lock, self._pulse = flow, bell, lock, pulse
+        self._flow, self._wakeup, self._lock, self._pulse = flow, wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
@@ -161,12 +161,12 @@ class Daemon:
         turn_failed(flow.workspace, "")
 
     def serve(self, once: bool) -> bool:
-        """Takes turns until the bell is stopped or, with `once`, until nothing is left to do.
+        """Takes turns until the wakeup is stopped or, with `once`, until nothing is left to do.
 
         False where the store is no longer ours: another may have begun what we had under way.
         """
         self._once = once
-        while not self._bell.stopped:
+        while not self._wakeup.stopped:
             if not self._lock.held():
                 log.warning("the right to the store was lost; it is asked for again")
                 return False
@@ -182,10 +182,10 @@ class Daemon:
     def _rest(self) -> set[str]:
         """Waits for a ring or until the next scan, with a sign from time to time."""
         while (pause_s := self._scan_at - time.monotonic()) > self._longest_wait_s:
-            if (heard := self._bell.wait(self._longest_wait_s)) or self._bell.stopped:
+            if (heard := self._wakeup.wait(self._longest_wait_s)) or self._wakeup.stopped:
                 return heard
             self._pulse.beat()
-        return self._bell.wait(max(0.0, pause_s))
+        return self._wakeup.wait(max(0.0, pause_s))
 
     def close(self) -> None:
         self._flow.executor.shutdown(wait=False, cancel_futures=True)
@@ -238,7 +238,7 @@ class Daemon:
         self._refuse_other_disks()
         until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
         for path in self._tracker.whole(scan(self._flow.workspace.spool, self._pulse)):
-            if self._bell.stopped or time.monotonic() > until:
+            if self._wakeup.stopped or time.monotonic() > until:
                 break
             self._receive(path, sharing)
         pause = min(

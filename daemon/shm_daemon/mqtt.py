@@ -18,12 +18,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 
-from shm.errors import BadInput, ShmError, TooLarge
+from shm.errors import BadInput, ShmError, TooLarge, needing
 from shm.pipeline import utc_now
 from shm.read import FORMATS, sidecar_path
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm_daemon.extras import needing
 from shm_daemon.landing import Incoming, Landed, incoming, landing_name
 
 if TYPE_CHECKING:

@@ -7,12 +7,10 @@ and model classes as objects; these here take names and numbers.
 
 from __future__ import annotations
 
-from shm.api.diagnosing import diagnose
-from shm.api.identifying import identify
+from shm.api.analysing import diagnose, identify, select, update
 from shm.api.reading import load_hanger, load_modes, read, round_bar
 from shm.api.simulating import simulate
 from shm.api.stored import Store
-from shm.api.updating import select, update
 
 __all__ = [
     "Store",

@@ -6,7 +6,156 @@ in the attributes of a DataTree and in the names of a table's columns.
 
 from __future__ import annotations
 
-from shm.export.tree import datatree
-from shm.export.writing import FORMATS, check_format, modes, samples, write
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shm.documents import dump, posterior_document
+from shm.errors import UsageError
+from shm.export.tree import datatree, write_netcdf
+from shm.values import FloatArray, Hanger, ModalTest, Posterior
 
 __all__ = ["FORMATS", "check_format", "datatree", "modes", "samples", "write"]
+
+
+SAMPLES_SCHEMA = "shm.samples/1"
+Writer = Callable[[Posterior, Path, Sequence[ModalTest], Hanger | None], None]
+
+
+def write(
+    posterior: Posterior,
+    path: str | Path,
+    format: str | None = None,
+    *,
+    tests: Sequence[ModalTest] = (),
+    hanger: Hanger | None = None,
+) -> None:
+    """Writes the draws of a posterior; `format` is one of `FORMATS`, or follows from the suffix.
+
+    `csv` (.csv) and `npz` (.npz): a column a parameter, then `tension_n` in N and `log_likelihood`.
+    `json` (.json): the document of `shm update --json` with all draws by name under `draws`.
+    `netcdf` (.nc): the `datatree` for ArviZ, to which `tests` and `hanger` add the likelihood of
+    each measurement. Raises UsageError for another format, or where a library is missing.
+
+    Example:
+        >>> shm.export.write(posterior, "hanger3.nc", tests=[test.test], hanger=hanger)
+        >>> arviz.summary(arviz.from_netcdf("hanger3.nc"))
+    """
+    path = Path(path)
+    FORMATS[check_format(path, format)](posterior, path, tests, hanger)
+
+
+def check_format(path: Path, format: str | None = None) -> str:
+    """The format of a file to be; raises UsageError for one that is not known."""
+    suffixes = {".nc": "netcdf"} | {f".{name}": name for name in FORMATS}
+    named = suffixes.get(path.suffix.lower()) if format is None else format
+    if named is None or named not in FORMATS:
+        what = f"suffix {path.suffix!r}" if format is None else f"format {format!r}"
+        raise UsageError(f"{path.name}: unknown {what}.", remedy="Use .csv, .nc, .json or .npz.")
+    return named
+
+
+def _write_csv(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    samples(posterior).to_csv(path, index=False)
+
+
+def _write_npz(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **columns(posterior))
+    path.write_bytes(buffer.getvalue())
+
+
+def _write_json(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    document = {
+        "schema": SAMPLES_SCHEMA,
+        **posterior_document(posterior),
+        "draws": {name: values.tolist() for name, values in columns(posterior).items()},
+    }
+    path.write_text(dump(document) + "\n", encoding="utf-8")
+
+
+def _write_netcdf(
+    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
+) -> None:
+    write_netcdf(datatree(posterior, tests, hanger), path)
+
+
+FORMATS: dict[str, Writer] = {
+    "csv": _write_csv,
+    "json": _write_json,
+    "netcdf": _write_netcdf,
+    "npz": _write_npz,
+}
+"""What writes a format, by its name."""
+
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def columns(posterior: Posterior) -> dict[str, FloatArray]:
+    """Equally weighted draws by name, each (samples,): parameters, tension, log likelihood."""
+    parameters = dict(zip(posterior.names, posterior.samples.T, strict=True))
+    return {
+        **parameters,
+        "tension_n": posterior.tension_n,
+        "log_likelihood": posterior.log_likelihood,
+    }
+
+
+def samples(posterior: Posterior) -> DataFrame:
+    """The draws as a table: a row a draw, all of equal weight.
+
+    A column a parameter (`theta_F` is tension over nominal tension, `log10_k1` the log10 of a
+    spring in N m/rad, `sigma` the fractional model error), then `tension_n` in N and
+    `log_likelihood`.
+
+    Example:
+        >>> table = shm.export.samples(posterior)
+        >>> table["tension_n"].quantile([0.05, 0.95])
+    """
+    from pandas import DataFrame
+
+    return DataFrame(columns(posterior))
+
+
+def modes(tests: Sequence[ModalTest]) -> DataFrame:
+    """The modes of tests as a table, a row a mode; what is not known is NaN or NaT.
+
+    Columns: test, time (UTC), temperature_c, amplitude, plane, order, frequency_hz,
+    frequency_sd_hz, damping_ratio, damping_sd.
+
+    Example:
+        >>> table = shm.export.modes(store.tests(3))
+        >>> table.pivot_table("frequency_hz", "test", ["plane", "order"])
+    """
+    from pandas import DataFrame, Series, to_datetime
+
+    rows = [(test, mode) for test in tests for mode in test.modes]
+    return DataFrame(
+        {
+            "test": [test.id for test, _ in rows],
+            "time": to_datetime(Series([test.time for test, _ in rows], dtype=object), utc=True),
+            "temperature_c": _numbers([test.temperature_c for test, _ in rows]),
+            "amplitude": _numbers([test.amplitude for test, _ in rows]),
+            "plane": [mode.plane for _, mode in rows],
+            "order": [mode.order for _, mode in rows],
+            "frequency_hz": _numbers([mode.frequency_hz for _, mode in rows]),
+            "frequency_sd_hz": _numbers([mode.frequency_sd_hz for _, mode in rows]),
+            "damping_ratio": _numbers([mode.damping_ratio for _, mode in rows]),
+            "damping_sd": _numbers([mode.damping_sd for _, mode in rows]),
+        }
+    )
+
+
+def _numbers(values: Sequence[float]) -> FloatArray:
+    return np.array(values, dtype=np.float64)

@@ -16,10 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.gap.calibration import CALIBRATION
-from shm.gap.chances import Family, Tried, families, missed, probabilities
 from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
+from shm.gap.model_probabilities import (
+    Family,
+    ScoredHypothesis,
+    families,
+    probabilities,
+    undetected_share,
+)
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
 from shm.inference.tmcmc import normalised
@@ -41,8 +47,8 @@ class Explanation:
     `group` is an index of `Attribution.groups`, None for none.
     """
 
-    best: Tried
-    variants: tuple[Tried, ...]
+    best: ScoredHypothesis
+    variants: tuple[ScoredHypothesis, ...]
     probability: float
     log_bayes_factor: float
     log_fit: float
@@ -82,7 +88,7 @@ class Attribution:
     invisible: tuple[tuple[str, str], ...]
     p_value: float
     search: Search
-    tried: tuple[Tried, ...]
+    tried: tuple[ScoredHypothesis, ...]
 
     @property
     def leads(self) -> Leads:
@@ -136,33 +142,33 @@ def more_thorough(found: Attribution) -> Attribution:
     return _weighed(search, search.with_other_pairs(tried))
 
 
-def _weighed(search: Search, tried: list[Tried]) -> Attribution:
+def _weighed(search: Search, tried: list[ScoredHypothesis]) -> Attribution:
     kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
     search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
     p_value = search.p_value(likeliest)
-    chances, passing = probabilities(kinds, p_value)
-    chances = without_faint(search.problem, search.baseline, kinds, chances)
-    each = [float(chance) for chance in missed(kinds, chances)]
-    return _attribution(search, tried, kinds, each, passing, p_value)
+    chances, mimic = probabilities(kinds, p_value)
+    chances = without_minor_cause(search.problem, search.baseline, kinds, chances)
+    each = [float(chance) for chance in undetected_share(kinds, chances)]
+    return _attribution(search, tried, kinds, each, mimic, p_value)
 
 
 def _attribution(
     search: Search,
-    tried: Sequence[Tried],
+    tried: Sequence[ScoredHypothesis],
     kinds: Sequence[Family],
     chances: Sequence[float],
-    passing: float,
+    mimic: float,
     p_value: float,
 ) -> Attribution:
-    """`passing` is the probability of something unknown that passes for one of the effects."""
+    """`mimic` is the probability of something unknown that passes for one of the effects."""
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
     flexible = [kind for kind in kinds if kind.flexible]
     causes, groups = _with_groups(search.problem, _explanations(kinds, chances, none))
     return Attribution(
         baseline=_fit([none]),
         no_gap_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k is none),
-        unexplained_probability=passing
+        unexplained_probability=mimic
         + sum(c for k, c in zip(kinds, chances, strict=True) if k.flexible),
         unexplained=_fit(flexible),
         explanations=causes,
@@ -246,7 +252,7 @@ def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:
     return any(single > pair.log_bayes_factor - SUPPORTED for single in singles)
 
 
-def without_faint(
+def without_minor_cause(
     problem: GapProblem, baseline: Fit, kinds: Sequence[Family], chances: FloatArray
 ) -> FloatArray:
     """The probabilities (families,) with those of pairs given to the one effect that they lean on.

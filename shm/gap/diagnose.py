@@ -16,16 +16,16 @@ import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
-from shm.gap.laws import mixed
+from shm.gap.cross_validation import held_out, shrinkage
+from shm.gap.data_checks import doubtful, set_aside, usable
+from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
+from shm.gap.outlier_removal import cleared, outliers, with_outliers
 from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
 from shm.gap.problem import GapProblem
-from shm.gap.remarks import doubtful, set_aside, usable
 from shm.gap.residuals import residuals, trends
-from shm.gap.setting_aside import cleared, outliers, with_outliers
-from shm.gap.shrinkage import held_out, shrinkage
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors

@@ -16,11 +16,11 @@ from scipy.special import logsumexp
 from shm.errors import BadInput
 from shm.gap.contract import Fit, Hypothesis, Peak
 from shm.gap.coordinates import is_place
-from shm.gap.descent import Optimum, optima
-from shm.gap.landscape import Landscape
+from shm.gap.detectability import scan
 from shm.gap.likelihood import Likelihood
+from shm.gap.objective import Landscape
+from shm.gap.optimiser import Optimum, optima
 from shm.gap.problem import GapProblem
-from shm.gap.sensitivity import scan
 from shm.values import FloatArray
 
 _DRAWS = 256  # technical: a mean to 6 % of its sd, as the likeliest fits are sampled afterwards

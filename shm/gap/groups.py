@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import connected_components
 
 from shm.gap.contract import Fit, NoiseNode
 from shm.gap.coordinates import Branch
-from shm.gap.landscape import Landscape
 from shm.gap.likelihood import Likelihood
+from shm.gap.objective import Landscape
 from shm.gap.problem import GapProblem
 
 SAME_BELOW = 3.0

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shm.errors import UsageError
-from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis, Progress
+from shm.gap.detectability import HOPELESS_SHARE, Scan, scan, superposed, truncate
 from shm.gap.marginal import marginal
+from shm.gap.model_probabilities import ScoredHypothesis
 from shm.gap.problem import GapProblem
-from shm.gap.sensitivity import HOPELESS_SHARE, Scan, scan, superposed, truncate
 from shm.models.effects import EFFECTS
 
 IN_BASELINE = {
@@ -87,13 +87,13 @@ def paired(
 
 def tried_by_screening(
     problem: GapProblem, before: Fit, scans: Mapping[Hypothesis, Scan]
-) -> tuple[Tried, ...]:
+) -> tuple[ScoredHypothesis, ...]:
     """What scans on top of a fit say, the best first, as gains on it to stand beside fits."""
     nothing = marginal(problem, Hypothesis(), before, np.zeros((1, len(before.predicted))))
-    best = Tried.fitted(before, len(before.z))
+    best = ScoredHypothesis.fitted(before, len(before.z))
     level = float(nothing.log_likelihood[0])
     tried = [
-        Tried(
+        ScoredHypothesis(
             hypothesis,
             before.log_evidence + found.log_evidence - level,
             best.log_fit + float(found.marginal.log_peak.max()) - level,
@@ -104,13 +104,13 @@ def tried_by_screening(
 
 
 def hopeful(
-    tried: Sequence[Tried],
+    tried: Sequence[ScoredHypothesis],
     priors: Sequence[float],
     coarse: Sequence[bool],
     rival: float,
     gap: float,
     most: int,
-) -> tuple[Tried, ...]:
+) -> tuple[ScoredHypothesis, ...]:
     """Those that may come near the likeliest, the best first, at most `most`.
 
     `priors` are the logarithms of theirs, `rival` the log of prior times evidence of the best so
@@ -125,7 +125,9 @@ def hopeful(
     return tuple(tried[i] for i in order if weighed[i] > best - reach[i])
 
 
-def varied(tried: Sequence[Tried], alike: int, most: int) -> tuple[Tried, ...]:
+def varied(
+    tried: Sequence[ScoredHypothesis], alike: int, most: int
+) -> tuple[ScoredHypothesis, ...]:
     """The best by their evidence, at most `most`, and no more than `alike` of one family."""
     before: Counter[str] = Counter()
     kept = []

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from shm.gap.contract import Design, Fit, Observations
+from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
 from shm.gap.problem import GapProblem
-from shm.gap.proposals import Proposal, proposals, sensors_wanted, with_sensors
 from shm.gap.residuals import identification_sd
 from shm.values import FloatArray, NextMeasurement
 

@@ -1,11 +1,11 @@
 """The unknown errors of the data: a few possibilities, each a covariance with a prior weight.
 
 The frequencies err by their identification, by a small model error that belongs to a mode and so
-repeats in every test, and by what repeats in any case (`shm.gap.repeated`): cov = factor^2 diag(sd)
-R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently, but for
-peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma is as
-likely half-normal of 2e-5, as the general model agrees with independent finite elements, as it is
-log-uniform from there to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in
+repeats in every test, and by what repeats in any case (`shm.gap.repeated_errors`): cov = factor^2
+diag(sd) R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently,
+but for peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma is
+as likely half-normal of 2e-5, as the general model agrees with independent finite elements, as it
+is log-uniform from there to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in
 every test, and whoever takes none of it for scatter finds a cause in each. Stated standard
 deviations rest on a few hits and are themselves uncertain: those of one mode in several tests are
 drawn together as far as they differ by chance, and `factor`, what is left and common to all, has a
@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
-from shm.gap.repeated import Repeated, turned_modes
+from shm.gap.repeated_errors import Repeated, turned_modes
 from shm.values import FloatArray, IntArray
 
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).

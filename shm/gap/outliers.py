@@ -21,14 +21,14 @@ import scipy
 from scipy.special import expit, logsumexp
 
 from shm.gap.attribution import Attribution
-from shm.gap.chances import log_prior
 from shm.gap.contract import Fit, Hypothesis
+from shm.gap.detectability import HOPELESS_SHARE
 from shm.gap.fit import fitted
-from shm.gap.landscape import Landscape
-from shm.gap.laws import by_its_laws
+from shm.gap.law_error import by_its_laws
+from shm.gap.model_probabilities import log_prior
+from shm.gap.objective import Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.search import LEADERS
-from shm.gap.sensitivity import HOPELESS_SHARE
 from shm.values import BoolArray, FloatArray, IntArray
 
 SURE = 0.9

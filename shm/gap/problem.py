@@ -14,10 +14,10 @@ import numpy as np
 
 from shm.gap.contract import Design, Fit, Hypothesis, Observations
 from shm.gap.coordinates import DEVIATIONS, Coordinates, Pair, Straight, cut
-from shm.gap.flexible import flexible_nodes
+from shm.gap.discrepancy import flexible_nodes
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
-from shm.gap.repeated import (
+from shm.gap.repeated_errors import (
     STRETCHES,
     Repeated,
     ShapeScaling,
@@ -41,7 +41,7 @@ class GapProblem:
     """The measurements of one hanger, and what hypotheses about it predict of them.
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
-    be seen in these data and that their priors therefore leave out (see `shm.gap.sensitivity`).
+    be seen in these data and that their priors therefore leave out (see `shm.gap.detectability`).
     `fits` keeps the fits that others start from; `evaluations` counts the hangers solved, each
     under one set of conditions.
     """

@@ -13,9 +13,9 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Covariance, Design, Fit, Observations
+from shm.gap.cross_validation import HeldOut
 from shm.gap.likelihood import ShapeErrors
 from shm.gap.problem import GapProblem
-from shm.gap.shrinkage import HeldOut
 from shm.values import NAN, PLANES, FloatArray, IntArray, Residual, Trend
 
 _LEAST_LEFT = 1e-9  # technical: of a datum that the fit follows altogether

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.gap.chances import Family, Tried, families, log_prior
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
+from shm.gap.detectability import Scan
 from shm.gap.fit import STARTS, baseline_fit, fitted, with_remainder
 from shm.gap.hypotheses import (
     hopeful,
@@ -20,11 +20,11 @@ from shm.gap.hypotheses import (
     tried_by_screening,
     varied,
 )
-from shm.gap.laws import by_its_laws, mixed, otherwise
+from shm.gap.importance_sampling import sampled
+from shm.gap.law_error import by_its_laws, mixed, otherwise
+from shm.gap.model_probabilities import Family, ScoredHypothesis, families, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictive_p_value
-from shm.gap.sampled import sampled
-from shm.gap.sensitivity import Scan
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
@@ -72,7 +72,7 @@ class Search:
         self._reached = 0.0
         self._samples: dict[Hypothesis, tuple[Fit, Fit, bool]] = {}
 
-    def singles(self) -> list[Tried]:
+    def singles(self) -> list[ScoredHypothesis]:
         """No gap and every single effect, those that stand a chance fitted."""
         self.scans = screened(
             self.problem,
@@ -89,22 +89,22 @@ class Search:
         rest = [each for each in rough if each.hypothesis not in fits]
         return [self._tried(self.baseline), *map(self._tried, fits.values()), *rest]
 
-    def with_unknown(self, tried: list[Tried]) -> list[Tried]:
+    def with_unknown(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Adds the remainder of something unknown to no gap and to the leading effects."""
         fits = [self.baseline, *self._leading_fits(tried, LEADERS)]
         return [*tried, *map(self._flexible, fits)]
 
-    def calls_for_pairs(self, tried: Sequence[Tried]) -> bool:
+    def calls_for_pairs(self, tried: Sequence[ScoredHypothesis]) -> bool:
         """Whether the best single effect explains something, so that a second may explain more."""
         fits = [leader.best.fit for leader in self.leaders(tried)[:1]]
         level = self.baseline.log_evidence + SUPPORTED
         return any(fit is not None and fit.log_evidence > level for fit in fits)
 
-    def with_pairs(self, tried: list[Tried]) -> list[Tried]:
+    def with_pairs(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Adds the pairs of a leading effect with another one that may be as likely, fitted."""
         return self._with_pairs_of(self._leading_fits(tried, LEADERS), tried)
 
-    def with_other_pairs(self, tried: list[Tried]) -> list[Tried]:
+    def with_other_pairs(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Adds pairs of either effect of the likeliest pair, which need not lead alone, fitted.
 
         Among them are those of its own kind at other places. Goes on while another pair leads.
@@ -117,12 +117,12 @@ class Search:
             best = self._likeliest(tried)
         return tried
 
-    def _likeliest(self, tried: Sequence[Tried]) -> Hypothesis:
+    def _likeliest(self, tried: Sequence[ScoredHypothesis]) -> Hypothesis:
         """Of the effects and pairs."""
         kinds = families(tried, self.variants)
         return next(f.best.hypothesis for f in kinds if f.effects and not f.flexible)
 
-    def _parts(self, pair: Hypothesis, tried: Sequence[Tried]) -> list[Fit]:
+    def _parts(self, pair: Hypothesis, tried: Sequence[ScoredHypothesis]) -> list[Fit]:
         """The fits of a pair's effects, each alone."""
         parts = [Hypothesis((effect,)) for effect in pair.effects]
         alone = [each for each in tried if each.hypothesis in parts]
@@ -130,8 +130,8 @@ class Search:
         return [*(each.fit for each in alone if each.fit is not None), *new.values()]
 
     def _with_pairs_of(
-        self, fits: Sequence[Fit], tried: list[Tried], kind: tuple[str, ...] = ()
-    ) -> list[Tried]:
+        self, fits: Sequence[Fit], tried: list[ScoredHypothesis], kind: tuple[str, ...] = ()
+    ) -> list[ScoredHypothesis]:
         """Adds the pairs of fitted effects that stand a chance, and all of a `kind`, fitted."""
         best = families(tried, self.variants)[0]
         rival = best.log_evidence + best.log_prior
@@ -142,7 +142,7 @@ class Search:
         chosen = tuple(dict.fromkeys([*hopeful, *of_kind]))
         return self._with_fitted_pairs(tried, scans, chosen)
 
-    def with_every_effect(self, tried: list[Tried]) -> list[Tried]:
+    def with_every_effect(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Adds fits of the effects and places that screening had given up.
 
         Of an effect so large that the baseline goes along far, the linear scan says too little.
@@ -153,7 +153,7 @@ class Search:
             self._tried(fit) for fit in fits.values()
         ]
 
-    def with_many_pairs(self, tried: list[Tried]) -> list[Tried]:
+    def with_many_pairs(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Adds pairs of all kinds, fitted.
 
         Where the gap is large, the scans, which add up what each effect does alone, say little.
@@ -162,12 +162,12 @@ class Search:
         return self._with_fitted_pairs(tried, scans, varied(rough, ALIKE, MANY_PAIRS))
 
     def _pairs(
-        self, fits: Sequence[Fit], tried: Sequence[Tried]
-    ) -> tuple[dict[Hypothesis, Scan], list[Tried]]:
+        self, fits: Sequence[Fit], tried: Sequence[ScoredHypothesis]
+    ) -> tuple[dict[Hypothesis, Scan], list[ScoredHypothesis]]:
         """Pairs of fitted effects that are not tried yet, scanned, and what the scans say."""
         known = {each.hypothesis for each in tried}
         scans: dict[Hypothesis, Scan] = {}
-        rough: list[Tried] = []
+        rough: list[ScoredHypothesis] = []
         for fit in fits:
             found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
             rough += tried_by_screening(self.problem, fit, found)
@@ -175,13 +175,16 @@ class Search:
         return scans, rough
 
     def _with_fitted_pairs(
-        self, tried: list[Tried], scans: Mapping[Hypothesis, Scan], chosen: Sequence[Tried]
-    ) -> list[Tried]:
+        self,
+        tried: list[ScoredHypothesis],
+        scans: Mapping[Hypothesis, Scan],
+        chosen: Sequence[ScoredHypothesis],
+    ) -> list[ScoredHypothesis]:
         fits = list(self._fitted(scans, chosen, 0.7, 0.85, tried).values())
         first = sorted(fits, key=lambda fit: -fit.log_evidence)[:1]
         return [*tried, *map(self._tried, fits), *map(self._flexible, first)]
 
-    def with_sampled(self, tried: list[Tried]) -> list[Tried]:
+    def with_sampled(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """The likeliest explanations, by variant, sampled instead of taken as normal."""
         able = {e.hypothesis: e for e in tried if e.fit is not None and not e.hypothesis.flexible}
         weight = {h: e.log_evidence + log_prior(h, self.variants) for h, e in able.items()}
@@ -201,7 +204,7 @@ class Search:
             for each in tried
         ]
 
-    def with_laws(self, tried: list[Tried]) -> list[Tried]:
+    def with_laws(self, tried: list[ScoredHypothesis]) -> list[ScoredHypothesis]:
         """Allows for the error of the effects' own laws, where it may decide something."""
         first = max(each.log_evidence for each in tried)
         gap = first - self.baseline.log_evidence
@@ -225,25 +228,25 @@ class Search:
         """Of the absolute fit, with the errors as they are expected to be."""
         return predictive_p_value(self.problem.observations, fit, fit.noise)
 
-    def leaders(self, tried: Sequence[Tried], most: int = LEADERS) -> list[Family]:
+    def leaders(self, tried: Sequence[ScoredHypothesis], most: int = LEADERS) -> list[Family]:
         """The likeliest families of one effect."""
         return self._singles(tried)[:most]
 
-    def _leading_fits(self, tried: Sequence[Tried], most: int) -> list[Fit]:
+    def _leading_fits(self, tried: Sequence[ScoredHypothesis], most: int) -> list[Fit]:
         leaders = (family.best.fit for family in self.leaders(tried, most))
         return [fit for fit in leaders if fit is not None]
 
-    def _singles(self, tried: Sequence[Tried]) -> list[Family]:
+    def _singles(self, tried: Sequence[ScoredHypothesis]) -> list[Family]:
         return [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
 
     def _hopeful(
         self,
         scans: Mapping[Hypothesis, Scan],
-        rough: Sequence[Tried],
+        rough: Sequence[ScoredHypothesis],
         without: float,
         rival: float,
         most: int,
-    ) -> tuple[Tried, ...]:
+    ) -> tuple[ScoredHypothesis, ...]:
         """What stands a chance; `without` is the log evidence without what was scanned."""
         if not rough:
             return ()
@@ -255,10 +258,10 @@ class Search:
     def _fitted(
         self,
         scans: Mapping[Hypothesis, Scan],
-        chosen: Sequence[Tried],
+        chosen: Sequence[ScoredHypothesis],
         begin: float,
         end: float,
-        tried: Sequence[Tried] = (),
+        tried: Sequence[ScoredHypothesis] = (),
     ) -> dict[Hypothesis, Fit]:
         """Fits of what was chosen, from the scans' best points.
 
@@ -289,16 +292,16 @@ class Search:
         self._reached = max(self._reached, fraction)
         self.progress(label, self._reached)
 
-    def _flexible(self, base: Fit) -> Tried:
+    def _flexible(self, base: Fit) -> ScoredHypothesis:
         self._tell("something unknown", 0.65)
         return self._tried(with_remainder(self.problem, base, self.rng))
 
-    def _foremost(self, tried: Sequence[Tried]) -> list[Family]:
+    def _foremost(self, tried: Sequence[ScoredHypothesis]) -> list[Family]:
         """The likeliest families of one effect and of two."""
         pairs = [f for f in families(tried, self.variants) if f.effects > 1 and not f.flexible]
         return [*self.leaders(tried), *pairs[:LEADING_PAIRS]]
 
-    def _by_its_laws(self, tried: Tried, anew: bool) -> Tried:
+    def _by_its_laws(self, tried: ScoredHypothesis, anew: bool) -> ScoredHypothesis:
         """With the error of its laws; fitted `anew` by each other law, as likely as by its own.
 
         A large effect by another law may be far from the point that fits best by its own.
@@ -313,7 +316,7 @@ class Search:
         return replace(
             self._tried(found[int(log.argmax())].fit),
             log_evidence=float(logsumexp(log)),
-            log_passing=float(logsumexp(plain + [each.passing for each in found])),
+            log_mimic=float(logsumexp(plain + [each.mimic for each in found])),
             draws=mixed([each.draws for each in found], normalised(log), self.rng),
         )
 
@@ -321,10 +324,10 @@ class Search:
         self._tell(f"other laws of {fit.hypothesis.name}", 0.95)
         return [fitted(self.problem, h, self.rng, fit.z[None]) for h in otherwise(fit.hypothesis)]
 
-    def _tried(self, fit: Fit) -> Tried:
-        return Tried.fitted(fit, len(self.baseline.z))
+    def _tried(self, fit: Fit) -> ScoredHypothesis:
+        return ScoredHypothesis.fitted(fit, len(self.baseline.z))
 
-    def _sampled(self, tried: Tried, thorough: bool) -> Tried:
+    def _sampled(self, tried: ScoredHypothesis, thorough: bool) -> ScoredHypothesis:
         fit = tried.fit
         if fit is None:
             return tried

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from shm.identify.contract import Dropped, Hit, Poles
-from shm.identify.finding.registry import IDENTIFIERS
+from shm.identify.estimation.registry import IDENTIFIERS
 from shm.identify.identification import Identification, identify
 from shm.identify.options import IdentifyOptions
 

@@ -13,16 +13,16 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
-from shm.identify.finding.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
-from shm.identify.finding.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.joining.joined import Joined, joined
-from shm.identify.joining.products import joined_response
-from shm.identify.joining.ringing import fitted
-from shm.identify.joining.together import alike, sharpened, together
+from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
+from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.measuring.setups import measured
+from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
-from shm.identify.placing.placement import Placement, placed
 from shm.identify.quality import Inspection, assess, refusal, tones
+from shm.identify.setup_merging.hit_directions import alike, sharpened, together
+from shm.identify.setup_merging.joined import Joined, joined
+from shm.identify.setup_merging.modal_participation import fitted
+from shm.identify.setup_merging.products import joined_response
 from shm.values import (
     NAN,
     ComplexArray,

@@ -7,10 +7,10 @@ are followed to its end. The points found become anchors, from which the sampler
 stage with the covariance of that stage.
 
 The hybrid: a cheap class's posterior says where to look for that of an expensive one. Parameters
-that both classes share by name start from a widened t distribution of the hint's samples, the
-others from the prior; half of all starts come from the prior alone. The hint is only a place to
-start from: the importance weights correct for it, so that posterior and evidence are those without
-it, and a wrong hint costs half of the starts and no more.
+that both classes share by name start from a widened t distribution of the warm start's samples, the
+others from the prior; half of all starts come from the prior alone. The warm start is only a place
+to start from: the importance weights correct for it, so that posterior and evidence are those
+without it, and a wrong warm start costs half of the starts and no more.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _APART = 0.1  # of the prior's standard deviation: nearer ones are one optimum
 _DAMPING = 1e-2
 
 # Technical: a normal around an optimum holds at most so much of the prior, in which the others are
-# found by their own; a t needs it a little wider; a hint is of another class.
+# found by their own; a t needs it a little wider; a warm start is of another class.
 _WIDEST = 0.4
 _INFLATION = 1.3
 _WIDER = 3.0
@@ -70,9 +70,15 @@ class Anchors:
         return np.asarray(density + log_volume + self.problem.dimension / 2 * np.log(2 * np.pi))
 
 
-def search(problem: Problem, rng: np.random.Generator, hint: Hint | None = None) -> Anchors:
-    """The best distinct optima of `problem`; with a hint half of the starts do."""
-    z = hint.draw(_STARTS // 2, rng) if hint else problem.coordinates.draw_prior(_STARTS, rng)
+def search(
+    problem: Problem, rng: np.random.Generator, warm_start: WarmStart | None = None
+) -> Anchors:
+    """The best distinct optima of `problem`; with a warm start half of the starts do."""
+    z = (
+        warm_start.draw(_STARTS // 2, rng)
+        if warm_start
+        else problem.coordinates.draw_prior(_STARTS, rng)
+    )
     felt = problem.coordinates.draw_felt(_STARTS, rng)
     sigma = np.repeat([_FIRST_SIGMA, _FELT_SIGMA], [len(z), len(felt)])
     z = np.vstack([z, felt])
@@ -176,7 +182,7 @@ def _step(
     return -np.linalg.solve(damped, gradient[..., None])[..., 0].clip(-1, 1)
 
 
-class Hint:
+class WarmStart:
     """A density of starts for `problem` that follows another class's posterior.
 
     Parameters that ends can exchange are never shared: their names do not say which end.
@@ -202,11 +208,11 @@ class Hint:
         return np.asarray(np.logaddexp(np.log(_FROM_PRIOR), np.log1p(-_FROM_PRIOR) + near))
 
 
-def hinted(problem: Problem, posterior: Posterior | None) -> Hint | None:
-    """The hint that a posterior gives; None where there is none or no parameter is shared."""
+def warm_start_from(problem: Problem, posterior: Posterior | None) -> WarmStart | None:
+    """The warm start that a posterior gives; None where there is none or no parameter is shared."""
     if posterior is None or not len(_shared_places(problem, posterior)[0]):
         return None
-    return Hint(problem, posterior)
+    return WarmStart(problem, posterior)
 
 
 def _shared_places(problem: Problem, posterior: Posterior) -> tuple[IntArray, FloatArray]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.problem import Points, Problem
-from shm.inference.search import Anchors, Hint
+from shm.inference.search import Anchors, WarmStart
 from shm.values import FloatArray, IntArray
 
 # Technical: longer strides than the textbook's 1, since the last step corrects what they leave.
@@ -39,17 +39,19 @@ def sample(
     anchors: Anchors,
     particles: int,
     rng: np.random.Generator,
-    hint: Hint | None = None,
+    warm_start: WarmStart | None = None,
 ) -> list[FloatArray]:
     """The places (n, d) that `particles` points went through in each stage.
 
-    The last of them is the posterior's; the others are wider. With a hint the first points are its
-    draws, weighed towards the prior.
+    The last of them is the posterior's; the others are wider. With a warm start the first points
+    are its draws, weighed towards the prior.
     """
     points = problem.evaluate(
-        hint.draw(particles, rng) if hint else problem.coordinates.draw_prior(particles, rng)
+        warm_start.draw(particles, rng)
+        if warm_start
+        else problem.coordinates.draw_prior(particles, rng)
     )
-    current = hint.log_ratio(points.z) if hint else np.zeros(particles)
+    current = warm_start.log_ratio(points.z) if warm_start else np.zeros(particles)
     floor, step = np.inf, 0.6
     stages: list[FloatArray] = []
     while floor > 0:

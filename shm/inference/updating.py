@@ -15,7 +15,7 @@ from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
 from shm.inference.priors import DECADES, reading_of
 from shm.inference.problem import Problem
-from shm.inference.search import Hint, hinted, search
+from shm.inference.search import WarmStart, search, warm_start_from
 from shm.inference.textbook import textbook
 from shm.inference.tmcmc import normalised, sample
 from shm.models import THESIS, AsMade, Model
@@ -42,16 +42,17 @@ def update(
     model: Model,
     options: UpdateOptions | None = None,
     progress: Progress = silent,
-    hint: Posterior | None = None,
+    warm_start: Posterior | None = None,
 ) -> Posterior:
     """The posterior of `model` given all modes of `tests`.
 
     The sampler finds the posterior, importance sampling gives the evidence and the draws (`r_hat`
-    is the agreement of their batches), and a few steps spread equal draws. `hint`, the posterior of
-    another class on the same tests, saves evaluations and changes nothing else. `progress` hears
-    the model's name and the fraction done. Raises BadInput where a test has no modes or conditions
-    that the model class cannot describe, UsageError where the textbook method or a data set that
-    counts twice meets priors of the description. Warns (BiasedEvidenceWarning) about the method.
+    is the agreement of their batches), and a few steps spread equal draws. `warm_start`, the
+    posterior of another class on the same tests, saves evaluations and changes nothing else.
+    `progress` hears the model's name and the fraction done. Raises BadInput where a test has no
+    modes or conditions that the model class cannot describe, UsageError where the textbook method
+    or a data set that counts twice meets priors of the description. Warns (BiasedEvidenceWarning)
+    about the method.
     """
     options = options or UpdateOptions()
     if options.method == TEXTBOOK and model.priors != THESIS:
@@ -68,7 +69,7 @@ def update(
         outcome = textbook(problem, options.samples, rng)
         progress(model.name, 1.0)
         return assembled(problem, outcome, tests, options, started)
-    weighted = infer(problem, options.samples, rng, progress, hint)
+    weighted = infer(problem, options.samples, rng, progress, warm_start)
     progress(model.name, 1.0)
     found = posterior_of(problem, weighted, tests, options, rng, started)
     return replace(found, reading_off_sd=_off_the_reading(tests, model, options, rng))
@@ -93,14 +94,14 @@ def infer(
     samples: int,
     rng: np.random.Generator,
     progress: Progress = silent,
-    hint: Posterior | None = None,
+    warm_start: Posterior | None = None,
 ) -> Weighted:
     """Weighted draws of the posterior of any `problem`, enough for `samples` equal ones.
 
     Where fewer than 200 are effective it goes on with more particles; `Posterior.caveats` says so
     where that did not help.
     """
-    near = hinted(problem, hint)
+    near = warm_start_from(problem, warm_start)
     particles = max(samples // _SAMPLES_A_PARTICLE, _FEWEST_PARTICLES)
     best = _weighted(problem, samples, particles, rng, progress, near)
     for more in _AGAIN:
@@ -118,7 +119,7 @@ def _weighted(
     particles: int,
     rng: np.random.Generator,
     progress: Progress,
-    near: Hint | None = None,
+    near: WarmStart | None = None,
 ) -> Weighted:
     anchors = search(problem, rng, near)
     progress(problem.model.name, 0.2)

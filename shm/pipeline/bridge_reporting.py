@@ -10,7 +10,7 @@ from datetime import datetime
 
 import shm
 from shm.errors import DamagedRow, NothingThere
-from shm.pipeline.origins import settings_words, software
+from shm.pipeline.lineage import settings_words, software
 from shm.report.contents import BridgeReport, Course, HangerLine, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period

@@ -15,7 +15,7 @@ from shm.inference import UpdateOptions
 from shm.inference.priors import Calibration, calibration_of
 from shm.models import DESCRIPTION
 from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
-from shm.pipeline.terms import Taught, Terms
+from shm.pipeline.lineage import Taught, Terms
 from shm.values import Hanger, Posterior
 
 _SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery

@@ -35,7 +35,7 @@ from shm.pipeline.jobs import (
     Step,
     wait_after,
 )
-from shm.pipeline.terms import competing, reason_document
+from shm.pipeline.lineage import competing, reason_document
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing

@@ -13,9 +13,9 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.judging import judge
-from shm.pipeline.parcel import Opens, Parcel
+from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
-from shm.pipeline.terms import Taught, identify_lineage, update_terms
+from shm.pipeline.remote_file import Opens, RemoteFile
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
@@ -167,7 +167,7 @@ class Jobs:
         settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
         archive: Opens = workspace.archive
         if settings.scheduler:  # workers elsewhere need not see our folders
-            archive = Parcel.of(workspace.archive, recording.file, settings.max_file_bytes)
+            archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
         step = registered().identify
         run = partial(run_step, step, recording, archive, workspace.bridge, settings, selected)
         return Step(run, partial(self._keep_tests, recording))
@@ -288,3 +288,41 @@ def _notify(notifier: Notifier, hook: Hook | None, delivery: Delivery) -> None:
     if hook is None:
         raise ShmError(f"no hook {delivery.hook} in bridge.toml.", remedy="Describe it again.")
     notifier(hook, delivery.alert)
+
+
+def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime) -> list[str]:
+    """Heals what is damaged of a recording's results; a sentence for each kind of thing done.
+
+    Tests are made again from the archive, posteriors from the tests. Each is written over the
+    damaged row, so that baselines, selections and alerts go on referring to it. The same input,
+    settings, seed and version give the same result, so nothing else changes.
+
+    Raises StoreError where the raw file is damaged too, BadInput or UsageError where the present
+    description or settings no longer take it.
+    """
+    said = []
+    dropped = store.upkeep.drop_damaged(recording_id)
+    if dropped:
+        said.append(f"Damaged rows that are made again by themselves, removed: {dropped}.")
+    damaged = store.upkeep.damaged_tests(recording_id)
+    if damaged:
+        recording, selected = store.recordings.get(recording_id), store.posteriors.selected_models()
+        terms = (workspace.bridge, workspace.settings, selected)
+        found = run_step(registered().identify, recording, workspace.archive, *terms)
+        lineage = identify_lineage(recording, found[0].test.hanger, workspace)
+        store.upkeep.heal_tests(damaged, found, lineage)
+        said.append(f"Damaged tests, identified again from the archive: {len(damaged)}.")
+    posteriors = store.upkeep.damaged_posteriors(recording_id)
+    for each in posteriors:
+        tests = [store.tests.get(test_id) for test_id in each.tests]
+        hanger = workspace.bridge.hanger(tests[0].hanger)
+        taught = Jobs(workspace, store, lambda: at).taught(hanger, min(t.time for t in tests))
+        options, lineage = update_terms(
+            hanger, [each.model], tests, workspace.settings, taught=taught
+        )
+        plain = [test.test for test in tests]
+        selection = run_step(registered().select, plain, hanger, [each.model], options)
+        store.upkeep.heal_posterior(each.id, selection.selected, tests, lineage, at)
+    if posteriors:
+        said.append(f"Damaged posteriors, made again from their tests: {len(posteriors)}.")
+    return said

@@ -15,7 +15,7 @@ from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
 from shm.pipeline.calibrating import options_of
-from shm.pipeline.terms import update_terms
+from shm.pipeline.lineage import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
 from shm.values import Change, Hanger
 
@@ -57,7 +57,7 @@ def rebaseline(
         build(model, hanger, terms.priors),
         options_of(terms, hanger),
         progress,
-        hint=before.posterior,
+        warm_start=before.posterior,
     )
     record = (order.who, order.why, order.since)
     return store.watch.rebaseline(before, posterior, chosen, record, lineage, at)

@@ -14,8 +14,8 @@ from shm.resources import give_back_memory
 
 if TYPE_CHECKING:
     from shm.bridge import Bridge
-    from shm.pipeline.parcel import Opens
-    from shm.pipeline.terms import Terms
+    from shm.pipeline.lineage import Terms
+    from shm.pipeline.remote_file import Opens
     from shm.settings import Settings
     from shm.store import Baseline, IdentifiedTest, StoredRecording
     from shm.values import (

@@ -11,20 +11,25 @@ from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
 from shm.pipeline.bridge_reporting import stored_pattern
-from shm.pipeline.origins import IDENTIFY_SETTINGS, settings_words, test_lineage
+from shm.pipeline.lineage import (
+    IDENTIFY_SETTINGS,
+    identify_lineage,
+    read_limits,
+    settings_words,
+    test_lineage,
+)
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
-from shm.pipeline.terms import identify_lineage, read_limits
 from shm.pipeline.watching import dated_tests
-from shm.read.apart import read_test
-from shm.report.contents import HangerReport, TestSheet, trend_row_of
+from shm.read.sandbox import read_test
+from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
+from shm.watch.alert_text import watch_words
 from shm.watch.neighbours import BridgePattern
-from shm.watch.wording import watch_words
 
 
 def hanger_report(
@@ -161,7 +166,9 @@ def hanger_states(
     return states_over_time(watched, hanger)
 
 
-def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) -> TestSheet:
+def modal_test_report(
+    workspace: Workspace, store: Store, hanger_id: int, name: str
+) -> ModalTestReport:
     """How a stored test came to its modes: its raw file is identified once more.
 
     Raises NothingThere for an unknown test and for one whose modes a file gave.
@@ -183,7 +190,7 @@ def test_sheet(workspace: Workspace, store: Store, hanger_id: int, name: str) ->
     if identify_lineage(recording, hanger_id, workspace) != stored.lineage:
         note = "identified anew: settings, description or version differ from those of the store"
         found = replace(found, notes=(*found.notes, note))
-    return TestSheet(
+    return ModalTestReport(
         found,
         records,
         hanger,

@@ -14,10 +14,10 @@ from shm.identify.plausibility import signal_doubts
 from shm.inference import refresh, select, update
 from shm.models import build
 from shm.pipeline.calibrating import options_of
-from shm.pipeline.parcel import Opens
-from shm.pipeline.terms import Terms, competing, identify_settings, read_limits
+from shm.pipeline.lineage import Terms, competing, identify_settings, read_limits
+from shm.pipeline.remote_file import Opens
 from shm.plausibility import fingerprint_of
-from shm.read.apart import Limits, load_modes, read_test
+from shm.read.sandbox import Limits, load_modes, read_test
 from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX, refuse_oversize

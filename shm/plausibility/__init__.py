@@ -6,7 +6,8 @@ modes of a test are identified, and before anything is computed from them.
 
 from __future__ import annotations
 
-from shm.plausibility import bar, clock, copies
+from shm.plausibility import clock, copies
+from shm.plausibility.bars import of_another_bar, of_other_signals
 from shm.plausibility.candidate import (
     Candidate,
     Check,
@@ -37,8 +38,8 @@ CHECKS: tuple[Check, ...] = (
     clock.stuck,
     clock.before_the_baseline,
     copies.copied,
-    bar.of_another_bar,
-    bar.of_other_signals,
+    of_another_bar,
+    of_other_signals,
 )
 
 

@@ -6,7 +6,7 @@ unit, calibration, place and plane. What the sidecar says goes before what the f
 holds the files of one test.
 
 These verbs work in the caller's process, for a person's own files; whatever comes by itself is read
-through `shm.read.apart`.
+through `shm.read.sandbox`.
 """
 
 from shm.read.base import Format, Peek, PeekChannel

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
+
+import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.read.base import Format, Peek
@@ -19,7 +23,7 @@ from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.numpy_file import FORMAT as NUMPY
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
-from shm.values import FrequencyResponse, Recording
+from shm.values import Channel, FloatArray, FrequencyResponse, Recording
 
 # The most particular first: any text may be comma-separated.
 FORMATS: tuple[Format, ...] = (
@@ -89,3 +93,13 @@ def _format_of_suffix(path: Path) -> Format | None:
 
 def _suffixes() -> list[str]:
     return [suffix for known in FORMATS for suffix in known.suffixes]
+
+
+def write_single(recording: Recording, path: Path) -> None:
+    """Writes an .npz file, not compressed: its size tells the numbers of samples and channels."""
+    write(replace(recording, channels=tuple(map(_single, recording.channels))), path)
+
+
+def _single(channel: Channel) -> Channel:
+    values = channel.values.astype(np.float32)
+    return replace(channel, values=cast(FloatArray, values))

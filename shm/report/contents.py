@@ -310,7 +310,7 @@ class BridgeReport:
 
 
 @dataclass(frozen=True, eq=False)
-class TestSheet:
+class ModalTestReport:
     """One identified test as a person checks it.
 
     `records` are those it came from, in the order in which they were given; empty where they are

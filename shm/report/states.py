@@ -19,9 +19,9 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch import Watched
+from shm.watch.alert_text import group_words, quantity_words, suspected_groups
 from shm.watch.history import Band, StateHistory
 from shm.watch.state import StateOptions, set_free, states
-from shm.watch.wording import group_words, quantity_words, suspected_groups
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ def _motion(scene: Scene, modes: tuple[PlaneModes, ...]) -> Motion:
     """Modes, pulses and noise-free accelerations."""
     plan, state = scene.plan, scene.state
     pulses = tuple(
-        pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.blows
+        pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.hits
     )
     places = plan.sensor_places_m(scene.hanger)
     moved = [

@@ -38,8 +38,8 @@ _DAMPING = (0.0005, 0.002)
 class Reality:
     """What no description of a hanger and no textbook effect holds.
 
-    - `own_laws`: effects follow laws of their own (`shm.simulate.effects.laws`), not the
-      catalogue's, with parameters that mean the same.
+    - `own_laws`: effects follow laws of their own (`shm.simulate.effects.alternative_laws`), not
+      the catalogue's, with parameters that mean the same.
     - `section_sd`: the bar's area varies along it, rms as a fraction: hot-rolled rounds of 100 mm
       may be off by 1.3 mm of diameter (EN 10060), mostly the same all along a bar; 0.1 % of the
       area is 0.05 mm of diameter. It is a sum of `section_waves` cosines along the bar.

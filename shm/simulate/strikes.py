@@ -41,7 +41,7 @@ class Strike:
     rebound_share: float = 0.0
 
     @property
-    def blows(self) -> tuple[Strike, ...]:
+    def hits(self) -> tuple[Strike, ...]:
         """The hit, and the blow of a bouncing hammer after it."""
         first = replace(self, rebound_s=NAN, rebound_share=0.0)
         if not self.rebound_share:

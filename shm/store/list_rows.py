@@ -57,7 +57,7 @@ class LatestTest:
 class Numbers:
     """A posterior in numbers.
 
-    `stiffness` is that of each plane's ends as `shm.models.ends.end_stiffness` has it, log10 of
+    `stiffness` is that of each plane's ends as `shm.models.end_stiffness` has it, log10 of
     N m/rad, by `transverse_end_stiffness` and the like; empty where the class clamps the ends.
     `parameters` are those of the class, as it takes them, and sigma. `averaged` is the tension over
     all model classes of the hanger.

@@ -230,7 +230,7 @@ def _made(
 def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
     """A posterior of `hanger` in numbers, its tension also over the classes of a `selection`."""
     # Imported here because who only asks what is kept needs no model.
-    from shm.models.ends import end_stiffness
+    from shm.models import end_stiffness
 
     try:
         stiffness = end_stiffness(posterior, hanger)

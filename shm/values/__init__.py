@@ -49,7 +49,6 @@ from shm.values.hanger import (
     Thresholds,
     Turnbuckle,
 )
-from shm.values.held import Doubt, Fingerprint, KnownSamples
 from shm.values.kinds import (
     NAN,
     PLANES,
@@ -85,7 +84,10 @@ from shm.values.posterior import (
 from shm.values.recording import (
     AddedMass,
     Channel,
+    Doubt,
+    Fingerprint,
     FrequencyResponse,
+    KnownSamples,
     Recording,
     ResponsePoint,
 )

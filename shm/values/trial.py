@@ -14,7 +14,8 @@ PlantedKind = Literal["none", "one", "two", "unknown"]
 """Nothing, one effect of the catalogue, two of them, something that the catalogue lacks."""
 
 MIX: Mapping[PlantedKind, float] = {"none": 1 / 4, "one": 1 / 2, "two": 1 / 8, "unknown": 1 / 8}
-"""How often each is planted: judgement, the same as the diagnosis's priors (`shm.gap.chances`)."""
+"""How often each is planted: judgement, the same as the diagnosis's priors
+(`shm.gap.model_probabilities`)."""
 
 Richness = Literal["one plane", "two planes", "known mass", "shapes", "conditions", "everything"]
 """What a case's tests measure: both planes from `two planes` on, and then what is named besides."""

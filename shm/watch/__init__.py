@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.models.ends import end_stiffness
+from shm.models import end_stiffness
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
 from shm.watch.options import WatchOptions
 from shm.watch.watching import (

@@ -36,10 +36,10 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
+from shm.watch.alert_text import message_of, short_name, suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.watcher import Watch, Watcher, WatchState, watched
-from shm.watch.wording import message_of, short_name, suspects
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -122,14 +122,14 @@ def watch_newest(
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
         state, watch = watcher.begin(readings)
-        told, alert = Told(), None
+        told, alert = AlertState(), None
         for found in watch.tests:
             told, alert = after(told, found, hanger)
     else:
         state = WatchState.from_bytes(kept)
         if state.key != watcher.key:
             return None
-        told = Told.from_text(state.told)
+        told = AlertState.from_text(state.told)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
         state, found = watcher.after(state, reader.reading(test, max(time, since)))
@@ -160,13 +160,13 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
     `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
     rules, quantity, way and test: the same whenever it is asked for.
     """
-    told, alert = Told(), None
+    told, alert = AlertState(), None
     for test in watched:
         told, alert = after(told, test, hanger)
     return alert
 
 
-def after(told: Told, test: WatchedTest, hanger: Hanger) -> tuple[Told, Alert | None]:
+def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
     """What stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = _still(told, test, level)
@@ -176,20 +176,20 @@ def after(told: Told, test: WatchedTest, hanger: Hanger) -> tuple[Told, Alert | 
     called = (*standing.called, test.change) if test.change.called else standing.called
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    stands = Told({**standing.beyond, **beyond}, call, called)
+    stands = AlertState({**standing.beyond, **beyond}, call, called)
     return stands, _alert(news, change, test, hanger, is_further=is_further)
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
     """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
-    told, alerts = Told(), []
+    told, alerts = AlertState(), []
     for test in watched:
         told, alert = after(told, test, hanger)
         alerts += [alert] if alert else []
     return tuple(alerts)
 
 
-def _still(told: Told, test: WatchedTest, level: float) -> Told:
+def _still(told: AlertState, test: WatchedTest, level: float) -> AlertState:
     """What still stands at a test: unknown probabilities end nothing."""
     ended = {
         (drift.quantity, way)
@@ -199,7 +199,7 @@ def _still(told: Told, test: WatchedTest, level: float) -> Told:
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < _ENDS_BELOW * level:
-        return Told(beyond)
+        return AlertState(beyond)
     return replace(told, beyond=beyond)
 
 
@@ -208,7 +208,7 @@ def _probability(drift: Drift, way: Way) -> float:
     return drift.probability * (way_of(drift.shift_mean) == way)
 
 
-def _news(standing: Told, test: WatchedTest, level: float) -> _News:
+def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
     beyond = tuple(
         drift
         for drift in test.drifts
@@ -218,7 +218,7 @@ def _news(standing: Told, test: WatchedTest, level: float) -> _News:
     return _News(beyond, test.change.called and not _is_known(standing, test.change))
 
 
-def _is_known(standing: Told, change: Change) -> bool:
+def _is_known(standing: AlertState, change: Change) -> bool:
     """Whether a called change began before an alert that stands, and so is what that one told."""
     told = [] if standing.call is None else [standing.call]
     named = _suspects(change)
@@ -296,7 +296,7 @@ def _first_moved(news: _News, test: WatchedTest) -> str:
 
 
 @dataclass(frozen=True)
-class Told:
+class AlertState:
     """What stands: when each quantity was told to be beyond its threshold, and when a call was.
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
@@ -319,7 +319,7 @@ class Told:
         )
 
     @classmethod
-    def from_text(cls, text: str) -> Told:
+    def from_text(cls, text: str) -> AlertState:
         """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
         if not text:
             return cls()

@@ -30,7 +30,7 @@ from shm.errors import ShmError
 from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
-from shm_daemon.bell import Bell
+from shm_daemon.wakeup import Wakeup
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest, threads
@@ -84,20 +84,20 @@ def is_found(workspace: Workspace) -> bool:
 
 def lives(workspace: Workspace) -> bool:
     """Whether the daemon takes several turns without ending, a new file in its spool."""
-    bell, turns = Bell(), 0
+    wakeup, turns = Wakeup(), 0
     write_test(workspace.spool / "new.modes.json", workspace, day=120, tension=0.8)
-    waited = bell.wait
+    waited = wakeup.wait
 
     def wait(seconds: float) -> object:
         nonlocal turns
         turns += 1
         if turns == 8:
-            bell.stop()
+            wakeup.stop()
         return waited(min(seconds, 0.05))
 
-    bell.wait = wait  # type: ignore[method-assign, assignment]
+    wakeup.wait = wait  # type: ignore[method-assign, assignment]
     try:
-        shm_daemon.run(workspace, bell=bell, make_executor=threads)
+        shm_daemon.run(workspace, wakeup=wakeup, make_executor=threads)
     except Exception as error:  # noqa: BLE001 - any end of the daemon is what is looked for
         print(f"the daemon ended: {error!r}", flush=True)
         return False

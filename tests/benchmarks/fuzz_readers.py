@@ -29,8 +29,8 @@ import numpy as np
 
 from docs.filling import fill_in
 from shm.errors import BadInput
-from shm.read import apart, sidecar_path
-from shm.read.apart import asking
+from shm.read import sandbox, sidecar_path
+from shm.read.sandbox import reading_process
 from shm.store import Stage
 from shm_daemon.execution import process_pool
 from tests.helpers.flows import a_flow
@@ -68,7 +68,7 @@ class Tally:
 
 def outcome_of(path: Path) -> tuple[str, str]:
     """What came of a file in a word, and in its own words."""
-    verb = apart.load_modes if path.name.endswith(".modes.json") else apart.read_test
+    verb = sandbox.load_modes if path.name.endswith(".modes.json") else sandbox.read_test
     try:
         return ("read", "") if verb(path) else ("fault", "an empty answer")
     except BadInput as refusal:
@@ -115,7 +115,7 @@ def one_by_one(laid: Iterable[tuple[str, Path]]) -> Tally:
 
 def peak_of_children_kb() -> int:
     """The peak of the reading process; its children's is told when it ends."""
-    asking._forget()
+    reading_process._forget()
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
 
 

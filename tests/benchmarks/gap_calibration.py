@@ -33,18 +33,18 @@ from scipy.special import logsumexp
 from shm.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE, read_document
 from shm.blind.making import WAYS, make_trial
 from shm.blind.scoring.marks import LARGE
-from shm.blind.solving.case import identify_tests
+from shm.blind.solving import identify_tests
 from shm.bridge import load_hanger
 from shm.errors import ShmError
 from shm.gap.attribution import Attribution, second_cause
 from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, Share
-from shm.gap.chances import log_prior
 from shm.gap.contract import Fit, GapOptions
-from shm.gap.laws import allowances, by_its_laws
+from shm.gap.data_checks import usable
+from shm.gap.law_error import allowances, by_its_laws
+from shm.gap.model_probabilities import log_prior
 from shm.gap.observations import observed
+from shm.gap.outlier_removal import Cleared, cleared
 from shm.gap.problem import GapProblem
-from shm.gap.remarks import usable
-from shm.gap.setting_aside import Cleared, cleared
 from shm.modes_document import load_modes
 from shm.values import TrueCase
 

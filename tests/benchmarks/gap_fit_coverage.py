@@ -13,9 +13,9 @@ import time
 import numpy as np
 
 from shm.gap.contract import Hypothesis
+from shm.gap.detectability import scan, truncate
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.sampled import sampled
-from shm.gap.sensitivity import scan, truncate
+from shm.gap.importance_sampling import sampled
 from shm.models.effects import Variant
 from tests.helpers.gap_campaigns import campaign, problem_of
 

@@ -10,9 +10,9 @@ import time
 from dataclasses import replace
 
 from shm.report.as_html import as_html
-from shm.report.contents import TestSheet
-from shm.report.figures.every_figure import sheet_figures as report_test_figures
-from shm.report.sheet_report import sheet_paper
+from shm.report.contents import ModalTestReport
+from shm.report.figures.every_figure import modal_test_figures as report_test_figures
+from shm.report.modal_test_report import modal_test_paper
 from tests.report.sheets import make_points, make_recording, make_sheet, warned
 
 PLACES_M = (0.9, 2.1, 3.4, 4.6, 5.8, 7.1, 8.3, 9.6)
@@ -22,7 +22,7 @@ MOST_SECONDS = 5.0
 MOST_BYTES = 2_000_000
 
 
-def large_sheet() -> TestSheet:
+def large_sheet() -> ModalTestReport:
     sheet = warned(make_sheet(places_m=PLACES_M, orders=12))
     record = make_recording(sheet.modes, make_points(PLACES_M), 5, SLOT_S, RATE_HZ)
     starts_s = [number * SLOT_S + 0.5 for number in range(5)]
@@ -40,7 +40,7 @@ def main() -> int:
     begin = time.process_time()
     figures = [item.svg() for item in report_test_figures(sheet)]
     drawn = time.process_time()
-    page = as_html(sheet_paper(sheet))
+    page = as_html(modal_test_paper(sheet))
     done = time.process_time()
     size = len(page.encode())
     print(f"{'figures, SVG':20} {drawn - begin:8.2f} s   {sum(map(len, figures)) / 1e6:6.2f} MB")

@@ -32,8 +32,8 @@ from shm.modes_document import modes_document
 from shm.resources import one_thread_a_process
 from shm.store import Stage, Workspace
 from shm.values import Alert, ModalTest, Mode
-from shm_daemon.bell import Bell
 from shm_daemon.loop import run
+from shm_daemon.wakeup import Wakeup
 from tests.helpers.flows import Clock
 from tests.helpers.footprint import Trend, descendants, open_files, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
@@ -102,15 +102,15 @@ def noisy(test: ModalTest, rng: np.random.Generator) -> ModalTest:
 @contextmanager
 def served(week: Week) -> Iterator[None]:
     """The daemon's loop in a thread of this process."""
-    bell, options = Bell(), {"clock": week.clock, "notifier": week.notify}
+    wakeup, options = Wakeup(), {"clock": week.clock, "notifier": week.notify}
     thread = threading.Thread(
-        target=run, args=(week.workspace,), kwargs={"bell": bell, **options}, daemon=True
+        target=run, args=(week.workspace,), kwargs={"wakeup": wakeup, **options}, daemon=True
     )
     thread.start()
     try:
         yield
     finally:
-        bell.stop()
+        wakeup.stop()
         thread.join(60)
     if thread.is_alive():
         raise SystemExit("the daemon does not end")

@@ -15,8 +15,7 @@ from shm.blind.answers import read_answers, write_answer
 from shm.blind.layout import Trial
 from shm.blind.making.case import make_case
 from shm.blind.making.mix import Draft
-from shm.blind.solving import solve_left_out, solve_trial, solved
-from shm.blind.solving.guard import Refused, guard
+from shm.blind.solving import Refused, guard, solve_left_out, solve_trial, solved
 from shm.blind.workers import workers
 from shm.errors import BadInput, NothingThere, ShmError
 from shm.modes_document import load_modes
@@ -122,7 +121,7 @@ def test_a_case_is_diagnosed_in_a_guarded_process(tmp_path: Path) -> None:
 def test_recordings_are_identified_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     make_one(tmp_path, "c0001", "recordings")
     asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("shm.blind.solving.case.diagnose", lambda *given: asked.append(given))
+    monkeypatch.setattr("shm.blind.solving.diagnose", lambda *given: asked.append(given))
     found = solved(tmp_path / "c0001")
     assert found.identified is not None
     tests = asked[0][0]
@@ -138,7 +137,7 @@ def test_the_second_round_takes_the_tests_that_the_first_identified(
     known = tmp_path / "c0001" / "tests.modes.json"
     known = known.rename(tmp_path / "c0001.modes.json")
     asked: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("shm.blind.solving.case.diagnose", lambda *given: asked.append(given))
+    monkeypatch.setattr("shm.blind.solving.diagnose", lambda *given: asked.append(given))
     solved(tmp_path / "c0001", ("sag",), known)
     tests, _, options = asked[0]
     assert tests == load_modes(known)
@@ -162,7 +161,7 @@ def test_a_fault_of_shm_is_an_answer_that_says_where(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr("shm.blind.solving.case.diagnose", broken)
+    monkeypatch.setattr("shm.blind.solving.diagnose", broken)
     failure = solved(tmp_path / "c0001").answer.failure
     assert failure.startswith("unexpected ZeroDivisionError: by zero (test_solving.py, line ")
 

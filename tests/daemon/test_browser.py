@@ -21,8 +21,8 @@ from playwright.sync_api import Page, expect
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm_daemon.web.address_of_test import test_page as page_of
-from shm_daemon.web.working_out import Workshop
+from shm_daemon.web.address import test_page as page_of
+from shm_daemon.web.background_work import BackgroundWorker
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
@@ -75,7 +75,9 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         assert {each.stage for each in store.recordings.list_all()} == {Stage.DONE}
         assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shm_daemon.web.app.Workshop", partial(Workshop, pool=a_thread))
+        patch.setattr(
+            "shm_daemon.web.app.BackgroundWorker", partial(BackgroundWorker, pool=a_thread)
+        )
         with real_daemon(folder), served(workspace) as running:
             yield Site(running, workspace)
 

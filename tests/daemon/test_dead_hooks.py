@@ -12,7 +12,7 @@ import pytest
 from shm.bridge import Hook
 from shm.store import Delivery, DeliveryState, Stage, Workspace
 from shm.values import Alert
-from shm_daemon import Bell, HookNotifier, run
+from shm_daemon import HookNotifier, Wakeup, run
 from tests.helpers.flows import Clock, a_flow, threads
 from tests.helpers.listeners import Answer, a_listener, a_silent_listener
 from tests.helpers.outboxes import make_baseline, raise_alerts
@@ -53,13 +53,13 @@ def test_what_a_server_refuses_is_given_up_at_once_and_what_may_pass_waits(
 
 
 def test_a_server_that_hangs_holds_up_neither_the_files_nor_the_end(tmp_path: Path) -> None:
-    bell = Bell()
+    wakeup = Wakeup()
     with a_silent_listener() as url:
         workspace = with_webhook(tmp_path / "bridge", url)
         daemon = threading.Thread(
             target=run,
             args=(workspace,),
-            kwargs={"bell": bell, "make_executor": threads},
+            kwargs={"wakeup": wakeup, "make_executor": threads},
         )
         daemon.start()
         for file in range(2):
@@ -67,7 +67,7 @@ def test_a_server_that_hangs_holds_up_neither_the_files_nor_the_end(tmp_path: Pa
             until_refused(workspace, file + 1)
         assert any(thread.name.startswith("hook") for thread in threading.enumerate())
         began = time.monotonic()
-        bell.stop()
+        wakeup.stop()
         daemon.join(20)
         assert not daemon.is_alive()
         assert time.monotonic() - began < 5

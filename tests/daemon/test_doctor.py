@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline.intake import receive
-from shm.read import apart
+from shm.read import sandbox
 from shm.store import Archive, DeliveryState, Stage, Workspace
 from shm_cli.main import run
 from shm_daemon.doctor import Finding, Level, checks, examine
@@ -68,7 +68,7 @@ def test_bounds_of_reading_that_are_not_in_force_are_told_and_why(
 ) -> None:
     assert only(workspace, "confinement").level is Level.OK
     why = {"Landlock": "this kernel has none; Linux has it from 5.13"}
-    monkeypatch.setattr(apart, "missing_bounds", lambda: why)
+    monkeypatch.setattr(sandbox, "missing_bounds", lambda: why)
     finding = only(workspace, "confinement")
     assert finding.level is Level.WARNING
     assert "without Landlock: this kernel has none" in finding.found

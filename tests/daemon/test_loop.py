@@ -18,7 +18,7 @@ from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
 from shm.store.stored_recordings import Recordings
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
@@ -35,22 +35,22 @@ def _quick(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) ->
 
 
 @pytest.fixture
-def serve(workspace: Workspace) -> Iterator[Callable[..., Bell]]:
+def serve(workspace: Workspace) -> Iterator[Callable[..., Wakeup]]:
     """Begins a daemon in a thread; it is stopped at the end."""
-    bells, threads = [], []
+    wakeups, threads = [], []
 
-    def begin(where: Workspace = workspace, **options: object) -> Bell:
-        bell = Bell()
-        options = {"make_executor": make_threads, "bell": bell, **options}
+    def begin(where: Workspace = workspace, **options: object) -> Wakeup:
+        wakeup = Wakeup()
+        options = {"make_executor": make_threads, "wakeup": wakeup, **options}
         thread = threading.Thread(target=run, args=(where,), kwargs=options)
-        bells.append(bell)
+        wakeups.append(wakeup)
         threads.append(thread)
         thread.start()
-        return bell
+        return wakeup
 
     yield begin
-    for bell in bells:
-        bell.stop()
+    for wakeup in wakeups:
+        wakeup.stop()
     for thread in threads:
         thread.join(20)
         assert not thread.is_alive()
@@ -78,7 +78,7 @@ def deliveries(workspace: Workspace) -> tuple[Delivery, ...]:
 
 
 def test_files_dropped_while_it_runs_are_done(
-    workspace: Workspace, serve: Callable[..., Bell]
+    workspace: Workspace, serve: Callable[..., Wakeup]
 ) -> None:
     serve()
     for day in range(3):
@@ -88,7 +88,7 @@ def test_files_dropped_while_it_runs_are_done(
 
 
 def test_open_files_do_not_grow_with_the_tests(
-    workspace: Workspace, serve: Callable[..., Bell]
+    workspace: Workspace, serve: Callable[..., Wakeup]
 ) -> None:
     serve()
     held = []
@@ -101,7 +101,7 @@ def test_open_files_do_not_grow_with_the_tests(
 
 
 def test_a_file_being_written_is_not_taken_before_it_is_whole(
-    tmp_path: Path, serve: Callable[..., Bell]
+    tmp_path: Path, serve: Callable[..., Wakeup]
 ) -> None:
     workspace = make_workspace(tmp_path / "slow", settings={"spool_stable_seconds": 0.5})
     test = workspace.folder / "t.modes.json"
@@ -137,7 +137,7 @@ _ODD_NAMES = (
 
 
 def test_no_name_of_a_file_holds_up_the_others(
-    workspace: Workspace, serve: Callable[..., Bell]
+    workspace: Workspace, serve: Callable[..., Wakeup]
 ) -> None:
     serve()
     for name in _ODD_NAMES:
@@ -155,9 +155,9 @@ def test_no_name_of_a_file_holds_up_the_others(
 
 
 def test_nothing_is_taken_while_a_folder_is_on_another_disk(
-    workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bell = serve()
+    wakeup = serve()
     write_test(workspace.spool / "a.modes.json", workspace)
     until(lambda: counts(workspace) == {Stage.DONE: 1})
     monkeypatch.setattr("shm_daemon.loop._UNREADABLE_S", 0.2)
@@ -165,7 +165,7 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     write_test(workspace.spool / "b.modes.json", workspace, day=30)
     until(lambda: "archive/ is gone" in why_turn_failed(workspace))
     for _ in range(20):  # a turn without a scan, as after a step, says nothing of the spool
-        bell.ring()
+        wakeup.ring()
         time.sleep(0.02)
         assert "archive/ is gone" in why_turn_failed(workspace)
     assert not workspace.archive.folder.exists()
@@ -176,7 +176,7 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
 
 
 def test_a_turn_that_fails_is_shown_until_one_goes_well(
-    workspace: Workspace, serve: Callable[..., Bell], monkeypatch: pytest.MonkeyPatch
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: object) -> None:
         raise OSError("the spool is odd")
@@ -198,21 +198,21 @@ def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:
 
 
 def test_a_hook_that_hangs_does_not_hold_up_the_files(
-    tmp_path: Path, serve: Callable[..., Bell]
+    tmp_path: Path, serve: Callable[..., Wakeup]
 ) -> None:
     workspace = make_workspace(tmp_path / "hangs", hooks={"mail": ["sleep", "600"]})
     write_loss(workspace.spool, workspace)
-    bell = serve(workspace)
+    wakeup = serve(workspace)
     until(lambda: counts(workspace) == {Stage.DONE: 3})
     until(lambda: len(deliveries(workspace)) == 1)
     write_test(workspace.spool / "later.modes.json", workspace, day=90)
     until(lambda: counts(workspace) == {Stage.DONE: 4})
     assert [each.state for each in deliveries(workspace)] == [DeliveryState.WAITING]
-    bell.stop()  # ends the hook too; the fixture checks that the daemon ends soon
+    wakeup.stop()  # ends the hook too; the fixture checks that the daemon ends soon
 
 
 def test_two_daemons_do_not_serve_one_workspace(
-    workspace: Workspace, serve: Callable[..., Bell], caplog: pytest.LogCaptureFixture
+    workspace: Workspace, serve: Callable[..., Wakeup], caplog: pytest.LogCaptureFixture
 ) -> None:
     serve()
     until(lambda: "watching" in caplog.text)
@@ -221,7 +221,7 @@ def test_two_daemons_do_not_serve_one_workspace(
 
 
 def test_a_changed_description_is_taken_over(
-    workspace: Workspace, serve: Callable[..., Bell], caplog: pytest.LogCaptureFixture
+    workspace: Workspace, serve: Callable[..., Wakeup], caplog: pytest.LogCaptureFixture
 ) -> None:
     serve()
     write_test(workspace.spool / "a.modes.json", workspace, hanger=4)

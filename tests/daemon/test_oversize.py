@@ -15,7 +15,7 @@ import pytest
 from shm.errors import TooLarge
 from shm.pipeline.intake import receive
 from shm.store import Archive, Stage, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import START, make_workspace, put, write_test
@@ -36,9 +36,9 @@ def on_disk(folder: Path) -> int:
 
 def serve_for(workspace: Workspace, seconds: float, done: threading.Event | None = None) -> float:
     """Runs a daemon for a while; the longest time between two signs of it."""
-    bell, heart, seen = Bell(), workspace.folder / HEARTBEAT, [time.time()]
+    wakeup, heart, seen = Wakeup(), workspace.folder / HEARTBEAT, [time.time()]
     daemon = threading.Thread(
-        target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": threads}
+        target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": threads}
     )
     daemon.start()
     end = time.monotonic() + seconds
@@ -47,7 +47,7 @@ def serve_for(workspace: Workspace, seconds: float, done: threading.Event | None
             seen.append(heart.stat().st_mtime)
         time.sleep(0.02)
     seen.append(time.time())
-    bell.stop()
+    wakeup.stop()
     daemon.join(60)
     return max(after - before for before, after in pairwise(seen))
 

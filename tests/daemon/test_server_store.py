@@ -11,7 +11,7 @@ import pytest
 
 from shm.pipeline import steps
 from shm.store import Stage, Store, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
 from tests.helpers.flows import threads
 from tests.helpers.postgres import Databases
@@ -33,13 +33,13 @@ def served(
     for verb in ("update", "refresh", "select"):
         monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
     monkeypatch.setenv("SHM_STORE", url.replace("postgres@", "postgres:hush@"))
-    workspace, bell = make_workspace(tmp_path / "bridge"), Bell()
-    options = {"bell": bell, "make_executor": threads}
+    workspace, wakeup = make_workspace(tmp_path / "bridge"), Wakeup()
+    options = {"wakeup": wakeup, "make_executor": threads}
     daemon = threading.Thread(target=run, args=(workspace,), kwargs=options)
     daemon.start()
     yield workspace
     assert daemon.is_alive()
-    bell.stop()
+    wakeup.stop()
     daemon.join(30)
     assert not daemon.is_alive()
     assert "hush" not in caplog.text

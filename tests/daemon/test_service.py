@@ -15,9 +15,9 @@ import pytest
 from shm.errors import UsageError
 from shm.resources import service_unit
 from shm.store import Workspace
-from shm_daemon import Bell, run
+from shm_cli.daemon import unit_text
+from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
-from shm_daemon.unit import unit_text
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import make_workspace
 
@@ -98,9 +98,9 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
     """Though it scans its spool once an hour, it gives a sign thrice in the watchdog's time."""
     monkeypatch.setenv("WATCHDOG_USEC", "600000")
     workspace = make_workspace(tmp_path / "bridge", settings={"spool_scan_seconds": 3600.0})
-    bell = Bell()
+    wakeup = Wakeup()
     thread = threading.Thread(
-        target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": threads}
+        target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": threads}
     )
     thread.start()
     try:
@@ -109,19 +109,19 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
         for _ in range(5):
             assert "WATCHDOG=1" in hear(systemd)
     finally:
-        bell.stop()
+        wakeup.stop()
         thread.join(20)
     assert "STOPPING=1" in hear_until(systemd, "STOPPING=1")
 
 
 def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socket) -> None:
     workspace = make_workspace(tmp_path / "bridge")
-    bell = Bell()
+    wakeup = Wakeup()
     with workspace.lock():
         thread = threading.Thread(
             target=run,
             args=(workspace,),
-            kwargs={"bell": bell, "make_executor": threads, "standby": True},
+            kwargs={"wakeup": wakeup, "make_executor": threads, "standby": True},
         )
         thread.start()
         try:
@@ -129,7 +129,7 @@ def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socke
             assert "WATCHDOG=1" in said
             assert any(line.startswith("STATUS=standing by") for line in said)
         finally:
-            bell.stop()
+            wakeup.stop()
             thread.join(20)
 
 

@@ -15,7 +15,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store import Scope, Workspace
 from shm_daemon.web.address import Address, caller_of
-from shm_daemon.web.around import HTTPS_ONLY, PROTECTION
+from shm_daemon.web.middleware import HTTPS_ONLY, PROTECTION
 from shm_daemon.web.serving import refuse_unguarded
 from shm_daemon.web.site import MOST_WRONG, WITHIN_S, WrongTokens
 from tests.helpers.web_servers import Served, served

@@ -16,7 +16,7 @@ import pytest
 from shm.store import Workspace
 from shm_daemon.web import plotting
 from shm_daemon.web.address import Address
-from shm_daemon.web.around import PROTECTION
+from shm_daemon.web.middleware import PROTECTION
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace
 

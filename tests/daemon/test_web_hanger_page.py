@@ -18,8 +18,8 @@ from shm.report.contents import Status, status
 from shm.report.hanger_summary import summary
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace
+from shm_daemon.web.background_work import BackgroundWorker, Order
 from shm_daemon.web.hanger_figures import FIGURES
-from shm_daemon.web.working_out import Order, Workshop
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
@@ -47,8 +47,8 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     return workspace
 
 
-class AtTheSecondRequest(Workshop[Any]):
-    """A workshop without a process: nothing is made yet when it is first asked for."""
+class AtTheSecondRequest(BackgroundWorker[Any]):
+    """A background_worker without a process: nothing is made yet when it is first asked for."""
 
     made: ClassVar[dict[Order, Any]] = {}
 
@@ -63,7 +63,7 @@ class AtTheSecondRequest(Workshop[Any]):
 @pytest.fixture(scope="module")
 def site(bridge: Workspace) -> Iterator[Served]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shm_daemon.web.app.Workshop", AtTheSecondRequest)
+        patch.setattr("shm_daemon.web.app.BackgroundWorker", AtTheSecondRequest)
         with served(bridge) as site:
             yield site
 

@@ -23,11 +23,11 @@ import pytest
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm_daemon.web.address_of_test import name_in
-from shm_daemon.web.address_of_test import test_json as document_of
-from shm_daemon.web.address_of_test import test_page as page_of
-from shm_daemon.web.figures_of_test import FIGURES, FROM_RECORDS
-from shm_daemon.web.working_out import Workshop
+from shm_daemon.web.address import name_in
+from shm_daemon.web.address import test_json as document_of
+from shm_daemon.web.address import test_page as page_of
+from shm_daemon.web.background_work import BackgroundWorker
+from shm_daemon.web.modal_test_figures import FIGURES, FROM_RECORDS
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test
@@ -75,7 +75,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         assert {recording.stage for recording in store.recordings.list_all()} == {Stage.DONE}
     assert names[1:] == [MODES_ALONE]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shm_daemon.web.app.Workshop", partial(Workshop, pool=a_thread))
+        patch.setattr(
+            "shm_daemon.web.app.BackgroundWorker", partial(BackgroundWorker, pool=a_thread)
+        )
         with served(workspace) as running:
             yield Site(workspace, running, names[0], largest_n)
 

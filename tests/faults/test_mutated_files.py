@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.read import apart
-from shm.read.apart import asking
+from shm.read import sandbox
+from shm.read.sandbox import reading_process
 from tests.helpers.mutations import Sample, damaged, harmful_samples, light, whole_samples
 
 FILES = 280
-SMALL = apart.Limits(parse_memory_bytes=2**26)
+SMALL = sandbox.Limits(parse_memory_bytes=2**26)
 
 
 def what_comes_of(path: Path) -> BadInput | None:
     """The refusal of a file, None where it is read."""
-    verb = apart.load_modes if path.name.endswith(".modes.json") else apart.read_test
+    verb = sandbox.load_modes if path.name.endswith(".modes.json") else sandbox.read_test
     try:
         found = verb(path, SMALL)
     except BadInput as refusal:
@@ -79,4 +79,4 @@ def test_damaged_files_are_read_or_refused_soon_and_in_words(
     assert read > FILES // 40
     assert refused > FILES // 2
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
-    assert asking._known[0].process.poll() is None
+    assert reading_process._known[0].process.poll() is None

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
-from shm.gap.chances import Tried
 from shm.gap.contract import Fit, Hypothesis
+from shm.gap.model_probabilities import ScoredHypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
 
@@ -25,7 +25,7 @@ def cause(
     effect: str, probability: float, fit: Fit | None, group: int | None = None
 ) -> Explanation:
     """Of one place, screened where there is no fit."""
-    tried = Tried(Hypothesis(((effect, Variant()),)), 5.0, 8.0, fit)
+    tried = ScoredHypothesis(Hypothesis(((effect, Variant()),)), 5.0, 8.0, fit)
     return Explanation(tried, (tried,), probability, 5.0, 8.0, group)
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind, more_thorough
 from shm.gap.calibration import CALIBRATION
-from shm.gap.chances import Tried
 from shm.gap.contract import GapOptions, Hypothesis
+from shm.gap.model_probabilities import ScoredHypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
@@ -146,4 +146,4 @@ def test_a_cause_that_fits_as_well_is_not_told_apart_by_what_its_freedom_costs(
 
 
 def _cause(log_bayes_factor: float, log_fit: float) -> Explanation:
-    return Explanation(Tried(Hypothesis(), 0.0, 0.0), (), 0.1, log_bayes_factor, log_fit)
+    return Explanation(ScoredHypothesis(Hypothesis(), 0.0, 0.0), (), 0.1, log_bayes_factor, log_fit)

@@ -11,11 +11,11 @@ from scipy.special import logsumexp
 
 from shm.gap.contract import Fit, Hypothesis, Observations
 from shm.gap.coordinates import Coordinates, Straight
+from shm.gap.detectability import scan, superposed, truncate
 from shm.gap.fit import baseline_fit, fitted
+from shm.gap.importance_sampling import sampled
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
-from shm.gap.sampled import sampled
-from shm.gap.sensitivity import scan, superposed, truncate
 from shm.models.effects import Parameter, Variant
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy

@@ -7,7 +7,7 @@ from itertools import combinations
 import pytest
 
 from shm.gap.calibration import CALIBRATION
-from shm.gap.chances import EVEN, imitation
+from shm.gap.model_probabilities import EVEN, imitation
 from shm.models.effects import EFFECTS
 
 

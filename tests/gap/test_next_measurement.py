@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis, Observations
+from shm.gap.experiment_design import like_the_present, measured_already, proposals, with_sensors
 from shm.gap.fit import fitted
 from shm.gap.next_measurement import NO_GAP, Errors, Foresight, divergence, foreseen, ranked
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.proposals import like_the_present, measured_already, proposals, with_sensors
 from shm.models.effects import EFFECTS, Conditions, Variant
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect
 from shm.simulate import campaign as simulated

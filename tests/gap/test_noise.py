@@ -22,7 +22,7 @@ from shm.gap.noise import (
     nodes,
     same_mode,
 )
-from shm.gap.repeated import Repeated
+from shm.gap.repeated_errors import Repeated
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 

@@ -12,8 +12,8 @@ from shm.gap.attribution import attributed
 from shm.gap.contract import GapOptions
 from shm.gap.diagnose import diagnose
 from shm.gap.observations import observed
+from shm.gap.outlier_removal import misnumbered
 from shm.gap.problem import GapProblem
-from shm.gap.setting_aside import misnumbered
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.values import ModalTest
 from tests.helpers.effects import all_but

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from shm.gap.chances import Tried
 from shm.gap.contract import Hypothesis
 from shm.gap.hypotheses import varied
+from shm.gap.model_probabilities import ScoredHypothesis
 from shm.models.effects import Variant
 
 
-def _pair(log_evidence: float, other: str, at: str) -> Tried:
-    return Tried(Hypothesis((("sag", Variant()), (other, Variant(at)))), log_evidence, 0.0)
+def _pair(log_evidence: float, other: str, at: str) -> ScoredHypothesis:
+    return ScoredHypothesis(
+        Hypothesis((("sag", Variant()), (other, Variant(at)))), log_evidence, 0.0
+    )
 
 
 def test_many_places_of_one_pair_leave_room_for_other_pairs() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from shm import plausibility
-from shm.plausibility.bar import of_another_bar
+from shm.plausibility.bars import of_another_bar
 
 
 def take_any_bar(patch: pytest.MonkeyPatch) -> None:

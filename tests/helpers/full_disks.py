@@ -25,7 +25,7 @@ from shm.errors import ShmError
 from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
-from shm_daemon import Bell, loop
+from shm_daemon import Wakeup, loop
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
 from tests.helpers.feeds import Feed, assert_all_done_once
@@ -64,11 +64,11 @@ def fill_at_calls(where: Path, files: int, every: int, seed: int = 1) -> str:
 
 def _daemon(workspace: Workspace, moment: Moment | None) -> int:
     """A daemon in this process until all is done or, on a disk that stays full, for a while."""
-    recorder, bell, began = ctypes.CDLL(None), Bell(), time.monotonic()
+    recorder, wakeup, began = ctypes.CDLL(None), Wakeup(), time.monotonic()
     loop.time = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))  # type: ignore[assignment]
-    wait = bell.wait
-    bell.wait = lambda seconds: wait(min(seconds / _FASTER, 0.05))  # type: ignore[method-assign]
-    timer = threading.Timer(_LONGEST_S, bell.stop)
+    wait = wakeup.wait
+    wakeup.wait = lambda seconds: wait(min(seconds / _FASTER, 0.05))  # type: ignore[method-assign]
+    timer = threading.Timer(_LONGEST_S, wakeup.stop)
     timer.daemon = True
     timer.start()
 
@@ -80,7 +80,7 @@ def _daemon(workspace: Workspace, moment: Moment | None) -> int:
     try:
         loop.run(
             workspace,
-            bell=bell,
+            wakeup=wakeup,
             once=True,
             make_executor=threads,
             notifier=Postman(),

@@ -15,7 +15,7 @@ import pytest
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
 from shm.store.tables import metadata
-from shm_daemon import Bell, loop
+from shm_daemon import Wakeup, loop
 from tests.helpers.contents import quiet
 from tests.helpers.feeds import Feed, assert_all_done_once
 from tests.helpers.flows import Postman, threads
@@ -76,13 +76,13 @@ def writes(databases: Databases, url: str) -> int:
 
 def ingest_meanwhile(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """A daemon until all is done; what it waits passes quickly."""
-    began, bell = time.monotonic(), Bell()
+    began, wakeup = time.monotonic(), Wakeup()
     quick = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))
-    wait: Any = bell.wait
+    wait: Any = wakeup.wait
     with monkeypatch.context() as patched:
         patched.setattr(loop, "time", quick)
-        patched.setattr(bell, "wait", lambda seconds: wait(min(seconds / _FASTER, 0.05)))
-        loop.run(workspace, bell=bell, once=True, make_executor=threads, notifier=Postman())
+        patched.setattr(wakeup, "wait", lambda seconds: wait(min(seconds / _FASTER, 0.05)))
+        loop.run(workspace, wakeup=wakeup, once=True, make_executor=threads, notifier=Postman())
 
 
 def assert_whole(feed: Feed) -> None:

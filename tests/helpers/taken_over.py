@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from shm.read import apart
-from shm.read.apart import asking
+from shm.read import sandbox
+from shm.read.sandbox import reading_process
 
 _VERB = """
-from shm.read.apart import confinement, serving
+from shm.read.sandbox import confinement, serving
 known = serving._VERBS['read_test']
 def verb(path):
     if '.py' not in path.suffixes: return known(path)
@@ -30,15 +30,17 @@ def obeying_readers(first: str = "pass") -> Iterator[None]:
 
     `first` is done in the reading process before, to `confinement` for example.
     """
-    asking._forget()
+    reading_process._forget()
     with pytest.MonkeyPatch.context() as patch:
-        begin, end = asking._CODE.split("from shm", 1)
-        patch.setattr(asking, "_CODE", f"{begin.rstrip('; ')}{_VERB}{first}\nfrom shm{end}")
+        begin, end = reading_process._CODE.split("from shm", 1)
+        patch.setattr(
+            reading_process, "_CODE", f"{begin.rstrip('; ')}{_VERB}{first}\nfrom shm{end}"
+        )
         yield
-        asking._forget()
+        reading_process._forget()
 
 
-def obey(path: Path, code: str, limits: apart.Limits | None = None) -> object:
+def obey(path: Path, code: str, limits: sandbox.Limits | None = None) -> object:
     """Lets a child run some code, which may leave what it has `found`."""
     path.write_text(f"import os, sys\n{textwrap.dedent(code)}\n")
-    return apart.read_test(path, limits)
+    return sandbox.read_test(path, limits)

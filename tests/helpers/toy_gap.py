@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, Observations
-from shm.gap.repeated import Repeated
+from shm.gap.repeated_errors import Repeated
 from shm.models.effects import Conditions, Parameter, Survey
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger
 from tests.helpers.hangers import HANGER_3

@@ -58,5 +58,5 @@ def served(
 
 
 def a_thread(workers: int) -> ProcessPoolExecutor:
-    """Where a workshop works without a process of its own."""
+    """Where a background_worker works without a process of its own."""
     return ThreadPoolExecutor(workers)  # type: ignore[return-value]

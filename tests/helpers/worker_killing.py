@@ -13,7 +13,7 @@ from pathlib import Path
 from shm.pipeline import steps
 from shm.settings import Settings
 from shm.store import Stage, Workspace
-from shm_daemon import Bell, run
+from shm_daemon import Wakeup, run
 from shm_daemon.execution import Workers
 from tests.helpers import quick_update
 from tests.helpers.workspaces import write_test
@@ -49,13 +49,13 @@ def kill_workers(
         write_test(workspace.spool / f"t{number:04}.modes.json", workspace, day=number / 10)
     busy = workspace.folder / "busy"
     busy.mkdir()
-    bell, end, struck = Bell(), time.monotonic() + most_s, 0
+    wakeup, end, struck = Wakeup(), time.monotonic() + most_s, 0
 
     def make(settings: Settings) -> Workers:
         return Workers(settings.workers, partial(prepare_worker, busy))
 
     daemon = threading.Thread(
-        target=run, args=(workspace,), kwargs={"bell": bell, "make_executor": make}
+        target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": make}
     )
     daemon.start()
     try:
@@ -67,7 +67,7 @@ def kill_workers(
                 struck += _kill_one(busy, rng)
             time.sleep(0.0 if struck < kills else 0.5)
     finally:
-        bell.stop()
+        wakeup.stop()
         daemon.join()
     return struck
 

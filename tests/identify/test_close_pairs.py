@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.finding.candidates import Candidate, Pole
-from shm.identify.finding.close_pairs import told_apart
-from shm.identify.finding.poles import PoleSet
-from shm.identify.finding.repeats import Repeats, doubt, find_again, proven
+from shm.identify.estimation.candidates import Candidate, Pole
+from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.repeats import Repeats, doubt, find_again, proven
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray
 

@@ -7,7 +7,7 @@ import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import FoundMode, Measurement
-from shm.identify.joining.ringing import fitted
+from shm.identify.setup_merging.modal_participation import fitted
 from shm.values import ComplexArray, FrequencyResponse, ResponsePoint
 
 FREQUENCY_HZ = np.arange(801) * 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shm.identify.finding.repeats import FREQUENCY_FLOOR, frequency_sd, jackknife_sd, steadied
+from shm.identify.estimation.repeats import FREQUENCY_FLOOR, frequency_sd, jackknife_sd, steadied
 
 
 def _without_each(values: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.placing.alignment import PlaneModes
-from shm.identify.placing.order import Expected, assign_orders
+from shm.identify.mode_ordering.alignment import PlaneModes
+from shm.identify.mode_ordering.order import Expected, assign_orders
 from shm.simulate import HangerState, natural_frequencies
 from shm.values import Hanger
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.placing.placement import blurred, with_both_planes
+from shm.identify.mode_ordering.placement import blurred, with_both_planes
 from shm.values import ResponsePoint
 
 BIAXIAL = (ResponsePoint("acc_1", "transverse", 2.0), ResponsePoint("acc_2", "longitudinal", 2.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.placing.alignment import HIGHEST_ORDER, Pattern, tensioned_beam_pattern
+from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, Pattern, tensioned_beam_pattern
 from shm.simulate import HangerState, natural_frequencies
 from shm.values import FloatArray, Hanger
 

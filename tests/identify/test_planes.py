@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.placing.planes import planes_of, shape_points
+from shm.identify.mode_ordering.planes import planes_of, shape_points
 from shm.values import NAN
 from tests.identify.signals import BIAXIAL, Sensor, points
 

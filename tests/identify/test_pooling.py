@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.joining.joined import pooled
+from shm.identify.setup_merging.joined import pooled
 from shm.values import FloatArray
 
 

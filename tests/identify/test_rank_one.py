@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.joining.products import factors, hang_together
+from shm.identify.setup_merging.products import factors, hang_together
 from shm.values import BoolArray
 
 RNG = np.random.default_rng(2)

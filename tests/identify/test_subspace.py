@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from shm.identify.finding.poles import collinearity, poles_of, real_shape
-from shm.identify.finding.ssi import hankel, realise
+from shm.identify.estimation.poles import collinearity, poles_of, real_shape
+from shm.identify.estimation.ssi import hankel, realise
 
 RATE_HZ = 256.0
 
@@ -24,7 +24,7 @@ def test_pyoma2_is_kept_quiet() -> None:
     """No log handler, no numpy warning turned off, no word on either stream, no heavy import."""
     script = (
         "import logging, sys, numpy as np; before = np.geterr();"
-        "import shm.identify.finding.ssi as s;"
+        "import shm.identify.estimation.ssi as s;"
         "h = s.hankel(np.random.default_rng(0).normal(size=(2, 400)), np.ones((1, 400)), 20);"
         "s.realise(h, 20, 8);"
         "assert np.geterr() == before; assert not logging.getLogger('pyoma2').handlers;"

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.identify.finding.candidates import (
+from shm.identify.estimation.candidates import (
     Candidate,
     Pole,
     continued,
@@ -10,7 +10,7 @@ from shm.identify.finding.candidates import (
     resolved,
     stable_candidates,
 )
-from shm.identify.finding.poles import PoleSet
+from shm.identify.estimation.poles import PoleSet
 from shm.identify.options import IdentifyOptions
 
 X, Y = np.array([1.0 + 0j, 0.0]), np.array([0.0 + 0j, 1.0])

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.placing.order import turnbuckle_shift
+from shm.identify.mode_ordering.order import turnbuckle_shift
 from shm.simulate import HangerState, natural_frequencies
 from shm.values import Hanger, Turnbuckle
 

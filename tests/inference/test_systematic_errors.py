@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shm.gap.repeated import STRETCHES, section_loads
+from shm.gap.repeated_errors import STRETCHES, section_loads
 from shm.inference.systematic_errors import (
     _GIVE_M_N,
     _GIVE_SD_M_N,

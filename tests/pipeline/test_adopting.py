@@ -14,8 +14,7 @@ from shm.errors import BadInput, NothingThere, UsageError
 from shm.inference import UpdateOptions
 from shm.models import Model, build
 from shm.pipeline import adopting, steps
-from shm.pipeline.adopting import Wish, adopt, gap_watch
-from shm.pipeline.naming import adopted_name
+from shm.pipeline.adopting import Wish, adopt, adopted_name, gap_watch
 from shm.pipeline.reporting import hanger_report
 from shm.store import Lineage, Store, StoredAdoption, Workspace
 from shm.values import ModalTest, Posterior, PredictedFrequency

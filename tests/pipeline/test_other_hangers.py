@@ -9,7 +9,7 @@ import pytest
 from shm.errors import UsageError
 from shm.models import MODELS
 from shm.models.beam import Beam1
-from shm.pipeline.terms import competing
+from shm.pipeline.lineage import competing
 from shm.store import Stage, Workspace
 from shm.values import Hanger
 from tests.helpers.flows import a_flow, ingest

@@ -28,9 +28,13 @@ def hints(monkeypatch: pytest.MonkeyPatch) -> list[Posterior]:
     told: list[Posterior] = []
 
     def quick(
-        tests: Sequence[ModalTest], model: Model, options: UpdateOptions, *_: Any, hint: Posterior
+        tests: Sequence[ModalTest],
+        model: Model,
+        options: UpdateOptions,
+        *_: Any,
+        warm_start: Posterior,
     ) -> Posterior:
-        told.append(hint)
+        told.append(warm_start)
         return quick_update.update(tests, model, options)
 
     monkeypatch.setattr(rebaselining, "update", quick)
@@ -67,8 +71,8 @@ def test_the_tests_since_that_day_make_the_baseline(
     assert (made.who, made.why, made.since, made.set_at) == (
         "engineer", "a new pin", START + timedelta(days=31), AT,
     )  # fmt: skip
-    (hint,) = hints
-    assert hint.tests == ("t0",)
+    (warm_start,) = hints
+    assert warm_start.tests == ("t0",)
 
 
 def test_later_tests_are_compared_with_it_and_earlier_figures_stay(

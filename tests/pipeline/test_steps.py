@@ -16,8 +16,8 @@ from shm.errors import BadInput, ShmError
 from shm.inference import UpdateOptions
 from shm.models import build
 from shm.pipeline import steps
+from shm.pipeline.lineage import reason_document, seed_of
 from shm.pipeline.steps import identify_file, watch_test
-from shm.pipeline.terms import reason_document, seed_of
 from shm.read import Limits
 from shm.store import Baseline, IdentifiedTest, ReceivedFile, Stage, StoredRecording, Workspace
 from shm.values import Alert, Hanger, ModalTest, Recording, WatchedTest

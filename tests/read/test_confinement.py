@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm.read import FORMATS, apart
-from shm.read.apart import confinement
+from shm.read import FORMATS, sandbox
+from shm.read.sandbox import confinement
 from shm.values import Recording
 from tests.helpers.taken_over import obey, obeying_readers
 from tests.helpers.written import write
@@ -277,7 +277,7 @@ def test_a_bound_that_the_system_lacks_is_said_and_the_others_hold(
     tmp_path: Path, broken: str, missing: dict[str, str]
 ) -> None:
     with obeying_readers(broken):
-        found = apart.missing_bounds()
+        found = sandbox.missing_bounds()
         assert found.keys() == missing.keys()
         assert all(words in found[name] for name, words in missing.items())
         probe = "open('/etc/passwd')" if "Landlock" not in missing else "os.fork()"
@@ -359,4 +359,4 @@ def test_hundreds_of_files_are_read_one_after_the_other(
     for path in paths:
         write(recording, path)
     for _ in range(200 // len(paths)):
-        assert all(len(apart.read_test(path)) == 1 for path in paths)
+        assert all(len(sandbox.read_test(path)) == 1 for path in paths)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.pipeline.terms import read_limits
+from shm.pipeline.lineage import read_limits
 from shm.read import Limits, peek, read
 from shm.read.limits import limited
 from shm.settings import Settings

@@ -8,7 +8,7 @@ import pytest
 
 import shm
 from shm.errors import BadInput
-from shm.read import apart
+from shm.read import sandbox
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def only_first(modes: Path) -> None:
 
 def test_what_a_sidecar_says_goes_before_the_document(modes: Path) -> None:
     modes.with_suffix(".toml").write_text("hanger = 5\ntemperature_c = 12.5\n")
-    for found in (shm.load_modes(modes), apart.load_modes(modes)):
+    for found in (shm.load_modes(modes), sandbox.load_modes(modes)):
         assert [(test.hanger, test.temperature_c) for test in found] == [(5, 12.5), (5, 12.5)]
         assert [test.id for test in found] == ["a", "b"]
 

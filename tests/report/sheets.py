@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.identify import Dropped, Hit, Identification, Poles
-from shm.report.contents import TestSheet
+from shm.report.contents import ModalTestReport
 from shm.values import (
     NAN,
     PLANES,
@@ -149,7 +149,7 @@ def make_sheet(
     dropped: dict[int, str] | None = None,
     places_m: Sequence[float] = (2.5, 4.4),
     orders: int = 6,
-) -> TestSheet:
+) -> ModalTestReport:
     """A test of both planes with biaxial sensors and every part of its identification."""
     modes, points = make_modes(orders, places_m), make_points(places_m)
     response = make_response(modes, points, coherent=hits > 1)
@@ -162,10 +162,10 @@ def make_sheet(
         poles=make_poles(modes),
         fit=accelerance(modes, points, response.frequency_hz),
     )
-    return TestSheet(found, (make_recording(modes, points, hits),), HANGER, (2.0, 90.0))
+    return ModalTestReport(found, (make_recording(modes, points, hits),), HANGER, (2.0, 90.0))
 
 
-def warned(sheet: TestSheet) -> TestSheet:
+def warned(sheet: ModalTestReport) -> ModalTestReport:
     """With every verdict but refused, three resonances set aside and a note."""
     quality = (
         QualityCheck("double hits", "warning", 1, 0, "hits", "hit 2 struck twice", "Hit freely."),
@@ -184,12 +184,12 @@ def warned(sheet: TestSheet) -> TestSheet:
     return replace(sheet, identification=found)
 
 
-def refused(sheet: TestSheet) -> TestSheet:
+def refused(sheet: ModalTestReport) -> ModalTestReport:
     check = QualityCheck("noise", "refused", 3.0, 10.0, "dB", "noise everywhere", "Hit harder.")
     return replace(sheet, identification=replace(sheet.identification, quality=(check,)))
 
 
-def given_responses() -> TestSheet:
+def given_responses() -> ModalTestReport:
     """Nine responses of a roving hammer on one line, plane and hanger unknown, no time record."""
     places_m = (0.1, 1.4, 2.6, 3.9, 5.2, 6.4, 7.7, 9.0, 10.2)
     modes = tuple(mode for mode in make_modes(4, places_m) if mode.plane == "transverse")
@@ -206,10 +206,10 @@ def given_responses() -> TestSheet:
         replace(response, points=(point,), accelerance=response.accelerance[row : row + 1])
         for row, point in enumerate(points)
     )
-    return TestSheet(found, parts)
+    return ModalTestReport(found, parts)
 
 
-def one_sensor() -> TestSheet:
+def one_sensor() -> ModalTestReport:
     """Five records of one hit each, one sensor, neither its plane nor its place known."""
     modes = tuple(replace(m, shape=()) for m in make_modes(4) if m.plane == "transverse")
     point = ResponsePoint("acc", None, NAN)
@@ -219,10 +219,10 @@ def one_sensor() -> TestSheet:
     response = replace(make_response(modes, points), points=(point,))
     found = Identification(ModalTest("hits", modes), response, hits, (), make_poles(modes))
     records = tuple(replace(record, source=f"hit_{number}.csv") for number in range(1, 6))
-    return TestSheet(found, records)
+    return ModalTestReport(found, records)
 
 
-def ambient() -> TestSheet:
+def ambient() -> ModalTestReport:
     """Nobody hit: accelerations alone."""
     sheet = make_sheet()
     modes, points = sheet.modes, make_points()

@@ -21,14 +21,14 @@ from shm.report.contents import (
     Course,
     HangerLine,
     HangerReport,
+    ModalTestReport,
     Status,
-    TestSheet,
     TrendRow,
 )
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.intervals import Interval
+from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.period import Period
-from shm.report.sheet_report import sheet_json, sheet_paper
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
@@ -192,20 +192,20 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
     assert_spoken(document_words(bridge_json(data)))
 
 
-def refused_sheet() -> TestSheet:
+def refused_sheet() -> ModalTestReport:
     return refused(make_sheet())
 
 
 @pytest.mark.parametrize("make", [refused_sheet, given_responses, one_sensor, ambient])
 def test_a_test_of_any_kind_is_told_in_numbers_and_words(
-    make: Callable[[], TestSheet],
+    make: Callable[[], ModalTestReport],
 ) -> None:
     sheet = make()
-    on_paper = Pdf.parse(as_pdf(sheet_paper(sheet))).words
-    assert_spoken(as_text(sheet_paper(sheet)))
-    assert_spoken(page_words(as_html(sheet_paper(sheet))))
+    on_paper = Pdf.parse(as_pdf(modal_test_paper(sheet))).words
+    assert_spoken(as_text(modal_test_paper(sheet)))
+    assert_spoken(page_words(as_html(modal_test_paper(sheet))))
     assert_spoken(on_paper)
-    assert_spoken(document_words(sheet_json(sheet)))
+    assert_spoken(document_words(modal_test_json(sheet)))
     assert ("Do not use" in on_paper) == (make is refused_sheet)
 
 

@@ -17,8 +17,8 @@ from shm.report.bridge_report import bridge_paper
 from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
+from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Part, Table
-from shm.report.sheet_report import sheet_paper
 from shm.report.trial_report import trial_paper
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.pdf_words import Pdf
@@ -54,7 +54,7 @@ KINDS: dict[str, Callable[[HangerReport], Paper]] = {
     "hanger": of_hanger,
     "bridge": of_bridge,
     "diagnosis": lambda _: diagnosis_paper(sheet("led")),
-    "sheet": lambda _: sheet_paper(warned(make_sheet(hits=6, dropped={2: "double hit"}))),
+    "sheet": lambda _: modal_test_paper(warned(make_sheet(hits=6, dropped={2: "double hit"}))),
     "trial": lambda _: trial_paper(make_score("plausible")),
 }
 

@@ -95,7 +95,7 @@ def test_a_bouncing_hammer_strikes_again_and_the_hanger_answers(hanger: Hanger, 
     made, plain = simulate(hanger, "double_hit", seed=seed), simulate(hanger, seed=seed)
     (hit,) = planted(made).hits
     strike = made.strikes[hit]
-    first, second = strike.blows
+    first, second = strike.hits
     assert 0.015 <= second.start_s - first.start_s <= 0.2
     assert 0.1 <= second.peak_n / first.peak_n <= 0.6
     later = int((second.start_s - 0.1) * RATE)  # the logger's filter is 0.06 s long

@@ -13,7 +13,7 @@ from shm.errors import UsageError
 from shm.identify import identify
 from shm.identify.options import campaign_options
 from shm.read import read
-from shm.read.single import write_single
+from shm.read.registry import write_single
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign_with_truth
 from shm.simulate.reality import Reality
 from shm.simulate.recorded import RecordedCampaign, Recorder, recorded

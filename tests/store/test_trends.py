@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shm.models import described
-from shm.models.ends import end_stiffness
+from shm.models import described, end_stiffness
 from shm.store import (
     Adoption,
     IdentifiedTest,

@@ -27,7 +27,7 @@ from shm import __version__
 from shm.bridge import AppriseHook, Hook, WebhookHook
 from shm.errors import ShmError
 from shm.models import competing_names
-from shm.read import apart
+from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.settings import Settings
 from shm.store import Workspace
@@ -242,7 +242,7 @@ def check_confinement() -> Iterator[Finding]:
 
     A file is read by a child process here, as the daemon's are.
     """
-    missing = apart.missing_bounds()
+    missing = sandbox.missing_bounds()
     for name, why in missing.items():
         yield warning(
             "confinement",

@@ -1,4 +1,4 @@
-"""Where the web interface listens, and who may call it by which name."""
+"""Where the web interface listens, who may call it by which name, and where a test is found."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import socket
 from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address
+from urllib.parse import quote
 
 DEFAULT_PORT = 8400  # technical: above 1024, for which one must be root, and not the usual 8080
 UPLOADS = "/api/recordings"
@@ -92,3 +93,26 @@ def _is_number(name: str) -> bool:
 
 def _machine() -> str:
     return socket.gethostname().lower()
+
+
+_DOTS = (".", "..")
+"""Names that a browser would take for a way up: they are followed by a slash."""
+
+
+def test_page(hanger_id: int, name: str) -> str:
+    """The address of a test's page."""
+    told = f"{name}/" if name in _DOTS else name
+    return f"/hangers/{hanger_id}/tests/{quote(told, safe='')}"
+
+
+def test_json(hanger_id: int, name: str) -> str:
+    """The address of what is known of a test, in numbers; its figures lie below it."""
+    return f"/api{test_page(hanger_id, name)}"
+
+
+def name_in(address: str) -> str:
+    """The name of the test whose address ends so, decoded."""
+    return address.removesuffix("/") if address.removesuffix("/") in _DOTS else address
+
+
+test_page.__test__ = test_json.__test__ = False  # type: ignore[attr-defined]  # no pytest cases

@@ -16,6 +16,7 @@ from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm_daemon.web import alerts, hanger_numbers, hangers, recordings, signing_in, tests, watching
 from shm_daemon.web.access import Reader
+from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
 from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
@@ -24,7 +25,6 @@ from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import alerts as alerts_page
 from shm_daemon.web.pages import bridge, hanger, health, one_test, static, upload
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import Workshop
 
 _described = APIRouter(include_in_schema=False)
 
@@ -46,7 +46,7 @@ def load_pages(site: Site) -> Pages:
         redoc_url=None,
     )
     app.state.site = site
-    app.state.workshop = Workshop()
+    app.state.background_worker = BackgroundWorker()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (
@@ -69,7 +69,7 @@ def load_pages(site: Site) -> Pages:
     app.include_router(_described)
 
     def close() -> None:
-        app.state.workshop.close()
+        app.state.background_worker.close()
         watching_site.close()
         site.close()
 

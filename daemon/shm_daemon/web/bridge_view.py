@@ -17,8 +17,8 @@ from shm.report.contents import HangerLine, Status
 from shm.report.intervals import Interval
 from shm.values import NAN, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
+from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import workshop_of
 
 QUICKLY_COMPARED = 24
 """So many hangers are compared while a page waits."""
@@ -132,7 +132,7 @@ def compared(request: Request, site: Site) -> Compared | None:
     wanted = Comparison(tuple(map(_comparable, hanger_shifts(site.store, order))), order)
     if len(order) <= QUICKLY_COMPARED:
         return wanted.make()
-    found: Compared | None = workshop_of(request).wanted(wanted)
+    found: Compared | None = background_worker_of(request).wanted(wanted)
     return found
 
 

@@ -12,6 +12,7 @@ from shm.errors import NothingThere
 from shm.report.states import QuantityOverTime, StatesOverTime, called_words
 from shm.store import StoredWatch, TrendPoint
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.hanger_figures import FIGURES
 from shm_daemon.web.hanger_models import FigureDocument, HangerTests, HangerTrend
@@ -21,7 +22,6 @@ from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS
 from shm_daemon.web.plotting import answer, plain
 from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
 
 router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
 
@@ -113,7 +113,7 @@ def figure(
 
 def _view(request: Request, site: Site, hanger_id: int) -> HangerView:
     hanger = described(site.workspace, hanger_id)
-    return HangerView(site.workspace, site.store, hanger, workshop_of(request))
+    return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
 
 
 def _headers(view: HangerView) -> dict[str, str]:

@@ -9,7 +9,7 @@ from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.store import TestRow, TrendPoint
 from shm.values.force_units import ForceUnit
-from shm_daemon.web.address_of_test import test_page
+from shm_daemon.web.address import test_page
 from shm_daemon.web.hanger_figures.over_time import tension_unit
 from shm_daemon.web.hanger_view import HangerView
 

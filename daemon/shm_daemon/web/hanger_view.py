@@ -23,7 +23,7 @@ from shm.store import (
     Workspace,
 )
 from shm.values import Hanger
-from shm_daemon.web.working_out import Workshop
+from shm_daemon.web.background_work import BackgroundWorker
 
 _BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
 
@@ -66,9 +66,15 @@ class StatesOrder:
 class HangerView:
     """One hanger as it stands in the store; what is asked for twice is read once."""
 
-    def __init__(self, workspace: Workspace, store: Store, hanger: Hanger, workshop: Workshop[Any]):
+    def __init__(
+        self,
+        workspace: Workspace,
+        store: Store,
+        hanger: Hanger,
+        background_worker: BackgroundWorker[Any],
+    ):
         self.workspace, self.store, self.hanger = workspace, store, hanger
-        self._workshop = workshop
+        self._background_worker = background_worker
 
     @cached_property
     def trend(self) -> tuple[TrendPoint, ...]:
@@ -109,7 +115,7 @@ class HangerView:
         if self.baseline is None:
             return NOTHING_WATCHED
         try:
-            made = self._workshop.wanted(self._order(self.baseline))
+            made = self._background_worker.wanted(self._order(self.baseline))
         except ShmError as error:
             log.warning("states over time of hanger %d: %s", self.hanger.id, error)
             return NOTHING_WATCHED

@@ -16,9 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, needing
 from shm.store import Workspace
-from shm_daemon.extras import needing
 from shm_daemon.web.address import Address
 
 if TYPE_CHECKING:
@@ -64,8 +63,8 @@ def make_app(
 
     It answers `/health` at once and loads its pages beside.
     """
-    from shm_daemon.web.around import Around
     from shm_daemon.web.front import Front, Pages
+    from shm_daemon.web.middleware import Around
     from shm_daemon.web.site import Description, Site
 
     def load() -> Pages:

@@ -9,9 +9,9 @@ from fastapi.responses import RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
 from shm_daemon.web.access import COOKIE, AtSite, refuse_foreign, token_in_force
-from shm_daemon.web.around import is_https
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import page
+from shm_daemon.web.middleware import is_https
 
 router = APIRouter(include_in_schema=False)
 

@@ -12,6 +12,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from shm.errors import NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
@@ -151,3 +152,17 @@ def _modified_ns(workspace: Workspace) -> int:
         return Path(workspace.bridge.source).stat().st_mtime_ns
     except OSError:
         return 0
+
+
+def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]]:
+    """What nobody has decided on yet, the oldest first; of one hanger where named."""
+    return [
+        {
+            "recording": hold.recording_id,
+            "file": hold.file_name,
+            "hanger": hold.hanger,
+            "held_at": hold.held_at,
+            "message": hold.message,
+        }
+        for hold in site.store.recordings.list_holds(hanger)
+    ]

@@ -18,13 +18,13 @@ from shm.errors import NothingThere
 from shm.report.quality_table import overall
 from shm.store import FormerPosterior, FormerTest
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.address_of_test import name_in
+from shm_daemon.web.address import name_in
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.figures_of_test import FIGURES
 from shm_daemon.web.hangers import Number
-from shm_daemon.web.origin_of_test import formers_of, steps_of
-from shm_daemon.web.view_of_test import AT_WORK, TestView, as_bytes
-from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
+from shm_daemon.web.modal_test_figures import FIGURES
+from shm_daemon.web.modal_test_origin import formers_of, steps_of
+from shm_daemon.web.modal_test_view import AT_WORK, TestView, as_bytes
 
 
 class Waiting(BaseModel):
@@ -162,8 +162,8 @@ Point = Annotated[
 
 def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    workshop = workshop_of(request)
-    return TestView.of(site.workspace, site.store, workshop, hanger_id, name_in(test))
+    background_worker = background_worker_of(request)
+    return TestView.of(site.workspace, site.store, background_worker, hanger_id, name_in(test))
 
 
 View = Annotated[TestView, Depends(view_of)]

@@ -20,7 +20,7 @@ from shm.bridge import load_hanger
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document
-from shm.read.single import write_single
+from shm.read.registry import write_single
 from shm.simulate import (
     PLANTED,
     CampaignPlan,

@@ -14,7 +14,7 @@ import numpy as np
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Dropped, Measurement
 from shm.identify.measuring.frf import band_limited, least_seconds
-from shm.identify.measuring.points import point_of
+from shm.identify.measuring.responses import point_of
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, FloatArray, Recording
 

@@ -5,8 +5,10 @@ Points hit one after the other (roving hammer) are, by reciprocity, channels of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,7 +17,23 @@ from shm.identify.contract import Dropped, Measurement
 from shm.identify.measuring.frf import LEAST_SAMPLES, band_limited
 from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.options import IdentifyOptions
-from shm.values import FloatArray, FrequencyResponse
+from shm.values import Channel, FloatArray, FrequencyResponse, Plane, ResponsePoint
+
+Place: TypeAlias = tuple[Plane | None, float | None, str]
+"""Plane, position in m where stated, else the name: equal for one point in several set-ups."""
+
+
+def point_of(channel: Channel) -> ResponsePoint:
+    """Where a channel's sensor sits, or its hammer hits."""
+    return ResponsePoint(channel.name, channel.plane, channel.x_m)
+
+
+def place_of(point: ResponsePoint) -> Place:
+    """What makes the point the same in several set-ups."""
+    if math.isnan(point.x_m):
+        return point.plane, None, point.name
+    return point.plane, point.x_m, ""
+
 
 _MOST_SAMPLES = 16_000  # judgement: a minute at 256 Hz, in which all modes have rung down
 _MOST_SAMPLES_ROVING = 1_000

@@ -27,8 +27,7 @@ from shm.identify.measuring.frf import (
     filter_reach,
 )
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
-from shm.identify.measuring.points import point_of
-from shm.identify.measuring.responses import measurement_of_responses
+from shm.identify.measuring.responses import measurement_of_responses, point_of
 from shm.identify.measuring.screening import Screening, screened
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording

@@ -9,7 +9,7 @@ from collections import Counter
 import numpy as np
 
 from shm.identify.contract import Hit, Measurement
-from shm.identify.finding.repeats import LEAST_HITS
+from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord, find_pulses
 from shm.identify.measuring.screening import FEWEST_TO_COMPARE, LIMIT, disagreement
 from shm.identify.measuring.signal_faults import CUT_OFF, DOUBLE_HIT, KNOCK, OUTLIER

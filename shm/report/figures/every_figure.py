@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, TestSheet
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, ModalTestReport
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
 from shm.report.figures.gap_causes import FIGURE as CAUSES
@@ -14,14 +14,14 @@ from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.illustration import Illustration, Member, drawn
-from shm.report.figures.sheet_damping import FIGURE as DAMPING
-from shm.report.figures.sheet_hits import FIGURE as HITS
-from shm.report.figures.sheet_quality import FIGURE as QUALITY
-from shm.report.figures.sheet_response import FIGURE as RESPONSE
-from shm.report.figures.sheet_shapes import FIGURE as SHAPES
-from shm.report.figures.sheet_spectra import Shown
-from shm.report.figures.sheet_stabilisation import FIGURE as STABILISATION
-from shm.report.figures.sheet_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.modal_test_damping import FIGURE as DAMPING
+from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_quality import FIGURE as QUALITY
+from shm.report.figures.modal_test_response import FIGURE as RESPONSE
+from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
+from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
 from shm.report.figures.trial_errors import (
     COVERAGE,
@@ -39,7 +39,7 @@ OF_HANGER: tuple[Member[HangerReport], ...] = (
 _ON_A_SHEET: tuple[Member[Shown], ...] = (
     TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES, DAMPING
 )  # fmt: skip
-OF_SHEET = (QUALITY, *_ON_A_SHEET)
+OF_MODAL_TEST = (QUALITY, *_ON_A_SHEET)
 OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
 OF_TRIAL: tuple[Member[TrialScore], ...] = (
     DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
@@ -57,12 +57,12 @@ def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
     return (*shifts, *drawn((TENSIONS,), data))
 
 
-def sheet_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
     """All of one hammer test."""
-    return drawn(OF_SHEET, Shown.of(sheet))
+    return drawn(OF_MODAL_TEST, Shown.of(sheet))
 
 
-def sheet_page_figures(sheet: TestSheet) -> tuple[Illustration, ...]:
+def modal_test_page_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
     """Those of them that are no table."""
     return drawn(_ON_A_SHEET, Shown.of(sheet))
 

@@ -6,7 +6,6 @@ A disturbance is one function and one line of `DISTURBANCES`.
 from __future__ import annotations
 
 from shm.simulate.disturbances.base import Channels, Disturbance, Lines, Motion, Planted, Scene
-from shm.simulate.disturbances.foreign import deck, harmonic, machine, mains
 from shm.simulate.disturbances.hitting import (
     cut_off,
     double_hit,
@@ -15,6 +14,7 @@ from shm.simulate.disturbances.hitting import (
     outlier_hit,
     soft_hit,
 )
+from shm.simulate.disturbances.spurious_vibration import deck, harmonic, machine, mains
 from shm.simulate.disturbances.wiring import cable, clipping, drop_out, overload
 
 __all__ = ["DISTURBANCES", "Channels", "Disturbance", "Lines", "Motion", "Planted", "Scene"]

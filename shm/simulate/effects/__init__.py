@@ -11,6 +11,7 @@ import numpy as np
 from shm.errors import UsageError
 from shm.simulate.bar.description import Bar
 from shm.simulate.effects import along, conditions, ends
+from shm.simulate.effects.alternative_laws import LAWS
 from shm.simulate.effects.base import (
     Plantable,
     PlantedEffect,
@@ -20,8 +21,7 @@ from shm.simulate.effects.base import (
     Where,
     where_of,
 )
-from shm.simulate.effects.laws import LAWS
-from shm.simulate.unlisted import UNLISTED
+from shm.simulate.off_catalogue import UNLISTED
 from shm.values import PLANES, Hanger
 
 __all__ = [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from shm.watch.neighbours.nouns import (
+from shm.watch.neighbours.pattern import bridge_pattern, shifts_of
+from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     Explanation,
     HangerRow,
@@ -12,7 +13,6 @@ from shm.watch.neighbours.nouns import (
     SumKept,
     Suspect,
 )
-from shm.watch.neighbours.pattern import bridge_pattern, shifts_of
 
 __all__ = [
     "BridgePattern",

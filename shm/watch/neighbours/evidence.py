@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp, ndtr
 
 from shm.values import FloatArray, IntArray
-from shm.watch.neighbours.nouns import HangerShift, NeighbourOptions
+from shm.watch.neighbours.pattern_types import HangerShift, NeighbourOptions
 
 # Technical: at a sixteenth of an sd the trapezoid rule is exact to rounding for a normal law, and
 # Gauss's of 16 nodes for polynomials of degree 31.

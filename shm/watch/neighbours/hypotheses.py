@@ -22,7 +22,7 @@ from shm.watch.neighbours.evidence import (
     weighed,
     with_sign,
 )
-from shm.watch.neighbours.nouns import ExplanationName, HangerShift, NeighbourOptions
+from shm.watch.neighbours.pattern_types import ExplanationName, HangerShift, NeighbourOptions
 
 # Both of two equal losses stand among the likeliest single ones.
 _FIRST_OF_TWO = 3

@@ -16,7 +16,8 @@ from shm.values import NAN, TENSION, Drift, FloatArray
 from shm.watch.history import NINETY_PERCENT
 from shm.watch.neighbours.evidence import Bridge
 from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
-from shm.watch.neighbours.nouns import (
+from shm.watch.neighbours.pattern_text import remarks_of, sentence_of
+from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     Explanation,
     ExplanationName,
@@ -28,7 +29,6 @@ from shm.watch.neighbours.nouns import (
     Suspect,
     Way,
 )
-from shm.watch.neighbours.words import remarks_of, sentence_of
 
 FEWEST = 3  # of two, either may be the one that moved
 _REACH = 2  # places: what hangers further off take up is below 5 % of a loss

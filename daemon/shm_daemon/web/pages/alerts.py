@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from shm.store import AlertRow, Store
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.address_of_test import test_page
+from shm_daemon.web.address import test_page
 from shm_daemon.web.alerts import alert_document
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import LARGEST_NUMBER

@@ -24,7 +24,8 @@ from shm.report.intervals import Interval
 from shm.values.force_units import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.address_of_test import test_page
+from shm_daemon.web.address import test_page
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.bridge_view import (
     QUICKLY_COMPARED,
     BridgeGlance,
@@ -34,9 +35,8 @@ from shm_daemon.web.bridge_view import (
 )
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import BridgeState, Moved, Underway
-from shm_daemon.web.working_out import RETRY_AFTER
+from shm_daemon.web.site import held_documents
 
 router = APIRouter(tags=["state"])
 

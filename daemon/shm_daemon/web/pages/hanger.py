@@ -20,14 +20,14 @@ from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
 from shm_daemon.web.hanger_tests import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.working_out import workshop_of
+from shm_daemon.web.site import held_documents
 
 router = APIRouter(include_in_schema=False)
 
@@ -66,7 +66,7 @@ class Chart:
 def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTMLResponse:
     """Everything known of a hanger; its figures are fetched as they come into view."""
     one = described(site.workspace, hanger_id)
-    view = HangerView(site.workspace, site.store, one, workshop_of(request))
+    view = HangerView(site.workspace, site.store, one, background_worker_of(request))
     rows = lines_before(view, _LATEST_TESTS + 1)
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
@@ -92,7 +92,7 @@ def all_tests(
 ) -> HTMLResponse:
     """All tests of a hanger, the newest first, some a page."""
     one = described(site.workspace, hanger_id)
-    view = HangerView(site.workspace, site.store, one, workshop_of(request))
+    view = HangerView(site.workspace, site.store, one, background_worker_of(request))
     rows = lines_before(view, _TESTS_A_PAGE + 1, before)
     return page(
         request,

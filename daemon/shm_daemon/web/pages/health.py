@@ -25,14 +25,13 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import troubles
-from shm_daemon.web.held import held_documents
 from shm_daemon.web.models import Examination, Operation, Underway
-from shm_daemon.web.site import Site
-from shm_daemon.web.working_out import RETRY_AFTER, workshop_of
+from shm_daemon.web.site import Site, held_documents
 
 router = APIRouter(tags=["operation"])
 
@@ -228,7 +227,7 @@ def _examination(request: Request, site: Site) -> Table | None:
 def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
     order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
     try:
-        found = workshop_of(request).wanted(order)
+        found = background_worker_of(request).wanted(order)
     except ShmError as error:
         return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
     return None if found is None else found.findings

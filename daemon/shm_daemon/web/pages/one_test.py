@@ -9,24 +9,24 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
-from shm.report import formatting, sheet_report
+from shm.report import formatting, modal_test_report
 from shm.report.colours import VERDICT_STYLES
-from shm.report.figures.sheet_response import point_name
-from shm.report.figures.sheet_spectra import shown_points
+from shm.report.figures.modal_test_response import point_name
+from shm.report.figures.modal_test_spectra import shown_points
 from shm.report.intervals import Interval
+from shm.report.modal_test_report import HEADLINES, name
 from shm.report.paper import Table, filled
 from shm.report.quality_table import overall
-from shm.report.sheet_report import HEADLINES, name
 from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
-from shm_daemon.web.address_of_test import test_json, test_page
-from shm_daemon.web.figures_of_test import TestFigure
+from shm_daemon.web.address import test_json, test_page
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.frame import page
-from shm_daemon.web.origin_of_test import origin, steps, superseded
+from shm_daemon.web.modal_test_figures import TestFigure
+from shm_daemon.web.modal_test_origin import origin, steps, superseded
+from shm_daemon.web.modal_test_view import AT_WORK, TestView
 from shm_daemon.web.tests import MOST_RESPONSES, View
-from shm_daemon.web.view_of_test import AT_WORK, TestView
-from shm_daemon.web.working_out import RETRY_AFTER
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
@@ -62,7 +62,9 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         before=before and (before, test_page(hanger_id, before)),
         after=after and (after, test_page(hanger_id, after)),
         results=filled(
-            sheet_report.modes(sheet), sheet_report.quality(sheet), sheet_report.set_aside(sheet)
+            modal_test_report.modes(sheet),
+            modal_test_report.quality(sheet),
+            modal_test_report.set_aside(sheet),
         ),
         charts=[(each, *_chart(view, each, chosen)) for each in view.figures()],
         points=[point_name(point) for point in points],
@@ -71,7 +73,7 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         document=test_json(hanger_id, view.stored.test.id),
         hits=_hit_tables(view),
         at_work=AT_WORK,
-        details=filled(sheet_report.notes(sheet), *_dropped(view), _conditions(view)),
+        details=filled(modal_test_report.notes(sheet), *_dropped(view), _conditions(view)),
         lineage=filled(origin(view), steps(view), superseded(view)),
     )
 
@@ -85,7 +87,7 @@ def _hits(request: Request, view: TestView) -> HTMLResponse:
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     """None where they are not worked out."""
-    whole = None if view.missing else view.workshop.kept(view.order)
+    whole = None if view.missing else view.background_worker.kept(view.order)
     return filled(whole.hits) if whole else None
 
 
@@ -97,7 +99,7 @@ def _dropped(view: TestView) -> tuple[Table, ...]:
 def _conditions(view: TestView) -> Table:
     if view.worked:
         return view.worked.conditions
-    found = sheet_report.conditions(view.as_stored)
+    found = modal_test_report.conditions(view.as_stored)
     return replace(found, rows=tuple(row for row in found.rows if row[0] not in _NOT_STORED))
 
 

@@ -1,0 +1,229 @@
+"""What takes seconds to work out, beside the requests that want it: one at a time, a few waiting.
+
+It runs in a process of its own that ends when nothing has been wanted for a while, so that neither
+a heavy file nor a crash of what reads it touches the interface. The latest results are kept in
+memory, within a limit.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from fastapi import Request
+
+from shm.errors import ShmError
+from shm_daemon.execution import children_ended, process_pool
+
+# Technical: each order takes seconds; the process goes when nobody looks at pages. Judgement: after
+# ten minutes it hangs, and who asks again within a minute is told why it failed.
+_MOST_WAITING = 8
+_MOST_KEPT_BYTES = 64_000_000
+_IDLE_S = 60.0
+_LONGEST_S = 600.0
+_FAILURE_LASTS_S = 60.0
+_LOOK_S = 0.2
+
+RETRY_AFTER = {"Retry-After": "2"}
+"""Seconds after which to ask again for what takes some of them to work out."""
+
+log = logging.getLogger(__name__)
+
+
+class Order(Protocol):
+    """What is wanted: equal orders have the same result. `make` runs in the other process."""
+
+    def __hash__(self) -> int: ...
+
+    def make(self) -> Sized: ...
+
+
+class Sized(Protocol):
+    """A result that knows about how much memory it takes."""
+
+    @property
+    def size_bytes(self) -> int: ...
+
+
+Made = TypeVar("Made", bound=Sized)
+
+
+@dataclass(frozen=True)
+class _Failure:
+    error: ShmError
+    at_s: float
+
+
+class BackgroundWorker(Generic[Made]):
+    """Makes what is ordered and keeps it. May be used from many threads."""
+
+    def __init__(
+        self,
+        longest_s: float = _LONGEST_S,
+        pool: Callable[[int], ProcessPoolExecutor] = process_pool,
+    ):
+        self._longest_s, self._pool = longest_s, pool
+        self._kept: OrderedDict[Order, Made] = OrderedDict()
+        self._failures: dict[Order, _Failure] = {}
+        self._waiting: OrderedDict[Order, None] = OrderedDict()
+        self._lost: Order | None = None
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._closed = False
+
+    def kept(self, order: Order) -> Made | None:
+        """What was made of an order already; begins nothing."""
+        with self._changed:
+            if order in self._kept:
+                self._kept.move_to_end(order)
+            return self._kept.get(order)
+
+    def wanted(self, order: Order) -> Made | None:
+        """What was made of an order; None while it is being worked on, or while many others wait.
+
+        Raises the ShmError with which it failed a short while ago.
+        """
+        with self._changed:
+            found = self.kept(order)
+            if found is not None:
+                return found
+            failure = self._failures.get(order)
+            if failure and time.monotonic() - failure.at_s < _FAILURE_LASTS_S:
+                raise failure.error.with_traceback(None)
+            if len(self._waiting) < _MOST_WAITING and not self._closed:
+                self._waiting[order] = None
+                self._begin()
+            return None
+
+    def close(self) -> None:
+        """Ends the work and its process."""
+        with self._changed:
+            self._closed, thread = True, self._thread
+            self._waiting.clear()
+            self._changed.notify_all()
+        if thread is not None:
+            thread.join()
+
+    def _begin(self) -> None:
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="workshop", daemon=True)
+            self._thread.start()
+        self._changed.notify_all()
+
+    def _work(self) -> None:
+        while self._shift():
+            pass
+
+    def _shift(self) -> bool:
+        """Works with one process until nothing is wanted, or the process is lost; whether to go on.
+
+        The order in work stays among those waiting, so that nobody begins it a second time.
+        """
+        with children_ended():
+            pool = self._pool(1)
+            try:
+                while (order := self._next()) is not None:
+                    if not self._made(pool, order):
+                        return not self._closed
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+        with self._changed:
+            if self._waiting and not self._closed:
+                return True
+            self._thread = None
+            return False
+
+    def _next(self) -> Order | None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closed, _IDLE_S)
+            return next(iter(self._waiting), None)
+
+    def _made(self, pool: ProcessPoolExecutor, order: Order) -> bool:
+        """Has an order made and notes what came of it; whether the process can be used further."""
+        try:
+            future: Future[Made] = pool.submit(order.make)  # type: ignore[arg-type]
+            self._await(future)
+            made = future.result(timeout=0)
+        except TimeoutError:
+            self._failed(order, _too_long(self._longest_s))
+            return False
+        except BrokenProcessPool:
+            self._tried_again(order)
+            return False
+        except ShmError as error:
+            self._failed(order, error)
+        except Exception:
+            log.exception("working out %r failed", order)
+            self._failed(order, _unexpected())
+        else:
+            self._keep(order, made)
+        return True
+
+    def _await(self, future: Future[Made]) -> None:
+        deadline = time.monotonic() + self._longest_s
+        while not self._closed and time.monotonic() < deadline:
+            if wait([future], timeout=_LOOK_S).done:
+                return
+
+    def _keep(self, order: Order, made: Made) -> None:
+        with self._changed:
+            self._waiting.pop(order, None)
+            self._failures.pop(order, None)
+            self._kept[order] = made
+            while sum(each.size_bytes for each in self._kept.values()) > _MOST_KEPT_BYTES:
+                if len(self._kept) == 1:
+                    break
+                self._kept.popitem(last=False)
+
+    def _tried_again(self, order: Order) -> None:
+        """An order fails whose process died twice.
+
+        Once may be no fault of its own: who ends all our processes often ends that one first, and
+        whoever asks in the moment before we end as well must not be told of a fault.
+        """
+        if self._lost != order:
+            self._lost = order
+            return
+        self._lost = None
+        self._failed(order, _died())
+
+    def _failed(self, order: Order, error: ShmError) -> None:
+        now = time.monotonic()
+        with self._changed:
+            if self._closed:  # that is why it was not made
+                return
+            self._waiting.pop(order, None)
+            fresh = {o: f for o, f in self._failures.items() if now - f.at_s < _FAILURE_LASTS_S}
+            self._failures = {**fresh, order: _Failure(error, now)}
+
+
+def background_worker_of(request: Request) -> BackgroundWorker[Any]:
+    """The background worker of the app, for all that is ordered there."""
+    background_worker = request.app.state.background_worker
+    assert isinstance(background_worker, BackgroundWorker)
+    return background_worker
+
+
+def _too_long(longest_s: float) -> ShmError:
+    return ShmError(
+        f"it took more than {longest_s:g} s and was given up.",
+        remedy="Have it written at leisure with `shm report`; see the log of the web interface.",
+    )
+
+
+def _died() -> ShmError:
+    return ShmError(
+        "the process that worked on it died.",
+        remedy="It may lack memory: see the log, and try again in a minute.",
+    )
+
+
+def _unexpected() -> ShmError:
+    return ShmError("an internal error.", remedy="The log of the web interface says more.")

@@ -1,0 +1,264 @@
+"""All that a test's page, its documents and its figures are made from, as far as it is at hand.
+
+The sheet of a stored test: at once as far as the store goes, whole from its raw file.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import NothingThere
+from shm.identify import Identification, Poles
+from shm.pipeline.lineage import identify_lineage
+from shm.pipeline.reporting import modal_test_report
+from shm.report.contents import ModalTestReport
+from shm.report.figures.modal_test_spectra import Shown, Spectrum
+from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust
+from shm.report.paper import Table
+from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
+from shm.store.archive import MODES_SUFFIX
+from shm_daemon.web.background_work import BackgroundWorker
+from shm_daemon.web.hangers import described
+from shm_daemon.web.modal_test_figures import FROM_RECORDS, MEMBERS, TestFigure
+
+AT_WORK = "The raw file is being identified once more; this comes in some seconds."
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure over HTTP: its document, None while it is worked out, and whether more will come.
+
+    `provisional` is what the store alone gives, while the rest is worked out.
+    """
+
+    document: dict[str, Any] | bytes | None
+    provisional: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class TestView:
+    """A stored test with its file, and the whole sheet of it where it was worked out lately."""
+
+    __test__ = False  # told to pytest
+
+    workspace: Workspace
+    store: Store
+    background_worker: BackgroundWorker[WorkedOut]
+    stored: StoredTest
+    recording: StoredRecording
+
+    @classmethod
+    def of(
+        cls,
+        workspace: Workspace,
+        store: Store,
+        background_worker: BackgroundWorker[Any],
+        hanger_id: int,
+        name: str,
+    ) -> TestView:
+        """Raises NothingThere for a hanger or a test that is none."""
+        stored = store.tests.named(described(workspace, hanger_id).id, name)
+        return cls(
+            workspace, store, background_worker, stored, store.recordings.get(stored.recording_id)
+        )
+
+    @property
+    def is_archived(self) -> bool:
+        return self.workspace.archive.holds(self.recording.file)
+
+    @property
+    def missing(self) -> str:
+        """Why there is no more than the store holds; empty where the raw file can be asked."""
+        name = self.recording.file.file_name
+        if name.lower().endswith(MODES_SUFFIX):
+            return (
+                f"{name} gave the modes of this test, not what they come from: no signals, hits, "
+                "responses or poles were ever here."
+            )
+        if not self.is_archived:
+            return (
+                f"The raw file {name} was taken out of the archive: signals, hits, poles and the "
+                "fit of the modes cannot be drawn. `shm archive fetch` brings a copy back."
+            )
+        return ""
+
+    @cached_property
+    def order(self) -> ModalTestOrder:
+        return order_of(self.workspace, self.recording, self.stored)
+
+    @cached_property
+    def worked(self) -> WorkedOut | None:
+        """The whole sheet, where it is at hand; begins nothing."""
+        return None if self.missing else self.background_worker.kept(self.order)
+
+    @cached_property
+    def sheet(self) -> ModalTestReport:
+        """The whole sheet without its records, or what the store has of it."""
+        return self.worked.sheet if self.worked else self.as_stored
+
+    @cached_property
+    def as_stored(self) -> ModalTestReport:
+        return stored_sheet(self.workspace, self.store, self.stored)
+
+    @property
+    def summary(self) -> str:
+        """One paragraph in plain words."""
+        if self.worked:
+            return self.worked.summary
+        return " ".join(part for part in (trust(self.as_stored), advice(self.as_stored)) if part)
+
+    def whole(self) -> WorkedOut | None:
+        """The whole sheet; None while it is worked out, which this begins.
+
+        Raises NothingThere where there is no more than the store holds, and the ShmError with
+        which working it out failed.
+        """
+        if self.missing:
+            raise NothingThere(self.missing)
+        return self.background_worker.wanted(self.order)
+
+    def shown(self, point: int = 0) -> Shown:
+        """What figures are drawn from, without any record."""
+        if self.worked:
+            return Shown(self.worked.sheet, self.worked.spectrum, point)
+        return Shown.of(self.as_stored, point)
+
+    def figures(self) -> tuple[TestFigure, ...]:
+        """Those that this test has, or may have once its raw file is identified once more."""
+        if not self.missing:
+            return MEMBERS
+        shown = self.shown()
+        return tuple(each for each in MEMBERS if each.source != "file" and each.member.draw(shown))
+
+    def figure(self, figure: TestFigure, point: int) -> Figure:
+        """A figure at the response of index `point`; raises as `whole`, and NothingThere."""
+        found = None if figure.source == "file" else figure.document(self.shown(point))
+        if self.worked:
+            return Figure(_there(self.worked.figures.get(figure.name) or found, figure))
+        if figure.source == "store" or (found is not None and self.missing):
+            return Figure(_there(found, figure))
+        if self.whole() is not None:  # made since we looked
+            return Figure(found, provisional=True)
+        return Figure(found, provisional=found is not None)
+
+
+def _there(found: dict[str, Any] | bytes | None, figure: TestFigure) -> dict[str, Any] | bytes:
+    if found is None:
+        raise NothingThere(f"{figure.title}: this test has nothing for it.")
+    return found
+
+
+def as_bytes(document: dict[str, Any] | bytes) -> bytes:
+    """A document as JSON."""
+    if isinstance(document, bytes):
+        return document
+    return json.dumps(document, allow_nan=False).encode()
+
+
+_NO_POLES = Poles(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class WorkedOut:
+    """A whole sheet but for its records, and what was made of those: words, tables, figures.
+
+    `figures` are documents as JSON bytes, by name; those that came to nothing are not among them.
+    """
+
+    sheet: ModalTestReport
+    spectrum: Spectrum | None
+    summary: str
+    hits: Table
+    dropped: Table
+    conditions: Table
+    figures: Mapping[str, bytes]
+
+    @property
+    def size_bytes(self) -> int:
+        found, documents = self.sheet.identification, self.figures.values()
+        arrays: list[np.ndarray[Any, Any]] = [
+            found.poles.order,
+            found.poles.frequency_hz,
+            found.poles.damping_ratio,
+        ]
+        if found.fit is not None:
+            arrays.append(found.fit)
+        if found.frequency_response is not None:
+            arrays.append(found.frequency_response.accelerance)
+        if self.spectrum is not None:
+            arrays.append(self.spectrum.values)
+        return sum(array.nbytes for array in arrays) + sum(map(len, documents))
+
+
+@dataclass(frozen=True)
+class ModalTestOrder:
+    """A sheet to be worked out: of which stored identification, and under which terms."""
+
+    folder: Path
+    hanger_id: int
+    name: str
+    stored: Lineage
+    terms: Lineage
+
+    def make(self) -> WorkedOut:
+        """Identifies the raw file once more; raises what `modal_test_report` does.
+
+        It runs in a process of its own: the workspace is opened anew.
+        """
+        workspace = Workspace.open(self.folder)
+        with workspace.store() as store:
+            return worked_out(modal_test_report(workspace, store, self.hanger_id, self.name))
+
+
+def order_of(
+    workspace: Workspace, recording: StoredRecording, stored: StoredTest
+) -> ModalTestOrder:
+    """What to work out of a test as it is stored and would be identified now."""
+    terms = identify_lineage(recording, stored.hanger, workspace)
+    return ModalTestOrder(workspace.folder, stored.hanger, stored.test.id, stored.lineage, terms)
+
+
+def worked_out(sheet: ModalTestReport) -> WorkedOut:
+    """The sheet with all that needs its records made of them."""
+    whole = Shown.of(sheet, point=0)
+    documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
+    return WorkedOut(
+        sheet=replace(sheet, records=()),
+        spectrum=whole.spectrum,
+        summary=summary(sheet),
+        hits=hits(sheet),
+        dropped=dropped(sheet),
+        # Where it comes from, the page says itself, with the steps.
+        conditions=conditions(replace(sheet, lineage={})),
+        figures={
+            name: json.dumps(document, allow_nan=False).encode()
+            for name, document in documents.items()
+            if document is not None
+        },
+    )
+
+
+def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> ModalTestReport:
+    """What the store knows of a test: no records, hits, poles and fit."""
+    response, settings = store.tests.frequency_response(stored), workspace.settings
+    found = Identification(
+        test=stored.test,
+        frequency_response=response,
+        hits=(),
+        dropped=(),
+        poles=_NO_POLES,
+        notes=stored.notes,
+        window_time_constant_s=math.nan,
+        quality=stored.quality,
+        set_aside=stored.set_aside,
+    )
+    band_hz = (settings.band_low_hz, settings.band_high_hz) if response is not None else None
+    return ModalTestReport(found, (), workspace.bridge.hanger(stored.hanger), band_hz)

@@ -1,0 +1,193 @@
+"""From the records of a test to its modes, the posterior, the best class, the cause of a gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from shm.api.reading import Tests, modal_tests
+from shm.errors import BadInput, UsageError
+from shm.gap import GapOptions, Progress
+from shm.gap import diagnose as diagnosed
+from shm.gap.contract import silent
+from shm.identify import Identification, IdentifyOptions
+from shm.identify.identification import identify as identified
+from shm.inference import METHODS, UpdateOptions, updating
+from shm.models import DESCRIPTION, build, competing_names
+from shm.settings import Settings, load_settings
+from shm.values import Diagnosis, FrequencyResponse, Hanger, Posterior, Recording, Selection
+
+Record: TypeAlias = Recording | FrequencyResponse
+_DEFAULT = Settings()
+
+
+def identify(
+    records: Record | Sequence[Record],
+    *,
+    hanger: Hanger | None = None,
+    test_id: str | None = None,
+    band_hz: tuple[float, float] = (_DEFAULT.band_low_hz, _DEFAULT.band_high_hz),
+    identifier: str = _DEFAULT.identifier,
+    cross_check: str = _DEFAULT.cross_check,
+    estimator: Literal["h1", "h2", "hv"] = "h1",
+    reference_force_n: float = _DEFAULT.reference_force_n,
+    frequency_allowance: float = _DEFAULT.frequency_allowance,
+    mains_hz: float = _DEFAULT.mains_hz,
+    window_time_constant_s: float = math.inf,
+) -> Identification:
+    """The modes of one test, each with its standard deviations, and how they were found.
+
+    `records` are those of one test: hits, set-ups, or frequency responses. The description of the
+    `hanger`, where known, helps to number the modes. `test_id` names the test; left out, the name
+    of its first file. Modes are looked for within `band_hz`. `identifier` and `cross_check` are
+    names of `shm.identify.IDENTIFIERS` (`ssi`, `ssi-input`, `frf`; the latter also `none`).
+    `estimator` of the frequency response allows for noise in the responses (`h1`), the force
+    (`h2`) or both (`hv`). A hit of `reference_force_n` has amplitude 1. `frequency_allowance` is
+    the part of a frequency by which it differs from test to test unseen. `window_time_constant_s`
+    is that of an exponential window already in given frequency responses.
+
+    `Identification.test` holds the modes; beside it stand quality, hits, the frequency response and
+    what was dropped and why. Raises BadInput where the records cannot be used together or are of
+    another hanger, NotIdentifiable where no mode can be trusted, UsageError for an unknown name.
+
+    Example:
+        >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
+        >>> [(mode.plane, mode.order, mode.frequency_hz) for mode in test.test.modes[:2]]
+        [('transverse', 1, 5.83), ('transverse', 2, 14.17)]
+    """
+    given = [records] if isinstance(records, Recording | FrequencyResponse) else list(records)
+    if not given:
+        raise UsageError("no record to identify modes in.", remedy="Give at least one.")
+    options = IdentifyOptions(
+        band_low_hz=band_hz[0],
+        band_high_hz=band_hz[1],
+        identifier=identifier,
+        cross_check=cross_check,
+        estimator=estimator,
+        reference_force_n=reference_force_n,
+        frequency_allowance=frequency_allowance,
+        mains_hz=mains_hz,
+        window_time_constant_s=window_time_constant_s,
+    )
+    name = test_id or Path(given[0].source).stem
+    found = identified(given, options, test_id=name, hanger=hanger)
+    return found if hanger is None else _of(found, hanger, given[0].source)
+
+
+def _of(found: Identification, hanger: Hanger, source: str) -> Identification:
+    """The test as one of `hanger`, where its records do not say that it is of another."""
+    named = found.test.hanger
+    if named not in (None, hanger.id):
+        raise BadInput(
+            f"the file says hanger {named}, the description is of hanger {hanger.id}.",
+            file=source,
+            remedy="Give the description of its hanger, or correct the file.",
+        )
+    return replace(found, test=replace(found.test, hanger=hanger.id))
+
+
+def update(
+    tests: Tests,
+    hanger: Hanger,
+    model: str = "beam2",
+    *,
+    seed: int = 1,
+    samples: int = 1000,
+    repeat: int = 1,
+    method: str = METHODS[0],
+    priors: str = DESCRIPTION,
+    progress: Progress = updating.silent,
+) -> Posterior:
+    """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
+
+    `model` is a name of `shm.models.MODELS` (`beam1`, `beam2`, `beam3`, `s1`, `s2`, `solid0`,
+    `solid1`, `solid2`), or a baseline with an adopted effect (`beam1+point_mass@everywhere`).
+    `priors` say what is possible before the test: by the hanger's `description` (tension from slack
+    to 5 times nominal, ends from pinned to clamped, the tolerances of its `scatter`), or by the
+    `thesis`: its ranges, an exact description and f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2),
+    thesis (4.5), with the unknown fractional model error sigma and the identification's standard
+    deviation sd. With the thesis's, `repeat` counts the data set N_D times and `method` may be any
+    of `shm.inference.METHODS`. `progress` hears a label and the fraction done.
+
+    `Posterior.samples` (samples, parameters) are equally weighted draws, `Posterior.tension_n`
+    (samples,) is in N; its interval is absolute, `Posterior.repeatability_sd_n` is for shifts and
+    `Posterior.caveats` say what keeps it from being taken at its word. Raises UsageError where the
+    class does not apply to the hanger, BadInput where a test has no modes or conditions that the
+    class cannot describe.
+
+    Example:
+        >>> posterior = shm.update(test, hanger, model="beam2", seed=1)
+        >>> posterior.tension_n.mean(), posterior.tension_n.std()
+        (711000.0, 4000.0)
+    """
+    options = UpdateOptions(samples, seed, repeat, method)
+    return updating.update(modal_tests(tests), build(model, hanger, priors), options, progress)
+
+
+def select(
+    tests: Tests,
+    hanger: Hanger,
+    models: Sequence[str] | None = None,
+    *,
+    seed: int = 1,
+    samples: int = 1000,
+    repeat: int = 1,
+    method: str = METHODS[0],
+    priors: str = DESCRIPTION,
+    progress: Progress = updating.silent,
+) -> Selection:
+    """Model classes compared by their evidence, the most probable first.
+
+    The classes are equally probable beforehand, thesis (4.15) to (4.17). Without `models` they are
+    those of the setting `models` that apply to this hanger (`shm.models.applicable` says why
+    another does not). `Selection.averaged(hanger.limits)` is the tension over all of them. The
+    other options are those of `update`. Raises UsageError where one of `models` does not apply,
+    BadInput as `update` does.
+
+    Example:
+        >>> choice = shm.select(test, hanger, models=["beam1", "beam2"])
+        >>> choice.selected.model, choice.probabilities
+        ('beam2', (0.98, 0.02))
+    """
+    usual = () if models else competing_names(hanger, load_settings().model_names)
+    classes = [build(name, hanger, priors) for name in models or usual]
+    options = UpdateOptions(samples, seed, repeat, method)
+    return updating.select(modal_tests(tests), classes, options, progress)
+
+
+_OF_GAP = GapOptions()
+
+
+def diagnose(
+    tests: Tests,
+    hanger: Hanger,
+    baseline: str = _OF_GAP.baseline,
+    *,
+    without: Sequence[str] = _OF_GAP.without,
+    hold_out: Sequence[str] = _OF_GAP.hold_out,
+    draws: int = _OF_GAP.draws,
+    seed: int = _OF_GAP.seed,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+
+    `baseline` is the model class whose gap is diagnosed. `without` are effects taken out of the
+    catalogue; `hold_out` what is left out of the fit and predicted: ids of tests or orders of modes
+    (empty: every one in turn). `draws` are kept of each posterior. `progress` hears a label and the
+    fraction done.
+
+    The probabilities of `Diagnosis.causes`, of no gap and of something unknown add to 1;
+    `Diagnosis.leading` is the likeliest cause, None where none leads; tensions are in N, residuals
+    in percent of a frequency. Raises BadInput where the tests cannot be used, UsageError for a
+    model class, effect, test or order that is not there.
+
+    Example:
+        >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")
+        >>> diagnosis.leading.effect
+        'point_mass'
+    """
+    options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
+    return diagnosed(modal_tests(tests), hanger, options, progress)

@@ -1,0 +1,246 @@
+"""From evidences to probabilities: Bayes' rule, once.
+
+    P(h | data) ~ prior(h) x evidence(h) x P(misfit | h)
+    P(cause | data) = sum over h of P(cause | h) P(h | data)
+
+Hypotheses h are families (one effect or pair, wherever it may act), each with or without something
+unknown beside it, and something unknown that passes for a family. A family has the same prior
+however many variants it has, so that an effect does not become likelier by being tried in more
+places (Scott and Berger, Ann. Stat. 38, 2010); its evidence is the mean over them. The misfit (a
+p-value) is what the evidence does not hold: whether even the likeliest explanation fits
+(`probabilities`). What a hypothesis is in truth, P(cause | h), trials have taught
+(`calibration.toml`): a pair with a minor second cause is for the most part one cause with an error
+of its law (`without_minor_cause` in `shm.gap.attribution`), and a free remainder sometimes a cause
+that was not found (`undetected_share`); every other h is what its name says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shm.gap.calibration import CALIBRATION
+from shm.gap.contract import Fit, Hypothesis, Method
+from shm.values import FloatArray
+
+# Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
+# than two. Blind trials plant the same mix; where it is another, odds are off by the ratio.
+NO_GAP = 0.25
+SINGLE = 0.5
+PAIR = 0.125
+UNKNOWN = 0.125
+
+AND_UNKNOWN = PAIR / (SINGLE + PAIR) * UNKNOWN / (SINGLE + UNKNOWN)
+"""How often something unknown comes with an effect or a pair, to how often these come alone: as
+often as a second cause comes at all, and as seldom as a cause is unknown."""
+
+LEAST_P_VALUE = 1e-4
+"""Of smaller ones no more is known than that they are small: tails are not that normal."""
+
+EVEN = 0.2
+"""Judgement: so much of what mimics pairs is shared evenly by all, as what is unknown need not
+resemble the catalogue's effects, from which the counts are. At 0 a pair that never led falsely
+would be claimed without doubt; at 1 the counts would say nothing."""
+
+_SENSORS = "sensor_misalignment"
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredHypothesis:
+    """A hypothesis with its evidence; `fit` is None where screening was enough.
+
+    `log_mimic` is the log evidence of something unknown that passes for its effects, None where
+    their laws were not looked at. `draws` (n, d) are of the posterior by all laws.
+    `log_fit` is the log likelihood at its best, less what the baseline's own parameters and the
+    bar's deviations pay there for lying off their priors: a baseline that fits by an unlikely bar
+    fits less well.
+    """
+
+    hypothesis: Hypothesis
+    log_evidence: float
+    log_fit: float
+    fit: Fit | None = None
+    log_mimic: float | None = None
+    draws: FloatArray | None = None
+
+    @property
+    def posterior(self) -> Fit | None:
+        """The fit by all laws of its effects: what it says of parameters."""
+        if self.fit is None or self.draws is None:
+            return self.fit
+        return replace(self.fit, draws=self.draws)
+
+    @property
+    def method(self) -> Method:
+        return self.fit.method if self.fit is not None else "screened"
+
+    @classmethod
+    def fitted(cls, fit: Fit, common: int) -> ScoredHypothesis:
+        """Of a fit whose first `common` parameters are those of the baseline and the bar."""
+        unlikely = float(np.sum(fit.z[:common] ** 2)) / 2
+        return cls(fit.hypothesis, fit.log_evidence, fit.log_fit - unlikely, fit)
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """What was tried of one effect, or one pair, wherever it may act, the best first.
+
+    `log_mimic` is the log evidence of something unknown that passes for it, `mimic_odds` the
+    odds of that against the family itself, before any data.
+    """
+
+    name: str
+    tried: tuple[ScoredHypothesis, ...]
+    log_evidence: float
+    log_mimic: float
+    log_prior: float
+    mimic_odds: float
+
+    @property
+    def best(self) -> ScoredHypothesis:
+        return self.tried[0]
+
+    @property
+    def flexible(self) -> bool:
+        return self.best.hypothesis.flexible
+
+    @property
+    def effects(self) -> int:
+        return len(self.best.hypothesis.effects)
+
+
+def families(tried: Sequence[ScoredHypothesis], variants: dict[str, int]) -> tuple[Family, ...]:
+    """The families of what was tried, each with its prior, the likeliest first.
+
+    `variants` says how many variants each effect has; those of a pair that were not tried count as
+    if they had no evidence, and so does a pair that was not tried at all.
+    """
+    kinds: dict[tuple[tuple[str, ...], bool], list[ScoredHypothesis]] = {}
+    for each in tried:
+        names = tuple(sorted(name for name, _ in each.hypothesis.effects))
+        kinds.setdefault((names, each.hypothesis.flexible), []).append(each)
+    made = [_family(members, variants) for members in kinds.values()]
+    return tuple(sorted(made, key=lambda each: -(each.log_evidence + each.log_prior)))
+
+
+def probabilities(candidates: Sequence[Family], p_value: float = 1.0) -> tuple[FloatArray, float]:
+    """Of each family, (families,), and of something unknown that passes for one of them.
+
+    All add to 1. `p_value` is that of the likeliest family without something unknown: an effect
+    that errs in its law may be given what it does not explain, while the flexible remainder pays
+    for every form that it could take, so of a bad fit the evidence alone says too little.
+    """
+    evidence, mimic, prior, odds = (
+        np.array([getattr(each, name) for each in candidates])
+        for name in ("log_evidence", "log_mimic", "log_prior", "mimic_odds")
+    )
+    bad = misfit_odds(p_value)
+    mimics = CALIBRATION.mimics_one + CALIBRATION.mimics_two
+    kept = np.array([bad * (1 - mimics) if each.flexible else 1.0 for each in candidates])
+    top = float((evidence + prior).max())
+    weight = kept * np.exp(evidence + prior - top)
+    unknown = bad * float(np.sum(odds * np.exp(mimic + prior - top)))
+    whole = weight.sum() + unknown
+    return np.asarray(weight / whole), unknown / whole
+
+
+def misfit_odds(p_value: float) -> float:
+    """By how much a p-value raises the odds of something unknown, from 1.
+
+    Where the likeliest explanation is right, so small a p-value is that much rarer than where
+    something else is, at most: -1 / (e p ln p) (Sellke, Bayarri and Berger, Am. Stat. 55, 2001).
+    """
+    p = max(p_value, LEAST_P_VALUE)
+    return max(1.0, -1 / (np.e * p * np.log(p))) if p < 1 / np.e else 1.0
+
+
+def undetected_share(candidates: Sequence[Family], chances: FloatArray) -> FloatArray:
+    """Chances (families,) by which a remainder rules out no cause beyond what may be missed.
+
+    Of what the causes gain, each has its share by what speaks for it: it was tried near its best.
+    """
+    unknown = np.array([each.flexible for each in candidates])
+    cause = np.array([each.effects > 0 for each in candidates]) & ~unknown
+    least = CALIBRATION.undetected_share * chances[unknown | cause].sum()
+    if not cause.any() or chances[cause].sum() >= least:
+        return chances
+    speaks = np.array([each.log_evidence + each.log_prior for each in candidates])
+    share = np.exp(np.where(cause, speaks - logsumexp(speaks[cause]), -np.inf))
+    left = (chances[unknown | cause].sum() - least) / chances[unknown].sum()
+    return np.asarray(np.where(cause, least * share, chances * np.where(unknown, left, 1)))
+
+
+def log_prior(hypothesis: Hypothesis, variants: dict[str, int]) -> float:
+    """Of a hypothesis with its variant: its family's, shared evenly by the family's variants."""
+    shared = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
+    return float(np.log(_prior(hypothesis, len(variants)) / shared))
+
+
+def _family(members: Sequence[ScoredHypothesis], variants: dict[str, int]) -> Family:
+    ordered = tuple(sorted(members, key=lambda each: -each.log_evidence))
+    hypothesis = ordered[0].hypothesis
+    possible = np.prod([variants[name] for name, _ in hypothesis.effects] or [1])
+    evidence = [each.log_evidence for each in ordered]
+    mimic = [e.log_evidence if e.log_mimic is None else e.log_mimic for e in ordered]
+    log_evidence, log_mimic = (
+        float(logsumexp(each) - np.log(possible)) for each in (evidence, mimic)
+    )
+    log_prior = float(np.log(_prior(hypothesis, len(variants))))
+    odds = _mimic_odds(hypothesis, variants)
+    return Family(hypothesis.name, ordered, log_evidence, log_mimic, log_prior, odds)
+
+
+def _mimic_odds(hypothesis: Hypothesis, catalogue: Collection[str]) -> float:
+    names = [name for name, _ in hypothesis.effects]
+    if hypothesis.flexible or not names:
+        return 0.0
+    if len(names) == 1:
+        return CALIBRATION.mimics_one * UNKNOWN / SINGLE
+    return CALIBRATION.mimics_two * UNKNOWN / PAIR * imitation(names, catalogue)
+
+
+def _prior(hypothesis: Hypothesis, effects: int) -> float:
+    count = len(hypothesis.effects)
+    if count == 0:
+        return UNKNOWN if hypothesis.flexible else NO_GAP
+    known = SINGLE / effects if count == 1 else PAIR / max(1, effects * (effects - 1) // 2)
+    return AND_UNKNOWN * known if hypothesis.flexible else known
+
+
+def imitation(effects: Collection[str], catalogue: Collection[str]) -> float:
+    """How often something unknown passes for this pair, to the mean over pairs of `catalogue`.
+
+    Some effects can act anywhere and take many forms: a mass and a loss of section together come
+    near to almost anything. Others can do one thing only. So of what passes for a pair, a few pairs
+    have the most: each as the product of what its effects were seen to do in blind trials.
+    """
+    pair, names = frozenset(effects), frozenset(catalogue)
+    if (freedoms := _sum_of_freedoms(names)) == 0:
+        return 1.0
+    pairs = len(names) * (len(names) - 1) / 2
+    turned = _with_turned_sensors(names)
+    known = (1 - sum(turned.values())) * _freedom(pair) / freedoms + turned.get(pair, 0.0)
+    return EVEN + (1 - EVEN) * known * pairs
+
+
+def _with_turned_sensors(names: frozenset[str]) -> dict[frozenset[str], float]:
+    """Skewed principal axes do what turned sensors do with ends that yield in one plane."""
+    led, of = CALIBRATION.with_turned_sensors, CALIBRATION.mimicking_pairs
+    pairs = {frozenset((_SENSORS, end)): count / of for end, count in led.items()}
+    return {pair: share for pair, share in pairs.items() if pair <= names}
+
+
+def _freedom(pair: Collection[str]) -> int:
+    one, other = pair
+    led = CALIBRATION.in_mimicking_pairs
+    return led.get(one, 0) * led.get(other, 0)
+
+
+@cache
+def _sum_of_freedoms(names: frozenset[str]) -> int:
+    return sum(_freedom(pair) for pair in combinations(names, 2))

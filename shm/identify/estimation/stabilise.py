@@ -1,0 +1,57 @@
+"""What every identifier does with the poles of its models: the modes among them, and the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.identify.contract import Dropped, Finding, Poles
+from shm.identify.estimation.candidates import diagram, resolved, stable_candidates
+from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.repeats import LEAST_HITS, find_again, proven
+from shm.identify.options import IdentifyOptions
+
+_FINAL_ORDERS = 5  # judgement: the median of five bears two strays; each costs a fit a hit
+
+
+def final_orders(orders: Sequence[int]) -> list[int]:
+    """The orders that estimates are taken from: up to five, spread over the upper half."""
+    upper = [order for order in orders if 2 * order >= max(orders)]
+    picks = np.linspace(0, len(upper) - 1, _FINAL_ORDERS).round().astype(int)
+    return [upper[pick] for pick in sorted(set(picks.tolist()))]
+
+
+def stabilised(
+    sets: Sequence[PoleSet],
+    without_each_hit: Sequence[Sequence[PoleSet]],
+    seconds: float,
+    options: IdentifyOptions,
+) -> Finding:
+    """The modes among the poles of models of rising order, `sets`.
+
+    `without_each_hit` holds the poles at the final orders with each hit left out in turn; empty
+    where there is one hit. `seconds` of ring-down decide what can be told apart.
+
+    Every pole is in a mode's track or counted with the reason why not.
+    """
+    orders = final_orders([poles.order for poles in sets])
+    # Where hits cannot prove a mode, the orders must: noise seldom makes a pole at nearly all.
+    gaps = len(without_each_hit) >= LEAST_HITS
+    candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
+    single, doubles = resolved(candidates, seconds)
+    final = [poles for poles in sets if poles.order in orders]
+    again = find_again(single, without_each_hit)
+    told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
+    modes, kept, doubtful = proven(told, again, options)
+    lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
+    followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
+    return Finding(modes, (*unstable, followed, *doubles, *doubtful), diagram(sets, kept, options))
+
+
+def nothing_moves(hits: int) -> Finding:
+    """The finding where no sensor moves after any of `hits`."""
+    nothing = np.empty(0)
+    dropped = (Dropped("ring-downs", hits, "nothing moves in them"),)
+    return Finding((), dropped, Poles(nothing, nothing, nothing, nothing.astype(bool)))

@@ -1,0 +1,146 @@
+"""What rings in a test without being a bending mode of the hanger, and how that is known.
+
+A tone is known by its frequency and by not decaying. Anything else is foreign only if it fits no
+order of the hanger: a string's modes are near multiples of each other, too. What is suspicious
+apart from that (a multiple with the shape of its base, a damping unlike the others') is a doubt,
+which decides where the order does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from shm.identify.contract import FoundMode, Tone
+from shm.identify.estimation.poles import modal_assurance
+from shm.values import FloatArray, ForeignMode
+
+MULTIPLES = (2, 3)  # judgement: rattling contacts give the first two, higher ones are fainter
+_MULTIPLE_TOLERANCE = 5e-4  # judgement: it is exact but for the drift within a test
+_TONE_TOLERANCE = 2e-3  # half of what a grid moves in a bad hour, see `tones`
+_STANDARD_DEVIATIONS = 3.0  # 99.7 % of a normal distribution
+# Modes of a hanger have 0.73 of the others' damping and more, the median planted tone 0.003:
+# identify_limits.py (docs/trials/identification_benchmarks.md); in between is judgement
+_STEADY = 0.1
+# judgement: costs, added to the misfit. By ASIDE_COST, 12, an undoubted mode is set aside 3.5
+# tolerances off its order; a multiple 3.1 off (by many points 2.1), a steady one 2.0, one of odd
+# damping 3.0: dampings of one hanger differ by a factor of three.
+_LIKE = 0.9
+_DOUBT_OF_MULTIPLE = 2.5
+_MOST_POINTS = 3.0
+_DOUBT_OF_STEADY = 8.0
+_MOST_DOUBT_OF_DAMPING = 3.0
+_ORDINARY_DAMPING = math.log(3.0)
+_LEAST_MODES = 4  # judgement: of fewer a median says little
+_NEAR = 0.03  # judgement: words alone depend on it
+
+
+def without_tones(
+    found: Sequence[FoundMode], tones: Sequence[Tone]
+) -> tuple[list[FoundMode], list[ForeignMode]]:
+    """The modes that are none of the `tones`, and those that are.
+
+    A mode is a tone where it lies at one and hardly decays beside the other modes.
+    """
+    rest, aside = [], []
+    for mode in found:
+        tone = next((tone for tone in tones if _lies_at(mode, tone)), None)
+        if tone and _is_steady(mode, found):
+            reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}) and hardly decays."
+            aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
+        else:
+            rest.append(mode)
+    return rest, aside
+
+
+def doubts(modes: Sequence[FoundMode]) -> FloatArray:
+    """The cost of taking each of `modes` for one of the hanger, (modes,)."""
+    return np.array(
+        [
+            _doubt_of_multiple(mode, modes)
+            + (_DOUBT_OF_STEADY if _is_steady(mode, modes) else _doubt_of_damping(mode, modes))
+            for mode in modes
+        ]
+    )
+
+
+def explained(
+    mode: FoundMode, modes: Sequence[FoundMode], hanger_modes: Sequence[FoundMode]
+) -> ForeignMode:
+    """A mode that fits no order, as what it is; `modes` are all, `hanger_modes` those that do."""
+    frequency_hz, damping = mode.frequency_hz, mode.damping_ratio
+    if _is_steady(mode, modes):
+        reason = f"It hardly decays (damping {damping:.4%}): something that runs drives it."
+        return ForeignMode("tone", frequency_hz, damping, reason)
+    base = base_of(mode, hanger_modes)
+    if base:
+        fold, of = base
+        reason = (
+            f"It is {fold} times the mode at {of.frequency_hz:.3f} Hz, and no order of the hanger "
+            "lies there."
+        )
+        return ForeignMode("harmonic", frequency_hz, damping, reason)
+    return ForeignMode("deck", frequency_hz, damping, _fits_nothing(mode, hanger_modes))
+
+
+def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode] | None:
+    """The stronger mode of like shape of which this is a multiple, and which."""
+    found = [
+        (fold, base)
+        for fold, base in product(MULTIPLES, modes)
+        if _is_multiple(mode, fold, base)
+        and not mode.acceleration_m_s2 > base.acceleration_m_s2
+        and modal_assurance(mode.shape, base.shape) >= _LIKE
+    ]
+    return found[0] if found else None
+
+
+def _is_multiple(mode: FoundMode, fold: int, base: FoundMode) -> bool:
+    sd = math.hypot(np.nan_to_num(mode.frequency_sd_hz), fold * np.nan_to_num(base.frequency_sd_hz))
+    expected = fold * base.frequency_hz
+    allowed = max(_MULTIPLE_TOLERANCE * expected, _STANDARD_DEVIATIONS * sd)
+    return abs(mode.frequency_hz - expected) <= allowed
+
+
+def _lies_at(mode: FoundMode, tone: Tone) -> bool:
+    allowed = max(
+        _TONE_TOLERANCE * tone.frequency_hz,
+        _STANDARD_DEVIATIONS * float(np.nan_to_num(mode.frequency_sd_hz)),
+    )
+    return abs(mode.frequency_hz - tone.frequency_hz) <= allowed
+
+
+def _is_steady(mode: FoundMode, modes: Sequence[FoundMode]) -> bool:
+    """Whether its damping is a small part of the others'."""
+    others = [each.damping_ratio for each in modes if each is not mode]
+    return bool(others) and mode.damping_ratio < _STEADY * float(np.median(others))
+
+
+def _doubt_of_multiple(mode: FoundMode, modes: Sequence[FoundMode]) -> float:
+    """More for a shape like the base's at many points, which a mode of its own would not have."""
+    if base_of(mode, modes) is None:
+        return 0.0
+    return _DOUBT_OF_MULTIPLE * min(max(len(mode.shape) / 2, 1.0), _MOST_POINTS)
+
+
+def _doubt_of_damping(mode: FoundMode, modes: Sequence[FoundMode]) -> float:
+    ratios = [each.damping_ratio for each in modes if each.damping_ratio > 0]
+    if len(ratios) < _LEAST_MODES or not mode.damping_ratio > 0:
+        return 0.0
+    away = math.log(mode.damping_ratio / float(np.median(ratios))) / _ORDINARY_DAMPING
+    return min(away**2, _MOST_DOUBT_OF_DAMPING)
+
+
+def _fits_nothing(mode: FoundMode, hanger_modes: Sequence[FoundMode]) -> str:
+    near = min(
+        hanger_modes, key=lambda each: abs(each.frequency_hz - mode.frequency_hz), default=None
+    )
+    if near and abs(near.frequency_hz / mode.frequency_hz - 1) < _NEAR:
+        return (
+            f"A hanger has one mode a plane near {near.frequency_hz:.2f} Hz, and another fits "
+            "better: this is a neighbour's motion, or the other plane's mode seen askew."
+        )
+    return "No order of the hanger lies there: the bridge or another neighbour moves it."

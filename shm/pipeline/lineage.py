@@ -1,0 +1,176 @@
+"""What the steps agree on: which classes compete, which seed, how a refusal reads, and what a
+result was made from: files, checksums, settings, software.
+
+Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from datetime import datetime
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from shm.errors import BadInput, ShmError
+from shm.models import Model, build, competing_names
+from shm.read import Limits
+from shm.settings import TABLE, Settings
+from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
+from shm.values import Hanger, Posterior
+
+_IDENTIFY_SETTINGS = (
+    "band_low_hz",
+    "band_high_hz",
+    "identifier",
+    "cross_check",
+    "estimator",
+    "reference_force_n",
+    "frequency_allowance",
+    "mains_hz",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """The posterior of a test whose tension was read, too; `own`: of this hanger, not a sibling."""
+
+    posterior: Posterior
+    own: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """How an update is made: samples, seed, priors, and what a measured tension has taught."""
+
+    samples: int
+    seed: int
+    priors: str
+    taught: Taught | None = None
+
+
+def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -> tuple[Model, ...]:
+    """The selected class of a hanger, or all that compete where none is selected yet.
+
+    Raises UsageError where the selected class does not apply to the hanger, or none does.
+    """
+    if hanger.id in selected:
+        return (build(selected[hanger.id], hanger, settings.priors),)
+    names = competing_names(hanger, settings.model_names)
+    return tuple(build(name, hanger, settings.priors) for name in names)
+
+
+def identify_settings(settings: Settings) -> dict[str, Any]:
+    """The settings that decide what an identification gives, by name."""
+    return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
+
+
+def read_limits(settings: Settings) -> Limits:
+    """What one file may hold and what reading it may cost."""
+    return Limits(**{each.name: getattr(settings, each.name) for each in fields(Limits)})
+
+
+def identify_lineage(
+    recording: StoredRecording, hanger_id: int | None, workspace: Workspace
+) -> Lineage:
+    """What the tests of a recording depend on: file, sidecar, settings, description, version."""
+    bridge = workspace.bridge
+    inputs = [recording.file.sha256, recording.file.sidecar_as]
+    terms = {
+        **identify_settings(workspace.settings),
+        "hanger": [asdict(hanger) for hanger in bridge.hangers if hanger.id == hanger_id],
+        "disturbances": [asdict(each) for each in bridge.disturbances],
+    }
+    return Lineage.of(inputs, terms)
+
+
+def diagnosis_lineage(
+    tests: Sequence[StoredTest], hanger: Hanger, terms: Mapping[str, Any]
+) -> Lineage:
+    """What a diagnosis depends on: tests, description, options, version."""
+    inputs = [[test.key, test.lineage.columns] for test in tests]
+    return Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
+
+
+def update_terms(
+    hanger: Hanger,
+    models: Sequence[str],
+    tests: Sequence[StoredTest],
+    settings: Settings,
+    known: Posterior | None = None,
+    taught: Taught | None = None,
+) -> tuple[Terms, Lineage]:
+    """Terms and lineage of an update; the seed depends on what is updated alone."""
+    seed = seed_of(settings.seed, [test.key for test in tests])
+    terms = Terms(settings.samples, seed, settings.priors, taught)
+    plain = {"samples": terms.samples, "seed": seed, "priors": terms.priors}
+    inputs: list[object] = [[test.key, test.lineage.columns] for test in tests]
+    from_others = [known, taught.posterior if taught else None]
+    inputs += [hashlib.sha256(each.samples.tobytes()).hexdigest() for each in from_others if each]
+    described = asdict(hanger)
+    settled = {"models": list(models), **plain, "hanger": described}
+    return terms, Lineage.of(inputs, settled, described)
+
+
+def seed_of(seed: int, keys: Sequence[str]) -> int:
+    """The seed of one result: the same in whatever order and wherever it is computed."""
+    text = "\n".join([str(seed), *sorted(keys)])
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4])
+
+
+def reason_document(
+    error: BaseException, recording: StoredRecording, time: datetime
+) -> dict[str, Any]:
+    """Why a file is refused: which file, line and channel, what is wrong, what to do."""
+    reason: dict[str, Any] = {
+        "schema": "shm.reason/1",
+        "file": recording.file.file_name,
+        "line": None,
+        "channel": None,
+        "message": f"internal error: {error!r}.",
+        "remedy": "Report this with the log, then drop the file again.",
+        "time": time,
+        "sha256": recording.file.sha256,
+    }
+    if isinstance(error, ShmError):
+        reason |= {"message": error.message, "remedy": error.remedy}
+    if isinstance(error, BadInput):
+        file = Path(error.file).name or recording.file.file_name
+        reason |= {"file": file, "line": error.line, "channel": error.channel or None}
+    return reason
+
+
+IDENTIFY_SETTINGS = tuple(identify_settings(Settings()))
+_ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
+_LIBRARIES = ("numpy", "scipy", "pyOMA-2", "emcee")
+
+
+def test_lineage(store: Store, test: StoredTest) -> dict[str, str]:
+    """The file of a test, the checksums of what its modes come from, the software."""
+    file = store.recordings.get(test.recording_id)
+    return {
+        "file_name": file.file.file_name,
+        "file_sha256": file.file.sha256,
+        "received": f"{file.received_at:%Y-%m-%d %H:%M} UTC, {file.file.size_bytes} bytes",
+        "input_sha256": test.lineage.input_sha256,
+        "settings_sha256": test.lineage.settings_sha256,
+        "version": test.lineage.version,
+        "software": software(),
+    }
+
+
+@cache
+def software() -> str:
+    """`Python 3.11.2, numpy 2.4.1 ...`: what computes here."""
+    libraries = [f"{name} {version(name)}" for name in _LIBRARIES]
+    return ", ".join((f"Python {platform.python_version()}", *libraries))
+
+
+def settings_words(settings: Settings, names: Sequence[str] = _ALL) -> dict[str, str]:
+    """The settings that decide the numbers of a report, each with its unit."""
+    units = {row.name: row.unit for row in TABLE}
+    return {name: f"{getattr(settings, name)} {units[name]}".rstrip() for name in names}

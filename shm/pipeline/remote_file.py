@@ -1,0 +1,63 @@
+"""A recording that is carried to a machine which does not see the archive."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol, Self
+
+from shm.errors import StoreError
+from shm.read import sidecar_path
+from shm.store import Archive, ReceivedFile
+
+
+class Opens(Protocol):
+    """What shows a received file under the name it came with: the archive, or a remote file."""
+
+    def opened(self, file: ReceivedFile) -> AbstractContextManager[Path]:
+        """The file, its sidecar beside it, while the context lasts; raises StoreError."""
+
+
+@dataclass(frozen=True)
+class RemoteFile:
+    """The bytes of a file and of its sidecar; None where the archive has none."""
+
+    content: bytes | None = field(repr=False)
+    sidecar: bytes | None = field(repr=False)
+    damage: str = ""
+
+    @classmethod
+    def of(cls, archive: Archive, file: ReceivedFile, most_bytes: int) -> Self:
+        """Packs an archived file; one that is larger will be refused, and is not packed."""
+        fits = archive.holds(file) and file.size_bytes <= most_bytes
+        if fits:
+            try:
+                archive.refuse_damaged(file)
+            except StoreError as error:
+                return cls(None, None, str(error))
+        content, sidecar = (
+            _bytes(archive, part, fits) for part in (file.archived_as, file.sidecar_as)
+        )
+        return cls(content, sidecar)
+
+    @contextmanager
+    def opened(self, file: ReceivedFile) -> Iterator[Path]:
+        """The file as the archive would show it, in a folder of its own."""
+        if self.content is None:
+            raise StoreError(
+                self.damage or f"{file.file_name} is not in the archive.",
+                remedy="" if self.damage else "Drop the file again.",
+            )
+        with tempfile.TemporaryDirectory(prefix="shm-") as folder:
+            path = Path(folder) / Path(file.file_name).name
+            path.write_bytes(self.content)
+            if self.sidecar is not None:
+                sidecar_path(path).write_bytes(self.sidecar)
+            yield path
+
+
+def _bytes(archive: Archive, relative: str | None, fits: bool) -> bytes | None:
+    return (archive.folder / relative).read_bytes() if fits and relative is not None else None

@@ -1,0 +1,233 @@
+"""Force and accelerations over the whole test, every hit marked; on paper one hit from near."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shm.identify import Hit
+from shm.report import formatting
+from shm.report.contents import ModalTestReport
+from shm.report.figures.illustration import Member
+from shm.report.figures.modal_test_signals import (
+    HitRecord,
+    borders_s,
+    channel_of,
+    hit_records,
+    hit_time_s,
+    located_hits,
+    offsets_s,
+    shown_rows,
+    strongest_row,
+    thinned,
+    unknown_times_s,
+)
+from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.specification import (
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    Specification,
+    envelope_places,
+    plane_colour,
+)
+from shm.values import FloatArray
+
+_MOST_CHANNELS = 4
+_MOST_NUMBERS = 40
+_ZOOM_INCHES = 1.9
+_MOTION_NEAR_S = (-0.05, 0.3)
+_LEAD = 0.012
+"""Room before the first record, as a share of all: a hit may begin with it."""
+_NEAR_BINS = 300
+_MOST_DOTS = 150
+_MARKS_AT, _ROOM = 0.84, 0.35
+"""Where the marks of the hits stand in the uppermost panel, as a share of its height, and the room
+above the curve that is left to them, as a share of the curve's."""
+
+
+def _draw(shown: Shown) -> Specification | None:
+    sheet, records = shown.sheet, shown.sheet.recordings
+    if not records or not records[0].accelerations:
+        return None
+    rows: list[int | None] = list(shown_rows(sheet, _MOST_CHANNELS))
+    if records[0].force is not None:
+        rows = [None, *rows]
+    panels = [_history(sheet, row, is_top=place == 0) for place, row in enumerate(rows)]
+    end_s = offsets_s(records)[-1] + records[-1].duration_s
+    several = "" if len(records) == 1 else ", the records one after the other"
+    across = Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
+    panels[-1] = replace(panels[-1], x=across)
+    typical = None if shown.is_on_screen else _typical(sheet)
+    near = [_near(sheet, typical)] if typical else []
+    height = sum(p.height for p in panels) + 0.9 + (_ZOOM_INCHES if near else 0)
+    return Specification(
+        rows=[*([panel] for panel in panels), *near], height_inches=height, legend_columns=3
+    )
+
+
+def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> Panel:
+    records, channel = sheet.recordings, channel_of(sheet.recordings[0], row)
+    assert channel is not None
+    time_s, values = thinned(records, row)
+    colour = "ink" if row is None else plane_colour(channel.plane)
+    unit = "N" if row is None else "m/s²"
+    marks: list[Mark] = [
+        Line(x=time_s, y=values, colour=colour, width=0.6, hover=f"%{{x:.3f}} s: %{{y:.4g}} {unit}")
+    ]
+    # The largest value that can be recorded, where the signal comes near.
+    if np.nanmax(np.abs(values), initial=0.0) > 0.5 * channel.full_scale:
+        ends = (-channel.full_scale, channel.full_scale)
+        marks += [Rule(at=end, colour="red", width=0.8, dash="dash") for end in ends]
+    if len(unknown := unknown_times_s(records, row)):
+        marks.append(
+            Points(
+                x=unknown, y=np.full(len(unknown), 0.04), in_shares=True, symbol="tick", size=5,
+                colour="red", name="not a number", hover="%{x:.3f} s",
+            )
+        )  # fmt: skip
+    marks += [
+        Rule(at=at_s, axis="x", colour="quiet", width=0.8, dash="dot")
+        for at_s in borders_s(records)
+    ]
+    marks += _hit_marks(sheet) if is_top else _hit_lines(sheet)
+    title, title_colour = _title(sheet, row)
+    label = "force (N)" if row is None else "m/s²"
+    return Panel(
+        y=Axis(label=label, range=_range(values, row, _ROOM if is_top else 0.0)), marks=marks,
+        title=title, title_colour=title_colour, height=1.25 if row is None else 0.95,
+    )  # fmt: skip
+
+
+def _range(values: FloatArray, row: int | None, room: float) -> tuple[float, float]:
+    """The values with a little room, and more above for marks."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+    low = float(np.nanmin(values)) if np.isfinite(values).any() else -1.0
+    low, high = min(low, 0.0) - 0.05 * largest, 1.05 * largest
+    return low, high + room * (high - low)
+
+
+def _title(sheet: ModalTestReport, row: int | None) -> tuple[str, str]:
+    """Name, plane and place, and in red why the channel was left out."""
+    channels = [channel_of(record, row) for record in sheet.recordings]
+    first = channels[0]
+    assert first is not None
+    there = {c.x_m for c in channels if c is not None and np.isfinite(c.x_m)}
+    title = formatting.place(first.name, first.plane, first.x_m if len(there) == 1 else np.nan)
+    if len(there) > 1:
+        title += ", place differs"
+    fault = sheet.channel_faults.get(first.name)
+    return (f"{title}, left out: {fault}", "red") if fault else (title, "ink")
+
+
+def _hit_lines(sheet: ModalTestReport) -> list[Mark]:
+    return [
+        Rule(
+            at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
+            opacity=0.7, dash="solid" if hit.used else "dash",
+        )
+        for _, hit in located_hits(sheet)
+    ]  # fmt: skip
+
+
+def _hit_marks(sheet: ModalTestReport) -> list[Mark]:
+    """A row of numbered symbols for the hits that were used, and for each reason to drop some."""
+    located = located_hits(sheet)
+    groups: dict[str, list[tuple[int, Hit]]] = {}
+    for number, hit in located:
+        groups.setdefault("" if hit.used else hit.reason, []).append((number, hit))
+    found: list[Mark] = []
+    for reason, hits in groups.items():
+        counted = formatting.counted(len(hits), "hit")
+        found.append(
+            Points(
+                x=[hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
+                in_shares=True, symbol="cross" if reason else "triangle down", size=5,
+                colour="red" if reason else "green",
+                name=f"{counted} dropped: {reason}" if reason else f"{counted} used",
+                labels=[str(number) for number, _ in hits] if len(located) <= _MOST_NUMBERS else (),
+                label_side="top", texts=[_told(number, hit) for number, hit in hits],
+            )
+        )  # fmt: skip
+    return found
+
+
+def _told(number: int, hit: Hit) -> str:
+    what = "used" if hit.used else f"dropped: {hit.reason}"
+    return f"hit {number}, {hit.start_s:.3f} s, {formatting.plain(hit.peak_force_n, 4)} N, {what}"
+
+
+def _typical(sheet: ModalTestReport) -> HitRecord | None:
+    """The used hit of median force, else any."""
+    found = hit_records(sheet)
+    hits = [hit_record for hit_record in found if hit_record.hit.used] or found
+    hits = sorted(hits, key=lambda hit_record: hit_record.hit.peak_force_n)
+    return hits[len(hits) // 2] if hits else None
+
+
+def _near(sheet: ModalTestReport, near: HitRecord) -> list[Panel]:
+    record, start = sheet.recordings[near.hit.record], near.hit.start
+    force, motion = record.force, channel_of(record, strongest_row(sheet))
+    assert force is not None
+    assert motion is not None
+    rate = record.sampling_rate_hz
+    across = Axis(label=f"time from the start of hit {near.number} (ms)")
+    name = formatting.place(motion.name, motion.plane, motion.x_m)
+    return [
+        Panel(
+            y=Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
+            x=across, height=_ZOOM_INCHES,
+        ),
+        Panel(
+            y=Axis(label="m/s²"), marks=_zoom(motion.values, rate, start, _MOTION_NEAR_S), x=across,
+            title=name,
+        ),
+    ]  # fmt: skip
+
+
+def _zoom(
+    values: FloatArray, rate: float, start: int, span_s: tuple[float, float]
+) -> list[Mark]:  # fmt: skip
+    first = max(0, start + int(span_s[0] * rate))
+    part = values[first : start + int(span_s[1] * rate) + 2]
+    places = envelope_places(part, _NEAR_BINS)
+    time_ms = 1e3 * (first + places - start) / rate
+    curve = Line(x=time_ms, y=part[places], width=0.8, dots=len(part) <= _MOST_DOTS)
+    return [curve, Rule(at=0, axis="x", colour="green", width=0.7)]
+
+
+def _caption(shown: Shown) -> str:
+    sheet = shown.sheet
+    channels = len(sheet.recordings[0].accelerations)
+    some = formatting.some(len(shown_rows(sheet, _MOST_CHANNELS)), channels, "accelerations")
+    kind = "Force and accelerations" if sheet.recordings[0].force else "Accelerations"
+    hits = (
+        " Numbers and lines are the hits, in green those that were used, in red and dashed those "
+        "that were dropped."
+        if sheet.hits
+        else ""
+    )
+    return (
+        f"{kind} as recorded, drawn by the smallest and the largest value of each short span, so "
+        f"that no peak is lost.{hits}{some}"
+    )
+
+
+def _alt(shown: Shown) -> str:
+    sheet = shown.sheet
+    seconds = sum(record.duration_s for record in sheet.recordings)
+    used = formatting.counted(len(sheet.used_hits), "hit")
+    dropped = [
+        f"hit {number} at {hit.start_s:.1f} s: {hit.reason}"
+        for number, hit in located_hits(sheet)
+        if not hit.used
+    ]
+    left = f"; dropped: {', '.join(dropped)}" if dropped else ""
+    return f"The signals of {seconds:.3g} s of records; {used} used{left}."
+
+
+FIGURE = Member("time_history", "Time histories with the hits", _draw, _caption, _alt)

@@ -1,0 +1,388 @@
+"""The sheet of one hammer test, by which a person checks how it was identified."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from shm import modes_document
+from shm.report import formatting
+from shm.report.colours import VERDICT_STYLES
+from shm.report.contents import ModalTestReport
+from shm.report.origin import added_mass, lineage, settings
+from shm.report.paper import Fact, Paper, Part, Table, filled
+from shm.report.quality_table import overall, quality_table
+from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
+from shm.values.force_units import force_unit
+
+if TYPE_CHECKING:
+    from shm.report.figures.illustration import Illustration
+
+
+def modal_test_paper(sheet: ModalTestReport) -> Paper:
+    """Summary, modes and quality, figures, how it came about."""
+    verdict = overall(sheet.identification.quality)
+    return Paper(
+        title=name(sheet),
+        bridge=sheet.bridge,
+        status=HEADLINES[verdict],
+        style=VERDICT_STYLES[verdict],
+        parts=(
+            Part("In short", summary=summary(sheet), facts=facts(sheet)),
+            Part("Modes and quality", tables=results(sheet)),
+            Part("Figures", figures=lambda: _figures(sheet)),
+            Part("How it came about", tables=details(sheet)),
+        ),
+        generated_at=sheet.generated_at,
+        version=sheet.version,
+        closing="Intervals are central 90 %; standard deviations are of one test; times are UTC.",
+    )
+
+
+def _figures(sheet: ModalTestReport) -> Sequence[Illustration]:
+    from shm.report.figures.every_figure import modal_test_page_figures
+
+    return modal_test_page_figures(sheet)
+
+
+def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
+    """The figures on top: what, value, what stands beside it."""
+    test, hits = sheet.identification.test, sheet.hits
+    planes = {mode.plane for mode in sheet.modes}
+    return (
+        ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
+        ("Hits used", f"{len(sheet.used_hits)} of {len(hits)}" if hits else "none", _force(sheet)),
+        ("Tested", formatting.moment(test.time), formatting.temperature(test.temperature_c)),
+        ("Set aside", str(len(sheet.identification.set_aside)), "resonances not of the hanger"),
+    )
+
+
+def _force(sheet: ModalTestReport) -> str:
+    forces = [hit.peak_force_n for hit in sheet.used_hits]
+    if not forces:
+        return "no force was recorded"
+    return f"peak force {formatting.plain(min(forces))} to {formatting.plain(max(forces))} N"
+
+
+HEADLINES: dict[Verdict, str] = {
+    "good": "Good",
+    "warning": "Use with care",
+    "refused": "Do not use",
+    "unknown": "Not checked",
+}
+_MOST_REMEDIES = 3  # layout: more are not read
+
+
+def name(sheet: ModalTestReport) -> str:
+    """`Test t7, Hanger 3`, as far as it is known."""
+    test = sheet.identification.test
+    if sheet.hanger is not None:
+        return f"Test {test.id}, {formatting.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
+    return f"Test {test.id}" if test.hanger is None else f"Test {test.id}, Hanger {test.hanger}"
+
+
+def summary(sheet: ModalTestReport) -> str:
+    """One paragraph in plain words."""
+    sentences = (
+        measured(sheet),
+        _what_was_found(sheet),
+        _what_is_no_mode(sheet),
+        trust(sheet),
+        advice(sheet),
+    )
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def measured(sheet: ModalTestReport) -> str:
+    test = sheet.identification.test
+    when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
+    return f"This test ({when}) has {_sensors(sheet)}{_excitation(sheet)}."
+
+
+def _sensors(sheet: ModalTestReport) -> str:
+    response = sheet.identification.frequency_response
+    points: Sequence[tuple[str | None, float]] = []
+    if response is not None:
+        points = [(point.plane, point.x_m) for point in response.points]
+    elif sheet.recordings:
+        points = [(c.plane, c.x_m) for c in sheet.recordings[0].accelerations]
+    if not points:
+        return "no records at hand"
+    places = {x_m for _, x_m in points if math.isfinite(x_m)}
+    at = f" at {formatting.counted(len(places), 'place')}" if places else ""
+    planes = {plane for plane, _ in points if plane}
+    where = {0: "", 1: f" in the {next(iter(planes), '')} plane", 2: " in both planes"}
+    return f"{formatting.counted(len(points), 'acceleration channel')}{at}{where[len(planes)]}"
+
+
+def _excitation(sheet: ModalTestReport) -> str:
+    if len(sheet.used_hits) == len(sheet.hits) == 1:
+        return " and one hit"
+    if not sheet.hits:
+        given = sheet.identification.frequency_response is not None
+        return ", given as frequency responses" if given else " of ambient motion: nobody hit"
+    reasons = Counter(hit.reason for hit in sheet.hits if not hit.used)
+    left = formatting.listed([f"{count} {reason}" for reason, count in reasons.items()] or [""])
+    dropped = f", {sum(reasons.values())} dropped ({left})" if reasons else ""
+    hits = formatting.counted(len(sheet.hits), "hit")
+    return f" and {hits}: {len(sheet.used_hits) if reasons else 'all'} used{dropped}"
+
+
+def _what_was_found(sheet: ModalTestReport) -> str:
+    if not sheet.modes:
+        return "No mode was identified."
+    groups = [_group(sheet, plane) for plane in PLANES]
+    listed = formatting.listed([group for group in groups if group])
+    verb = "was" if len(sheet.modes) == 1 else "were"
+    return f"{formatting.counted(len(sheet.modes), 'mode')} {verb} identified: {listed}."
+
+
+def _group(sheet: ModalTestReport, plane: Plane) -> str:
+    modes = sorted((m for m in sheet.modes if m.plane == plane), key=lambda m: m.frequency_hz)
+    if not modes:
+        return ""
+    low, high = modes[0].frequency_hz, modes[-1].frequency_hz
+    span = f"{low:.4g} Hz" if len(modes) == 1 else f"{low:.4g} to {high:.4g} Hz"
+    return f"{plane} {_orders(modes)} ({span})"
+
+
+def _orders(modes: Sequence[Mode]) -> str:
+    """`1 to 3, 5, 7 to 9`."""
+    runs: list[list[int]] = []
+    for order in sorted(mode.order for mode in modes):
+        if runs and order == runs[-1][-1] + 1:
+            runs[-1].append(order)
+        else:
+            runs.append([order])
+    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]} to {r[-1]}" for r in runs)
+
+
+def _what_is_no_mode(sheet: ModalTestReport) -> str:
+    found = sheet.identification.set_aside
+    if not found:
+        return ""
+    listed = formatting.listed([f"{each.kind} at {each.frequency_hz:.4g} Hz" for each in found])
+    return f"Set aside as no modes of the hanger: {listed}."
+
+
+def trust(sheet: ModalTestReport) -> str:
+    """Whether the modes can be used."""
+    checks = sheet.identification.quality
+    made = [check for check in checks if check.verdict != "unknown"]
+    match overall(checks):
+        case "refused":
+            return f"Do not use it: refused by {_names(checks, 'refused')}."
+        case "warning":
+            count = len([check for check in made if check.verdict == "warning"])
+            verb = "warns" if count == 1 else "warn"
+            of = formatting.counted(len(made), "check")
+            named = _names(checks, "warning")
+            return f"The modes can be used with care: {count} of {of} {verb} ({named})."
+        case "good":
+            which = f"all {len(made)} checks" if len(made) > 1 else "the one check"
+            verb = "are" if len(made) > 1 else "is"
+            return f"The modes can be trusted: {which} that could be made {verb} good."
+        case "unknown":
+            return "Its quality was not checked: judge by the figures before using the modes."
+
+
+def _names(checks: Sequence[QualityCheck], verdict: Verdict) -> str:
+    return formatting.listed([check.name for check in checks if check.verdict == verdict])
+
+
+def advice(sheet: ModalTestReport) -> str:
+    """What to do next, gravest first."""
+    checks = sheet.identification.quality
+    graves = sorted(
+        (c for c in checks if c.verdict in ("refused", "warning") and c.remedy),
+        key=lambda check: check.verdict != "refused",
+    )
+    if graves:
+        more = len(graves) - _MOST_REMEDIES
+        rest = f" See the quality for {more} more." if more > 0 else ""
+        return f"Next: {' '.join(c.remedy for c in graves[:_MOST_REMEDIES])}{rest}"
+    return "Nothing needs doing before using them." if overall(checks) == "good" else ""
+
+
+def results(sheet: ModalTestReport) -> tuple[Table, ...]:
+    """What came of the test, as far as there is any of it."""
+    return filled(modes(sheet), _doubts_in_terminal(quality(sheet)), set_aside(sheet))
+
+
+def _doubts_in_terminal(checks: Table) -> Table:
+    """In a terminal the checks that are not good, and how many are."""
+    doubts = tuple(row for row, verdict in enumerate(checks.marks) if verdict != "good")
+    good = len(checks.rows) - len(doubts)
+    note = f"{{}} {'further ' if doubts else ''}{'check' if good == 1 else 'checks'} good."
+    return replace(checks, terminal_rows=doubts, hidden_note=note) if good else checks
+
+
+def details(sheet: ModalTestReport) -> tuple[Table, ...]:
+    """How it came about, as far as there is any of it."""
+    told = (hits(sheet), conditions(sheet), settings(sheet.settings))
+    hit, *others = (table.not_in_terminal() for table in told)
+    return filled(notes(sheet), hit, dropped(sheet), *others)
+
+
+def modes(sheet: ModalTestReport) -> Table:
+    return Table(
+        "Modes",
+        ("plane", "order", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "amplitude, m/s²"),
+        tuple(_mode_row(mode) for mode in sheet.modes),
+        note="sd: standard deviation. Amplitude: with which the mode rings right after a hit, at "
+        "the sensor that moves most; as measured, without interval.",
+    )
+
+
+def _mode_row(mode: Mode) -> tuple[str, ...]:
+    places = min(6, max(3, formatting.decimals(2 * mode.frequency_sd_hz)))
+    return (
+        mode.plane,
+        str(mode.order),
+        f"{mode.frequency_hz:.{places}f}",
+        formatting.plain(mode.frequency_sd_hz, 2),
+        formatting.number(100 * mode.damping_ratio, ".4f"),
+        formatting.plain(100 * mode.damping_sd, 2),
+        formatting.plain(mode.acceleration_m_s2),
+    )
+
+
+def quality(sheet: ModalTestReport) -> Table:
+    return quality_table(sheet.identification.quality)
+
+
+def set_aside(sheet: ModalTestReport) -> Table:
+    return Table(
+        "Set aside: not modes of the hanger",
+        ("what", "frequency, Hz", "damping, %", "why"),
+        tuple(
+            (
+                each.kind,
+                f"{each.frequency_hz:.3f}",
+                formatting.number(100 * each.damping_ratio, ".4f"),
+                each.reason,
+            )
+            for each in sheet.identification.set_aside
+        ),
+    )
+
+
+def dropped(sheet: ModalTestReport) -> Table:
+    """What the identification left out of the records, and why."""
+    return Table(
+        "Left out",
+        ("what", "how many", "why"),
+        tuple((each.what, str(each.count), each.reason) for each in sheet.dropped),
+    )
+
+
+def hits(sheet: ModalTestReport) -> Table:
+    """Each hit with its time in s and peak force in N, and whether it was used."""
+    records = sheet.recordings
+    return Table(
+        "Hits",
+        ("hit", "record", "time, s", "peak force, N", "used"),
+        tuple(
+            (
+                str(number),
+                _file(records[hit.record]) if hit.record < len(records) else str(hit.record + 1),
+                f"{hit.start_s:.3f}",
+                formatting.plain(hit.peak_force_n, 4),
+                "yes" if hit.used else f"no: {hit.reason}",
+            )
+            for number, hit in enumerate(sheet.hits, 1)
+        ),
+        note="As recorded, without interval.",
+    )
+
+
+def notes(sheet: ModalTestReport) -> Table:
+    rows = [(str(number), note) for number, note in enumerate(sheet.identification.notes, 1)]
+    return Table("Decisions to know of", ("no.", "note"), tuple(rows))
+
+
+def conditions(sheet: ModalTestReport) -> Table:
+    """Which test it is, and what was noted with it."""
+    test = sheet.identification.test
+    facts = {
+        "test": test.id,
+        "hanger": _hanger(sheet),
+        "time": formatting.moment(test.time),
+        "temperature": formatting.temperature(test.temperature_c),
+        "hit level over reference level": formatting.plain(test.amplitude),
+        "added mass": added_mass(test),
+        "band": _band(sheet),
+        "exponential window on the responses": _window(sheet),
+        "records": _records(sheet),
+        **lineage(sheet.lineage),
+    }
+    return Table("Conditions", ("what", "value"), tuple(facts.items()))
+
+
+def _hanger(sheet: ModalTestReport) -> str:
+    number = sheet.identification.test.hanger
+    if sheet.hanger is None:
+        return "not stated" if number is None else f"{number}, not described"
+    hanger = sheet.hanger
+    called = formatting.hanger_name(hanger.id, hanger.name)
+    unit = force_unit(hanger.nominal_tension_n)
+    nominal = f"{unit.of(hanger.nominal_tension_n):g} {unit.name}"
+    return f"{called}, {hanger.length_m:g} m, nominal tension {nominal}"
+
+
+def _band(sheet: ModalTestReport) -> str:
+    if sheet.band_hz is None:
+        return "not stated"
+    return f"{sheet.band_hz[0]:g} to {sheet.band_hz[1]:g} Hz"
+
+
+def _window(sheet: ModalTestReport) -> str:
+    seconds = sheet.identification.window_time_constant_s
+    return f"time constant {seconds:.3g} s" if math.isfinite(seconds) else "none"
+
+
+def _records(sheet: ModalTestReport) -> str:
+    if not sheet.records:
+        return "not at hand"
+    return "; ".join(_record(record) for record in sheet.records)
+
+
+def _record(record: Recording | FrequencyResponse) -> str:
+    if isinstance(record, Recording):
+        return f"{_file(record)}, {record.duration_s:.4g} s at {record.sampling_rate_hz:g} Hz"
+    return f"{_file(record)}, {len(record.frequency_hz)} lines"
+
+
+def _file(record: Recording | FrequencyResponse) -> str:
+    """The file's name: where it lay is nothing for a report."""
+    return Path(record.source).name
+
+
+SHEET_SCHEMA = "shm.test-sheet/1"
+
+
+def modal_test_json(sheet: ModalTestReport) -> dict[str, Any]:
+    """A document for `shm.documents.dump`; signals and curves stay in the records."""
+    found = sheet.identification
+    return {
+        "schema": SHEET_SCHEMA,
+        "hanger": found.test.hanger,
+        "verdict": overall(found.quality),
+        "summary": summary(sheet),
+        "test": modes_document.test_document(found.test),
+        "quality": [asdict(check) for check in found.quality],
+        "set_aside": [asdict(each) for each in found.set_aside],
+        "hits": [asdict(hit) for hit in found.hits],
+        "dropped": [asdict(each) for each in found.dropped],
+        "notes": list(found.notes),
+        "records": [Path(record.source).name for record in sheet.records],
+        "lineage": dict(sheet.lineage),
+        "settings": dict(sheet.settings),
+        "generated_at": sheet.generated_at,
+        "version": sheet.version or None,
+        "band_hz": list(sheet.band_hz) if sheet.band_hz else None,
+    }

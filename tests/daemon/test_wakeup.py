@@ -1,0 +1,85 @@
+"""The wakeup: rung by signals, by changes, by threads; one listener."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from watchdog.observers import Observer
+
+from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
+
+
+def test_a_ring_before_the_wait_is_heard() -> None:
+    wakeup = Wakeup()
+    wakeup.ring("one")
+    wakeup.ring("two")
+    assert wakeup.wait(10) == {"one", "two"}
+    assert wakeup.wait(0.01) == set()
+
+
+def test_a_ring_ends_the_wait() -> None:
+    wakeup = Wakeup()
+    threading.Timer(0.05, wakeup.ring, ["now"]).start()
+    assert wakeup.wait(10) == {"now"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_stop_the_listener_and_only_within_the_context(number: int) -> None:
+    wakeup, before = Wakeup(), signal.getsignal(number)
+    with stopped_by_signals(wakeup):
+        os.kill(os.getpid(), number)
+        wakeup.wait(10)
+    assert wakeup.stopped
+    assert signal.getsignal(number) is before
+
+
+def test_in_another_thread_signals_are_left_alone() -> None:
+    errors = []
+
+    def run() -> None:
+        try:
+            with stopped_by_signals(Wakeup()):
+                pass
+        except ValueError as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert errors == []
+
+
+def test_a_change_in_the_folder_rings(tmp_path: Path) -> None:
+    wakeup = Wakeup()
+    (tmp_path / "sub").mkdir()
+    with rung_by_changes(wakeup, tmp_path):
+        (tmp_path / "sub" / "h3.csv").write_text("x")
+        assert wakeup.wait(10) == {SPOOL}
+
+
+def test_looking_does_not_ring(tmp_path: Path) -> None:
+    """Else the daemon would wake itself for ever."""
+    wakeup = Wakeup()
+    (tmp_path / "h3.csv").write_text("x")
+    with rung_by_changes(wakeup, tmp_path):
+        list(tmp_path.iterdir())
+        (tmp_path / "h3.csv").read_text()
+        assert wakeup.wait(0.3) == set()
+
+
+def test_without_hints_the_daemon_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse(self: object) -> None:
+        raise OSError("inotify watch limit reached")
+
+    monkeypatch.setattr(Observer, "start", refuse)
+    began = time.monotonic()
+    with rung_by_changes(Wakeup(), tmp_path):
+        assert time.monotonic() - began < 5
+    assert "inotify watch limit" in caplog.text

@@ -1,0 +1,162 @@
+"""What takes seconds is made beside the requests: one at a time, kept, and never begun twice."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from shm.errors import BadInput, ShmError
+from shm_daemon.web.background_work import BackgroundWorker
+from tests.helpers.web_servers import a_thread
+
+_MADE: list[str] = []
+_LET_GO = threading.Event()
+
+
+@dataclass(frozen=True)
+class Text:
+    said: str
+    size_bytes: int = 1
+
+
+@dataclass(frozen=True)
+class Order:
+    """Says a word, in the way that `how` names."""
+
+    word: str
+    how: str = "at once"
+    size_bytes: int = 1
+
+    def make(self) -> Text:
+        _MADE.append(self.word)
+        if self.how == "refused":
+            raise BadInput(f"{self.word} is no word.", remedy="Say another.")
+        if self.how == "bug":
+            raise ZeroDivisionError
+        if self.how == "slow":
+            _LET_GO.wait(10)
+        if self.how == "dies":
+            os._exit(3)
+        if self.how == "dies once" and not Path(self.word).exists():
+            Path(self.word).touch()
+            os._exit(3)
+        return Text(self.word, self.size_bytes)
+
+
+def a_process(workers: int) -> ProcessPoolExecutor:
+    """Without the imports of the daemon's, which take seconds."""
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("fork"))
+
+
+@pytest.fixture
+def background_worker() -> Iterator[BackgroundWorker[Text]]:
+    _MADE.clear()
+    _LET_GO.clear()
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=5.0, pool=a_thread)
+    yield background_worker
+    _LET_GO.set()
+    background_worker.close()
+
+
+def until(found: Callable[[], Text | None]) -> Text:
+    for _ in range(1000):
+        if (text := found()) is not None:
+            return text
+        time.sleep(0.005)
+    raise AssertionError("nothing came")
+
+
+def test_an_order_is_made_once_and_kept(background_worker: BackgroundWorker[Text]) -> None:
+    order = Order("one", "slow")
+    assert background_worker.kept(order) is None
+    assert [background_worker.wanted(order) for _ in range(5)] == [None] * 5
+    _LET_GO.set()
+    assert until(lambda: background_worker.wanted(order)) == Text("one")
+    assert background_worker.kept(Order("one", "slow")) == Text("one")
+    assert _MADE == ["one"]
+
+
+def test_orders_are_made_one_at_a_time_and_only_a_few_wait(
+    background_worker: BackgroundWorker[Text],
+) -> None:
+    orders = [Order(str(number), "slow") for number in range(20)]
+    assert [background_worker.wanted(order) for order in orders] == [None] * 20
+    time.sleep(0.1)
+    assert _MADE == ["0"]
+    _LET_GO.set()
+    until(lambda: background_worker.kept(orders[7]))
+    assert [background_worker.kept(order) for order in orders[8:]] == [None] * 12
+    assert until(lambda: background_worker.wanted(orders[19])) == Text("19")
+
+
+def test_what_fails_says_why_and_stops_nothing_else(
+    background_worker: BackgroundWorker[Text],
+) -> None:
+    for how, told in (("refused", "is no word"), ("bug", "internal error")):
+        order = Order("none", how)
+        with pytest.raises(ShmError, match=told):
+            until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+        with pytest.raises(ShmError, match=told):
+            background_worker.wanted(order)
+    assert _MADE == ["none", "none"]
+    assert until(lambda: background_worker.wanted(Order("some"))) == Text("some")
+
+
+def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker[Text]) -> None:
+    orders = [Order(str(number), size_bytes=25_000_000) for number in range(3)]
+    for order in orders:
+        until(lambda order=order: background_worker.wanted(order))  # type: ignore[misc]
+    assert [background_worker.kept(order) is None for order in orders] == [True, False, False]
+
+
+def test_what_takes_too_long_is_given_up() -> None:
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=0.3, pool=a_thread)
+    _LET_GO.clear()
+    try:
+        with pytest.raises(ShmError, match=r"more than 0\.3 s"):
+            until(lambda: background_worker.wanted(Order("slow one", "slow")))
+        _LET_GO.set()
+        assert until(lambda: background_worker.wanted(Order("quick one"))) == Text("quick one")
+    finally:
+        _LET_GO.set()
+        background_worker.close()
+
+
+def test_a_process_that_dies_is_told_and_replaced() -> None:
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    try:
+        with pytest.raises(ShmError, match="died"):
+            until(lambda: background_worker.wanted(Order("last words", "dies")))
+        assert until(lambda: background_worker.wanted(Order("next"))) == Text("next")
+    finally:
+        background_worker.close()
+
+
+def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    order = Order(str(tmp_path / "ended"), "dies once")
+    try:
+        assert until(lambda: background_worker.wanted(order)) == Text(order.word)
+    finally:
+        background_worker.close()
+
+
+def test_closing_ends_the_work_at_once() -> None:
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=60.0, pool=a_process)
+    _LET_GO.clear()
+    assert background_worker.wanted(Order("endless", "slow")) is None
+    time.sleep(0.2)
+    began = time.monotonic()
+    background_worker.close()
+    assert time.monotonic() - began < 5
+    assert background_worker.wanted(Order("endless", "slow")) is None
+    assert background_worker.wanted(Order("another")) is None
+    until(lambda: None if multiprocessing.active_children() else Text("all gone"))

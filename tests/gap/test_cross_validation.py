@@ -1,0 +1,181 @@
+"""What is held out, and what a right and a wrong cause then predict."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shm.errors import UsageError
+from shm.gap.contract import Hypothesis, Observations
+from shm.gap.cross_validation import held_out, shrinkage
+from shm.gap.fit import fitted
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.models.effects import Conditions, Variant
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect
+from shm.simulate import campaign as simulated
+from shm.values import AddedMass
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+
+MODES = [(plane, order) for plane in (0, 1) for order in range(1, 9)]
+RIGHT = Hypothesis((("bending_stiffness", Variant()),))
+WRONG = Hypothesis((("point_mass", Variant()),))
+ONE_TEST = Hypothesis((("timebase", Variant("test t3", test="t3")),))
+
+
+def with_stiffness(design):
+    """The second parameter raises high orders, and does nothing to shapes."""
+    grows = np.zeros((design.size, 1))
+    grows[: design.frequencies, 0] = 0.002 * design.frequency_order**2
+    return np.hstack([tension(design), grows])
+
+
+def overfitted(design):
+    """Every datum has a parameter of its own: it follows all and predicts nothing."""
+    return np.hstack([tension(design), 0.1 * np.eye(design.size)])
+
+
+SLOPES = {Hypothesis(): tension, RIGHT: with_stiffness, WRONG: overfitted, ONE_TEST: with_stiffness}
+
+
+def toy(conditions=None, modes=MODES, stiffer=0.5, places_m=(), seed=1):
+    design = design_of(conditions or campaign(), modes, places_m)
+    error = SD * np.random.default_rng(seed).standard_normal(design.size)
+    value = with_stiffness(design) @ [0.4, stiffer] + error
+    return ToyProblem(Observations(design, value, np.full(design.size, SD)), SLOPES)
+
+
+def held(problem, after=RIGHT, hold_out=()):
+    fits = problem.fit(), problem.fit(after)
+    return held_out(problem, *fits, hold_out, np.random.default_rng(1))
+
+
+def shrunk(problem, after):
+    fits = problem.fit(), problem.fit(after)
+    return shrinkage(problem, *fits, held(problem, after))
+
+
+def test_the_right_cause_shrinks_the_gap_in_the_fit_and_on_what_was_held_out():
+    found = shrunk(toy(), RIGHT)
+    assert found.rms_before_percent > 1
+    assert found.held_out_before_percent > 1
+    assert found.rms_after_percent == pytest.approx(100 * SD, rel=0.3)
+    assert found.held_out_after_percent == pytest.approx(100 * SD, rel=0.4)
+
+
+def test_a_cause_that_only_follows_the_data_shrinks_nothing_that_was_held_out():
+    found = shrunk(toy(), WRONG)
+    assert found.rms_after_percent < 0.1 * found.rms_before_percent
+    assert found.held_out_after_percent > 0.9 * found.held_out_before_percent
+
+
+def test_a_held_out_residual_is_that_of_a_fit_that_never_saw_the_datum():
+    """Changing a held-out frequency, or its shape, changes its residual by as much and no other."""
+    problem = toy(places_m=(3.0, 6.0))
+    design = problem.observations.design
+    before = held(problem, hold_out=("4",))
+    value = problem.observations.value.copy()
+    rows = np.flatnonzero(design.frequency_order == 4)
+    shapes = design.frequencies + np.flatnonzero(np.isin(design.shape_mode, rows))
+    value[rows] += 0.3
+    value[shapes] += 0.3
+    moved = ToyProblem(Observations(design, value, problem.observations.sd), SLOPES)
+    after = held(moved, hold_out=("4",))
+    assert after.after[0, rows] - before.after[0, rows] == pytest.approx(np.full(len(rows), 0.3))
+    assert np.isfinite(before.after[0]).sum() == len(rows)
+
+
+def test_every_order_but_the_outermost_is_held_out_once():
+    problem = toy((Conditions("t1"),))
+    order = problem.observations.design.frequency_order
+    found = held(problem)
+    assert np.array_equal(np.isfinite(found.before).sum(axis=0), (order > 1) & (order < 8))
+    assert [set(order[rows]) for rows in np.isfinite(found.before)] == [{2, 5}, {3, 6}, {4, 7}]
+    assert np.array_equal(np.isfinite(found.before_percent), (order > 1) & (order < 8))
+
+
+def test_with_two_orders_each_is_held_out_in_turn():
+    problem = toy((Conditions("t1"),), [(0, 1), (0, 2), (1, 1), (1, 2)], stiffer=0.0)
+    assert held(problem).before.shape[0] == 0
+    twice = toy((Conditions("t1"), Conditions("t2")), [(0, 1), (0, 2), (1, 1), (1, 2)])
+    assert held(twice).before.shape[0] == 2
+
+
+def test_tests_are_held_out_only_while_the_others_still_vary_the_same_conditions():
+    """t6 alone has a known mass; without any of the others temperatures and levels still vary."""
+    problem = toy(campaign(AddedMass(25.0, 3.6)))
+    assert whole_tests_held_out(problem, RIGHT) == [[0], [1], [2], [3], [4]]
+
+
+def test_a_cause_in_one_test_alone_is_not_asked_to_predict_that_test():
+    assert whole_tests_held_out(toy(), ONE_TEST) == [[0], [1], [3], [4]]
+
+
+def whole_tests_held_out(problem, after):
+    """The tests of each fold that holds out nothing but whole tests."""
+    test = problem.observations.design.frequency_test
+    folds = np.isfinite(held(problem, after).before)
+    parts = [(rows, sorted(set(test[rows].tolist()))) for rows in folds]
+    return sorted(tests for rows, tests in parts if np.array_equal(rows, np.isin(test, tests)))
+
+
+def test_named_tests_and_orders_are_left_out_together():
+    problem = toy()
+    design = problem.observations.design
+    rows = np.isfinite(held(problem, hold_out=("t2", "4")).before)
+    assert rows.shape[0] == 1
+    assert np.array_equal(rows[0], (design.frequency_test == 1) | (design.frequency_order == 4))
+
+
+@pytest.mark.parametrize("names", [("t9",), ("12",), ("4", "five")])
+def test_names_that_are_neither_tests_nor_orders_are_refused(names):
+    with pytest.raises(UsageError, match="neither a test nor an order"):
+        held(toy(), hold_out=names)
+
+
+def test_holding_out_all_but_two_frequencies_is_refused():
+    with pytest.raises(UsageError, match="left to fit"):
+        held(toy((Conditions("t1"),)), hold_out=tuple("2345678"))
+
+
+@pytest.mark.parametrize("modes", [[(0, 1), (0, 2), (0, 3)], [(0, 1), (1, 1)]])
+def test_three_frequencies_or_fewer_cannot_be_held_out_and_say_so_by_nan(modes):
+    found = shrunk(toy((Conditions("t1"),), modes), RIGHT)
+    assert np.isnan([found.held_out_before_percent, found.held_out_after_percent]).all()
+    assert found.rms_before_percent > 0
+
+
+def test_without_a_cause_there_is_nothing_after():
+    problem = toy()
+    fit = problem.fit()
+    without = held_out(problem, fit, None, (), np.random.default_rng(1))
+    found = shrinkage(problem, fit, None, without)
+    assert np.isnan([found.rms_after_percent, found.held_out_after_percent]).all()
+    assert found.held_out_before_percent > 1
+
+
+def test_the_same_seed_holds_out_the_same():
+    conditions = tuple(Conditions(f"t{i}", float(i)) for i in range(10))
+    one, other = (held(toy(conditions)) for _ in range(2))
+    assert np.array_equal(one.after, other.after, equal_nan=True)
+    assert one.after.shape[0] == 9
+
+
+def test_a_planted_clamp_shrinks_what_was_held_out_and_a_wrong_cause_does_not():
+    """Simulated by other means than the model."""
+    plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
+    clamp = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
+    rng = np.random.default_rng(1)
+    tests = simulated(HANGER_3, HangerState(711e3), (clamp,), plan, rng)
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    before, right, wrong = (
+        fitted(problem, hypothesis, rng)
+        for hypothesis in (Hypothesis(), WRONG, Hypothesis((("distributed_mass", Variant()),)))
+    )
+    found = [
+        shrinkage(problem, before, after, held_out(problem, before, after, (), rng))
+        for after in (right, wrong)
+    ]
+    assert found[0].held_out_after_percent < 0.1 * found[0].held_out_before_percent
+    assert found[1].held_out_after_percent > 0.7 * found[1].held_out_before_percent

@@ -1,0 +1,140 @@
+"""Residuals and trends against closed forms of a linear toy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shm.gap.contract import Hypothesis, Observations
+from shm.gap.cross_validation import HeldOut
+from shm.gap.residuals import identification_sd, residuals, trends
+from shm.models.effects import Conditions
+from shm.values import NAN, AddedMass
+from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+
+MODES = [(plane, order) for plane in (0, 1) for order in range(1, 7)]
+
+
+def toy(gap, conditions=None, modes=MODES, noise=0.0, seed=1):
+    """Measured: the toy's prediction, plus `gap` (frequencies,) and noise."""
+    design = design_of(conditions or campaign(), modes)
+    error = noise * np.random.default_rng(seed).standard_normal(design.size)
+    value = 0.05 + gap(design) + error
+    return ToyProblem(
+        Observations(design, value, np.full(design.size, SD)), {Hypothesis(): tension}
+    )
+
+
+def warmer(design):
+    return (
+        2e-4 * np.array([c.temperature_shift_k for c in design.conditions])[design.frequency_test]
+    )
+
+
+def test_shares_of_the_misfit_add_to_one_and_go_with_the_squares():
+    problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
+    found = residuals(problem, problem.fit(), None, None)
+    share = np.array([each.share for each in found])
+    percent = np.array([each.residual_percent for each in found])
+    assert share.sum() == pytest.approx(1)
+    assert share == pytest.approx(percent**2 / np.sum(percent**2), rel=0.05)
+    assert {each.order for each in found if each.share > 0.05} == {4}
+
+
+def test_a_residual_is_measured_over_predicted_less_one_in_the_order_of_the_data():
+    problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
+    first = residuals(problem, problem.fit(), None, None)[3]
+    assert (first.test, first.plane, first.order) == ("t1", "transverse", 4)
+    expected = 100 * (first.measured_hz / first.predicted_hz - 1)
+    assert first.residual_percent == pytest.approx(expected)
+    assert np.isnan([first.after_percent, first.held_out_before_percent]).all()
+
+
+def test_z_is_that_of_a_datum_against_the_prediction_from_all_others():
+    """z = (y - mean of the others) / sqrt(sd^2 + var of that mean) where one mean is free."""
+    problem = toy(lambda design: 0.01 * (design.frequency_order == 1), modes=[(0, 1), (0, 2)])
+    value = problem.observations.value
+    found = residuals(problem, problem.fit(), None, None)
+    for i, each in enumerate(found):
+        others = np.delete(value, i)
+        apart = (value[i] - others.mean()) / np.sqrt(SD**2 + SD**2 / len(others))
+        assert each.z == pytest.approx(apart, rel=1e-3)
+
+
+def test_the_z_of_pure_noise_is_standard_normal():
+    squares = []
+    for seed in range(40):
+        problem = toy(lambda design: np.zeros(design.size), noise=SD, seed=seed)
+        squares += [each.z**2 for each in residuals(problem, problem.fit(), None, None)]
+    assert np.mean(squares) == pytest.approx(1, abs=0.1)
+
+
+def test_a_model_error_that_swallows_the_gap_does_not_hide_it():
+    problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
+    fits = problem.fit(), problem.fit(model_error=0.01)
+    plain, swallowed = (max(r.z for r in residuals(problem, fit, None, None)) for fit in fits)
+    assert swallowed > 0.9 * plain > 7
+
+
+def test_unknown_standard_deviations_are_those_that_the_leading_fit_finds():
+    problem = toy(lambda design: np.zeros(design.size))
+    unknown = Observations(
+        problem.observations.design, problem.observations.value, np.full(60, NAN)
+    )
+    assert identification_sd(unknown, problem.fit()) == pytest.approx(np.full(60, SD))
+
+
+def test_residuals_after_and_held_out_stand_beside_those_before():
+    problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
+    fit = problem.fit()
+    held = HeldOut(np.full((1, 60), 0.02), np.where(np.arange(60) == 0, 0.01, NAN)[None])
+    first, second, *_ = residuals(problem, fit, fit, held)
+    assert first.after_percent == pytest.approx(first.residual_percent)
+    assert first.held_out_before_percent == pytest.approx(100 * np.expm1(0.02))
+    assert first.held_out_after_percent == pytest.approx(100 * np.expm1(0.01))
+    assert np.isnan(second.held_out_after_percent)
+
+
+def test_a_planted_trend_with_temperature_comes_out_with_its_slope_and_all_of_the_misfit():
+    problem = toy(warmer)
+    first = trends(problem, problem.fit())[0]
+    assert first.condition == "temperature"
+    assert first.slope_percent == pytest.approx(100 * 2e-4 * 20, rel=1e-3)
+    assert first.share == pytest.approx(1, abs=1e-3)
+    assert first.slope_sd_percent == pytest.approx(100 * SD * np.sqrt(400 / (200 * 12)), rel=1e-3)
+
+
+def test_the_standard_deviation_of_a_slope_is_that_of_its_scatter():
+    slopes = []
+    for seed in range(60):
+        problem = toy(lambda design: np.zeros(design.size), noise=SD, seed=seed)
+        found = {each.condition: each for each in trends(problem, problem.fit())}
+        slopes.append(
+            [found[name].slope_percent / found[name].slope_sd_percent for name in sorted(found)]
+        )
+    assert np.std(slopes, axis=0) == pytest.approx(1, abs=0.25)
+
+
+def test_only_conditions_that_the_tests_vary_have_a_trend():
+    one = toy(warmer, (Conditions("t1"),), [(0, 1), (0, 2)])
+    assert {each.condition for each in trends(one, one.fit())} == {"order"}
+    every = toy(warmer, campaign(AddedMass(25.0, 3.6)))
+    assert {each.condition for each in trends(every, every.fit())} == {
+        "temperature",
+        "amplitude",
+        "added mass",
+        "order",
+        "plane",
+    }
+
+
+def test_a_test_with_other_modes_does_not_pass_for_a_trend_with_its_temperature():
+    """The gap grows with the order only, and the warm test alone holds the high orders."""
+    problem = toy(lambda design: 1e-3 * design.frequency_order)
+    design = problem.observations.design
+    missing = (design.frequency_order > 3) & (design.frequency_test < 2)
+    sd = np.where(missing, 1e3, SD)
+    problem = ToyProblem(Observations(design, problem.observations.value, sd), problem.slopes)
+    found = {each.condition: each for each in trends(problem, problem.fit())}
+    assert abs(found["temperature"].slope_percent) < 1e-3
+    assert found["order"].slope_percent == pytest.approx(0.5, rel=1e-3)

@@ -1,0 +1,151 @@
+"""Errors that repeat: what their loads say against the same errors made in full."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.contract import Hypothesis, Observations
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.gap.repeated_errors import (
+    GAIN_SD,
+    PLACE_SD_M,
+    STRETCHES,
+    TURN_SD_RAD,
+    Repeated,
+    ShapeScaling,
+    section_loads,
+    section_ways,
+)
+from shm.inference.systematic_errors import shared_loads
+from shm.models.composed import Baseline
+from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.values import FloatArray
+from tests.helpers.hangers import HANGER_3
+
+PLAN = CampaignPlan(
+    modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
+)
+TENSION_N = 711e3
+
+
+@pytest.fixture(scope="module")
+def problem() -> GapProblem:
+    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    return GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+
+
+def _shapes(observations: Observations) -> FloatArray:
+    return observations.value[observations.design.frequencies :]
+
+
+def _scaled(problem: GapProblem, raw: FloatArray) -> FloatArray:
+    return np.asarray(ShapeScaling.measured(problem.observations).scaled(raw[None])[0])
+
+
+def test_a_channels_gain_changes_what_its_load_says(problem: GapProblem) -> None:
+    design, value = problem.design, _shapes(problem.observations)
+    channel = (design.shape_place == 1) & (design.shape_component == 0)
+    change = _scaled(problem, value * np.where(channel, 1 + GAIN_SD, 1.0)) - value
+    assert _nearest(problem.repeated.sensors, change) < 0.02
+
+
+def test_a_turned_sensor_changes_what_its_load_says(problem: GapProblem) -> None:
+    design, value = problem.design, _shapes(problem.observations)
+    turned = TURN_SD_RAD * (design.shape_place == 2)
+    other = value.reshape(-1, 2)[:, ::-1].ravel()
+    sign = np.where(design.shape_component == 0, 1.0, -1.0)
+    change = _scaled(problem, value + sign * turned * other) - value
+    assert _nearest(problem.repeated.sensors, change) < 0.02
+
+
+def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> None:
+    """The shapes of the baseline there, against those where it should be."""
+    design = problem.design
+    moved = (*design.places_m, design.places_m[2] + PLACE_SD_M)
+    place = np.where(design.shape_place == 2, len(design.places_m), design.shape_place)
+    theta = np.array([[TENSION_N / HANGER_3.nominal_tension_n, 0, 0, 0, 0]])
+    z = problem.coordinates(Hypothesis()).z(theta)
+    here, there = (
+        problem.predict(Hypothesis(), z, each)[0, design.frequencies :]
+        for each in (
+            replace(design, places_m=moved),
+            replace(design, places_m=moved, shape_place=place),
+        )
+    )
+    agrees = np.bincount(design.shape_mode, here * _shapes(problem.observations)) > 0
+    change = np.where(agrees, 1.0, -1.0)[design.shape_mode] * (there - here)
+    assert _nearest(problem.repeated.sensors, change) < 0.05
+
+
+def _nearest(loads: FloatArray, change: FloatArray) -> float:
+    """How far the likest load is from a change, as a share of it; its sign is nobody's."""
+    signed = np.column_stack([loads, -loads])
+    return float(np.linalg.norm(signed - change[:, None], axis=0).min() / np.linalg.norm(change))
+
+
+def test_loads_of_sensors_do_not_change_a_shapes_length(problem: GapProblem) -> None:
+    scaling = ShapeScaling.measured(problem.observations)
+    along = scaling.weight * _shapes(problem.observations)
+    for column in problem.repeated.sensors.T:
+        assert np.abs(np.bincount(scaling.shape, along * column)).max() < 1e-12
+
+
+def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
+    problem: GapProblem,
+) -> None:
+    """A cosine of the section is solved in full; its shift lies in what the loads span.
+
+    And by a size that fits the prior: a cosine of 0.1 % rms is about one standard deviation.
+    """
+    plain = Baseline("beam1", HANGER_3).physical(
+        np.array([[TENSION_N / HANGER_3.nominal_tension_n]]), 0
+    )
+    edges_m = np.linspace(0, HANGER_3.length_m, 25)
+    middles = (edges_m[1:] + edges_m[:-1]) / 2 / HANGER_3.length_m
+    thick = 1 + 1e-3 * np.sqrt(2) * np.cos(2 * np.pi * middles)
+    zones = tuple(
+        Zone(np.array([a]), np.array([b]), np.array([f**2]), np.array([f]))
+        for a, b, f in zip(edges_m[:-1], edges_m[1:], thick, strict=True)
+    )
+    bars = (replace(plain, zones=(*plain.zones, *more)) for more in (zones, ()))
+    solved = [solve(bar, PLAN.modes, np.empty(0), shapes=False).frequency_hz[0] for bar in bars]
+    shift = np.log(solved[0] / solved[1])[problem.design.frequency_plane][
+        np.arange(problem.design.frequencies), problem.design.frequency_order - 1
+    ]
+    loads = problem.repeated.section
+    ways = np.linalg.lstsq(loads, shift, rcond=None)[0]
+    np.testing.assert_allclose(loads @ ways, shift, atol=2e-6)
+    assert 0.5 < np.linalg.norm(ways) < 3.0
+
+
+@pytest.mark.parametrize("length_m", [3.0, 12.0])
+def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m: float) -> None:
+    ways = section_ways(length_m, 0.001)
+    assert np.sqrt(np.mean((ways**2).sum(axis=1))) == pytest.approx(0.001, rel=1e-3)
+    np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
+
+
+def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
+    scatter = replace(HANGER_3.scatter, along=0.0)
+    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    hanger = replace(HANGER_3, scatter=scatter)
+    found = GapProblem(hanger, "beam1", observed(tests, hanger))
+    design = found.design
+    bars = PhysicalHanger.clamped(hanger, np.full(STRETCHES + 1, TENSION_N))
+    assert not section_loads(design, bars, hanger).any()
+    frequency_hz = np.exp(found.observations.value[: design.frequencies])
+    own = shared_loads(hanger, design.frequency_plane, design.frequency_order, frequency_hz)
+    np.testing.assert_allclose(found.repeated.frequency, own @ own.T, rtol=0.1, atol=1e-12)
+
+
+def test_without_shapes_sensors_have_no_loads() -> None:
+    plan = replace(PLAN, shapes=False)
+    tests = campaign(HANGER_3, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
+    found = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
+    assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()

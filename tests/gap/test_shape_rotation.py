@@ -1,0 +1,98 @@
+"""Modes whose direction is uncertain: what their standard deviations say, and what it does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.noise import nodes
+from shm.gap.observations import observed, told_apart
+from shm.gap.outliers import without_shape
+from shm.gap.problem import GapProblem
+from shm.gap.repeated_errors import turn_loads
+from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.values import ModalTest, Mode
+from tests.helpers.hangers import HANGER_3
+
+PLAN = CampaignPlan(
+    modes=4, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
+)
+SIZE = np.array([0.1, 0.4, 1.0, 0.8])
+
+
+@pytest.fixture(scope="module")
+def test() -> ModalTest:
+    return campaign(HANGER_3, HangerState(711e3), (), PLAN, np.random.default_rng(4))[0]
+
+
+def _may_be_turned(mode: Mode, rad: float) -> Mode:
+    shape = tuple(replace(p, sd=float(np.hypot(p.sd, rad * p.value))) for p in mode.shape)
+    return replace(mode, shape=shape)
+
+
+def _turned(mode: Mode, rad: float) -> Mode:
+    """The mode turned about the hanger's axis."""
+    cosine, sine = np.cos(rad), np.sin(rad)
+    shape = tuple(
+        replace(p, value=cosine * p.value - sine * p.cross, cross=cosine * p.cross + sine * p.value)
+        for p in mode.shape
+    )
+    return replace(mode, shape=shape)
+
+
+def test_what_grows_with_the_shape_is_the_turn() -> None:
+    own, turn = told_apart(np.hypot(0.005, 0.1 * SIZE), SIZE, 0.004)
+    assert turn == pytest.approx(0.1)
+    assert own == pytest.approx(0.005)
+
+
+def test_standard_deviations_that_do_not_grow_with_the_shape_stay_as_they_are() -> None:
+    for sd in (np.full(4, 0.005), np.array([0.0055, 0.005, 0.006, 0.0052])):
+        own, turn = told_apart(sd, SIZE, 0.005)
+        assert turn == 0
+        assert own is sd
+
+
+def test_own_deviations_are_never_smaller_than_the_least() -> None:
+    own, turn = told_apart(0.2 * SIZE, SIZE, 0.005)
+    assert own == pytest.approx(0.005)
+    assert turn == pytest.approx(0.2, rel=0.01)
+
+
+def test_without_turns_nothing_changes(test: ModalTest) -> None:
+    found = observed([test], HANGER_3)
+    assert found.turned is None
+    assert turn_loads(found).shape == (64, 0)
+
+
+@pytest.mark.parametrize("rad", [0.02, 0.3])
+def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> None:
+    """The chi-square of the shapes grows by one for it, and by far more where it is not stated."""
+
+    def chi_square(mode: Mode) -> float:
+        problem = GapProblem(
+            HANGER_3, "beam1", observed([replace(test, modes=(mode, *rest))], HANGER_3)
+        )
+        covariance = nodes(problem.observations, problem.repeated)[0].covariance
+        whole = np.diag(covariance.shape) + covariance.shape_loads @ covariance.shape_loads.T
+        expected = observed([test], HANGER_3).value[test_modes:]
+        left = problem.observations.value[test_modes:] - expected
+        return float(left @ np.linalg.solve(whole, left))
+
+    first, *rest = test.modes
+    test_modes = len(test.modes)
+    assert chi_square(_turned(_may_be_turned(first, rad), rad)) < 2
+    assert chi_square(_turned(first, rad)) > 20
+
+
+def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: ModalTest) -> None:
+    first, *rest = (_may_be_turned(mode, 0.3) for mode in test.modes)
+    turned = replace(test, modes=(first, *rest))
+    whole = GapProblem(HANGER_3, "beam1", observed([turned], HANGER_3))
+    without = without_shape(whole, 0).observations
+    others = whole.observations.design.shape_mode != 0
+    _, _, *of_others = turn_loads(whole.observations)[others].T
+    # A sum over fewer components rounds otherwise; what is no load of a mode is 0 in both.
+    np.testing.assert_allclose(turn_loads(without), np.column_stack(of_others), rtol=1e-13)

@@ -1,0 +1,210 @@
+"""The sheet of one test as a page and in a terminal."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from shm import documents
+from shm.report.as_html import as_html
+from shm.report.as_text import as_text
+from shm.report.contents import ModalTestReport
+from shm.report.modal_test_report import modal_test_json, modal_test_paper
+from shm.values import ModalTest, QualityCheck
+from tests.report.outline import Outline
+from tests.report.sheets import (
+    HANGER,
+    ambient,
+    given_responses,
+    make_poles,
+    make_sheet,
+    one_sensor,
+    refused,
+    warned,
+)
+
+CASES: dict[str, Callable[[], ModalTestReport]] = {
+    "dropped": lambda: warned(make_sheet(hits=6, dropped={2: "double hit"})),
+    "refused": lambda: refused(make_sheet()),
+    "given responses": given_responses,
+    "one sensor": one_sensor,
+    "ambient": ambient,
+}
+
+PAGES = ["dropped", "given responses"]
+
+
+@pytest.fixture(scope="module")
+def pages() -> dict[str, str]:
+    return {name: as_html(modal_test_paper(CASES[name]())) for name in PAGES}
+
+
+@pytest.fixture(scope="module")
+def outlines(pages: dict[str, str]) -> dict[str, Outline]:
+    parsed = {name: Outline() for name in pages}
+    for name, page in pages.items():
+        parsed[name].feed(page)
+    return parsed
+
+
+def told(outline: Outline) -> str:
+    return " ".join(" ".join(outline.words).split())
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_nest_fetch_nothing_and_are_small(
+    name: str, pages: dict[str, str], outlines: dict[str, Outline]
+) -> None:
+    outline, page = outlines[name], pages[name]
+    assert outline.open == []
+    for tag, attributes in outline.tags:
+        assert tag not in {"script", "link", "iframe"}
+        assert not {"src", "srcset", "data", "action"} & attributes.keys()
+    assert not re.search(r"url\((?!#)|@import", page)
+    assert "http" not in page.replace("http://www.w3.org/", "")
+    assert len(page) < 2_000_000
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_have_unique_ids_sound_headings_and_no_nan(
+    name: str, outlines: dict[str, Outline]
+) -> None:
+    outline = outlines[name]
+    ids = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    levels = [int(tag[1]) for tag, _ in outline.tags if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert not re.search(r"\b(nan|inf|None)\b", " ".join(outline.words))
+
+
+def test_the_page_begins_with_what_was_measured_what_came_of_it_and_what_to_do(
+    outlines: dict[str, Outline],
+) -> None:
+    page = told(outlines["dropped"])
+    paragraph = page[page.index("In short") : page.index("Modes and quality")]
+    for words in (
+        "4 acceleration channels at 2 places in both planes and 6 hits: 5 used",
+        "1 dropped (1 double hit)",
+        "12 modes were identified: transverse 1 to 6 (5.8 to 34.8 Hz) and longitudinal 1 to 6",
+        "Set aside as no modes of the hanger: harmonic at 11.6 Hz, tone at 50 Hz and deck at",
+        "The modes can be used with care: 2 of 4 checks warn (double hits and tones)",
+        "Next: Hit freely. Move the cables",
+    ):
+        assert words in paragraph
+
+
+def test_the_page_holds_every_number_that_a_person_checks(outlines: dict[str, Outline]) -> None:
+    page = told(outlines["dropped"])
+    for words in (
+        "transverse 1 5.8000 0.001 0.4000 0.02 0.4",
+        "harmonic 11.600 0.4000 twice the frequency of transverse 1",
+        "tone 50.000 not known mains",
+        "2 made.csv 4.500 950 no: double hit",
+        "poles 41 not stable over the model orders",
+        "double hits ! warning 1 hits 0 hits hit 2 struck twice Hit freely.",
+        "cross-check ? unknown not known 0.2 %",
+        "transverse order 4 was not found; the others keep their numbers",
+        "2 to 90 Hz",
+        "hit level over reference level 0.97",
+        "Hanger 3 (north), 12 m, nominal tension 711 kN",
+    ):
+        assert words in page, words
+
+
+def test_verdicts_are_marked_on_their_rows(outlines: dict[str, Outline]) -> None:
+    rows = [attributes["class"] for tag, attributes in outlines["dropped"].tags
+            if tag == "tr" and "class" in attributes]  # fmt: skip
+    assert rows == ["warning", "good", "good", "warning", "unknown"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("refused", "Do not use it: refused by noise. Next: Hit harder."),
+        ("given responses", "9 acceleration channels at 9 places, given as frequency responses."),
+        ("one sensor", "1 acceleration channel and 5 hits: all used."),
+        ("ambient", "of ambient motion: nobody hit."),
+        ("ambient", "Its quality was not checked: judge by the figures before using the modes."),
+    ],
+)
+def test_the_paragraph_fits_every_kind_of_test(name: str, words: str) -> None:
+    assert words in " ".join(as_text(modal_test_paper(CASES[name]())).split())
+
+
+def test_a_test_of_good_checks_is_trusted() -> None:
+    sheet = make_sheet(hits=1)
+    checks = (
+        QualityCheck("clipping", "good", 0.2, 0.95, "", "sound"),
+        QualityCheck("coherence", "unknown", float("nan"), 0.8, "", "one hit gives none"),
+    )
+    sheet = replace(sheet, identification=replace(sheet.identification, quality=checks))
+    text = " ".join(as_text(modal_test_paper(sheet)).split())
+    assert "and one hit." in text
+    assert "the one check that could be made is good" in text
+    assert "Nothing needs doing before using them." in text
+    assert "1 further check good." in text
+    assert text.startswith("Test t1, Hanger 3 (north): Good")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_texts_fit_a_terminal(name: str) -> None:
+    text = as_text(modal_test_paper(CASES[name]()))
+    assert max(len(line) for line in text.splitlines()) <= 100
+    assert len(text.splitlines()) < 70
+    assert not re.search(r"\b(nan|inf|None)\b", text)
+
+
+def test_the_text_tells_doubts_in_full_and_counts_good_checks() -> None:
+    text = " ".join(as_text(modal_test_paper(CASES["dropped"]())).split())
+    assert "double hits ! warning 1 hits 0 hits hit 2 struck twice Hit freely." in text
+    assert "clipping" not in text
+    assert "2 further checks good." in text
+    assert "1 transverse order 4 was not found" in text
+    assert "LEFT OUT what how many why" in text
+
+
+def test_missing_orders_show_in_the_paragraph() -> None:
+    sheet = make_sheet()
+    kept = tuple(m for m in sheet.modes if m.plane == "transverse" and m.order not in (3, 5))
+    test = replace(sheet.identification.test, modes=kept)
+    text = as_text(
+        modal_test_paper(replace(sheet, identification=replace(sheet.identification, test=test)))
+    )
+    assert "transverse 1 to 2, 4, 6 (5.8 to 34.8 Hz)" in " ".join(text.split())
+
+
+def test_names_from_outside_cannot_inject_markup() -> None:
+    sly = "<script>alert(1)</script>"
+    sheet = given_responses()
+    bare = replace(
+        sheet.identification,
+        test=ModalTest(sly, ()),
+        frequency_response=None,
+        poles=make_poles((), orders=0),
+        notes=(sly,),
+    )
+    page = as_html(
+        modal_test_paper(replace(sheet, identification=bare, hanger=replace(HANGER, name=sly)))
+    )
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_the_document_survives_json_and_holds_what_the_page_tells() -> None:
+    document = json.loads(documents.dump(modal_test_json(CASES["dropped"]())))
+    assert document["schema"] == "shm.test-sheet/1"
+    assert document["verdict"] == "warning"
+    assert document["test"]["modes"][0]["frequency_hz"] == 5.8
+    assert [check["verdict"] for check in document["quality"]].count("warning") == 2
+    assert document["quality"][-1]["value"] is None
+    assert document["set_aside"][1] == {
+        "kind": "tone", "frequency_hz": 50.0, "damping_ratio": None, "reason": "mains",
+    }  # fmt: skip
+    assert document["hits"][1]["reason"] == "double hit"
+    assert document["band_hz"] == [2.0, 90.0]

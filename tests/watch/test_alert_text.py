@@ -1,0 +1,458 @@
+"""When an alert is raised, when it is not raised again, and what it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from typing import Literal
+
+import pytest
+
+from shm.errors import BadInput
+from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
+from shm.watch.alert_text import shift_words
+from shm.watch.watching import AlertState, after, alerts_of, new_alert
+from tests.helpers.hangers import HANGER_3
+
+START = datetime(2026, 5, 1, tzinfo=UTC)
+FELL = Moved("tension", 0.97, -0.082, 0.0067)
+DECK = Moved("log10_k1", 0.55, -0.3, 0.06, "deck", "transverse", ("log10_k3",))
+ARCH = Moved("log10_k3", 0.40, -0.31, 0.06, "arch", "transverse", ("log10_k1",))
+
+
+def change(
+    *, called: bool = False, began: float = 0.0, probability: float = 0.9, **changes: object
+) -> Change:
+    values: dict[str, object] = {
+        "evidence_years": 500.0 if called else 1.0,
+        "limit_years": 200.0,
+        "probability": probability,
+        "sudden": 0.98,
+        "began_after": START + timedelta(days=began - 3),
+        "began_by": START + timedelta(days=began),
+        "moved": (FELL,),
+        "outlier_probability": 0.01,
+        **changes,
+    }
+    return Change(**values)  # type: ignore[arg-type]
+
+
+def drift(test: str, probability: float, quantity: str = "tension", shift: float = -0.08) -> Drift:
+    limit = 0.05 if quantity == "tension" else 0.5
+    baseline, value = (711e3, 711e3 * (1 + shift)) if quantity == "tension" else (7.0, 7.0 + shift)
+    return Drift(
+        3, test, START, quantity, baseline, value, shift, abs(shift) / 10, limit, probability
+    )
+
+
+def day(
+    number: int, said: Change | None = None, probability: float = 0.0, **shifts: float
+) -> WatchedTest:
+    """The test of a day: tension beyond its threshold with a probability, springs by name."""
+    name = f"t{number}"
+    drifts = [drift(name, probability, **shifts)]  # type: ignore[arg-type]
+    said = said or change()
+    return WatchedTest(name, START + timedelta(days=number), 11.0, tuple(drifts), said)
+
+
+def told(*watched: WatchedTest) -> list[tuple[str, tuple[str, ...]]]:
+    return [(alert.test, alert.kinds) for alert in alerts_of(watched, HANGER_3)]
+
+
+def only(*watched: WatchedTest) -> Alert:
+    (alert,) = alerts_of(watched, HANGER_3)
+    return alert
+
+
+# ---------------------------------------------------------------- when
+
+
+def test_nothing_called_and_nothing_beyond_is_no_alert() -> None:
+    assert new_alert([], HANGER_3) is None
+    assert told(day(1), day(2, probability=0.94), day(3)) == []
+
+
+@pytest.mark.parametrize(("sudden", "kind"), [(0.98, "sudden change"), (0.2, "slow drift")])
+def test_a_called_change_is_sudden_or_slow_by_the_likelier(sudden: float, kind: str) -> None:
+    assert told(day(1), day(2, change(called=True, sudden=sudden))) == [("t2", (kind,))]
+
+
+def test_a_change_that_stays_called_is_told_once() -> None:
+    later = [day(n, change(called=True, began=2)) for n in (2, 3, 4)]
+    assert told(*later) == [("t2", ("sudden change",))]
+
+
+def test_a_call_that_flickers_about_its_limit_is_told_once() -> None:
+    calls = [day(n, change(called=called, began=2)) for n, called in enumerate((1, 0, 1), start=2)]  # type: ignore[arg-type]
+    assert told(*calls) == [("t2", ("sudden change",))]
+
+
+def test_a_further_change_after_the_alert_is_another() -> None:
+    first, second = change(called=True, began=2), change(called=True, began=9)
+    assert told(day(2, first), day(3), day(10, second)) == [
+        ("t2", ("sudden change",)),
+        ("t10", ("sudden change",)),
+    ]
+
+
+def test_a_change_that_went_away_can_be_called_anew() -> None:
+    called = change(called=True, began=2)
+    assert told(day(2, called), day(3, change(probability=0.48)), day(4, called)) == [
+        ("t2", ("sudden change",))
+    ]
+    assert told(day(2, called), day(3, change(probability=0.47)), day(4, called)) == [
+        ("t2", ("sudden change",)),
+        ("t4", ("sudden change",)),
+    ]
+
+
+def test_a_probability_that_hovers_about_the_level_rings_once() -> None:
+    hovering = [day(n, probability=p) for n, p in enumerate((0.96, 0.93, 0.97, 0.5, 0.99))]
+    assert told(*hovering) == [("t0", ("beyond threshold",))]
+
+
+def test_a_condition_that_ended_below_half_the_level_can_ring_anew() -> None:
+    again = [day(n, probability=p) for n, p in enumerate((0.96, 0.47, 0.94, 0.96))]
+    assert [name for name, _ in told(*again)] == ["t0", "t3"]
+
+
+def test_the_level_and_its_half_are_those_of_the_hanger() -> None:
+    careful = replace(HANGER_3, thresholds=Thresholds(alert_probability=0.6))
+    watched = [day(n, probability=p) for n, p in enumerate((0.6, 0.31, 0.7, 0.29, 0.7))]
+    assert [alert.test for alert in alerts_of(watched, careful)] == ["t0", "t4"]
+
+
+def test_an_unknown_probability_neither_raises_nor_ends() -> None:
+    nan = float("nan")
+    watched = [day(n, probability=p) for n, p in enumerate((nan, 0.96, nan, 0.97))]
+    assert [name for name, _ in told(*watched)] == ["t1"]
+    called = change(called=True, began=2)
+    assert len(told(day(2, called), day(3, change(probability=nan)), day(4, called))) == 1
+
+
+def test_a_called_change_that_passes_the_threshold_is_told_again() -> None:
+    called = change(called=True, began=2)
+    assert told(day(2, called), day(3, called, 0.5), day(4, called, 0.97)) == [
+        ("t2", ("sudden change",)),
+        ("t4", ("beyond threshold",)),
+    ]
+
+
+def test_a_change_beyond_its_threshold_at_once_is_one_alert_of_both_kinds() -> None:
+    assert told(day(2, change(called=True), 0.99)) == [
+        ("t2", ("beyond threshold", "sudden change"))
+    ]
+
+
+def test_a_call_that_comes_after_the_threshold_adds_nothing() -> None:
+    late = change(called=True, began=2)
+    assert told(day(2, probability=0.97), day(3, late, 0.97)) == [("t2", ("beyond threshold",))]
+
+
+def test_a_call_of_another_quantity_than_the_one_beyond_is_told() -> None:
+    other = change(called=True, began=2, moved=(DECK, ARCH))
+    assert told(day(2, probability=0.97), day(3, other, 0.97)) == [
+        ("t2", ("beyond threshold",)),
+        ("t3", ("sudden change",)),
+    ]
+
+
+def test_a_gain_after_a_loss_is_another_condition() -> None:
+    watched = day(1, probability=0.97), day(2, probability=0.97, shift=0.09)
+    assert [alert.key for alert in alerts_of(watched, HANGER_3)] == [
+        "hanger-3:beyond-threshold:tension-down:t1",
+        "hanger-3:beyond-threshold:tension-up:t2",
+    ]
+
+
+# ---------------------------------------------------------------- the same alert
+
+
+def test_the_newest_test_alone_decides_whether_there_is_a_new_alert() -> None:
+    watched = [day(1), day(2, change(called=True)), day(3, change(called=True))]
+    alert = new_alert(watched[:2], HANGER_3)
+    assert alert is not None
+    assert alert == only(*watched)
+    assert new_alert(watched, HANGER_3) is None
+
+
+def test_asking_after_each_test_gives_the_alerts_of_the_history() -> None:
+    probabilities = (0.1, 0.96, 0.4, 0.97, 0.2, 0.99)
+    watched = [day(n, change(called=n == 3, began=n), p) for n, p in enumerate(probabilities)]
+    asked = [new_alert(watched[: n + 1], HANGER_3) for n in range(len(watched))]
+    assert [alert for alert in asked if alert] == list(alerts_of(watched, HANGER_3))
+
+
+def test_the_key_names_hanger_rules_quantity_way_and_test() -> None:
+    assert only(day(2, change(called=True))).key == "hanger-3:sudden-change:tension-down:t2"
+    both = only(day(2, change(called=True, moved=(DECK, ARCH)), 0.99))
+    assert both.key == "hanger-3:beyond-threshold+sudden-change:tension-down:t2"
+
+
+def test_keys_of_long_test_names_fit_the_store_and_stay_apart() -> None:
+    base = day(2, change(called=True))
+    keys = {only(replace(base, test="x" * 300 + end)).key for end in "ab"}
+    assert len(keys) == 2
+    assert max(map(len, keys)) < 200
+
+
+# ---------------------------------------------------------------- what it says
+
+
+def test_a_sudden_loss_says_first_what_moved_and_last_what_to_do() -> None:
+    message = only(day(2, change(called=True, began=2), 0.3)).message
+    assert message == (
+        "Hanger 3: tension fell by 8.2 % (90 % interval 7.1 to 9.3 %). That it is this that "
+        "moved: probability 0.97. Tension is now 654.1 kN, 8.0 % below the 711 kN of the baseline. "
+        "It came suddenly (probability 0.98), between 2026-04-30 and 2026-05-03. That anything has "
+        "changed: probability 0.90; a hanger that does not change raises such an alert at most "
+        "once in 200 years on the average. The threshold of the tension is 5 %: passed with "
+        "probability 0.30. What to do: hit it again within days. If it holds, compare the hangers "
+        "beside it (shm drift bridge), which take up what it sheds, and look at its anchorages "
+        "and along the rod."
+    )
+
+
+@pytest.mark.parametrize(
+    ("baseline_n", "said"),
+    [
+        (5.4, "Tension is now 4.968 N, 8.0 % below the 5.4 N of the baseline."),
+        (20e3, "Tension is now 18.4 kN, 8.0 % below the 20 kN of the baseline."),
+        (12e6, "Tension is now 11.04 MN, 8.0 % below the 12 MN of the baseline."),
+        (10.5e6, "Tension is now 9.66 MN, 8.0 % below the 10.5 MN of the baseline."),
+    ],
+)
+def test_the_tension_is_told_in_the_unit_that_fits_it(baseline_n: float, said: str) -> None:
+    test = day(2, change(called=True, began=2), 0.3)
+    shift = replace(test.drifts[0], baseline=baseline_n, value=0.92 * baseline_n)
+    assert said in only(replace(test, drifts=(shift,))).message
+
+
+def test_beyond_the_threshold_comes_first_and_asks_for_a_decision() -> None:
+    message = only(day(2, probability=0.99)).message
+    assert message.startswith(
+        "Hanger 3: tension fell by 8.0 % (90 % interval 6.7 to 9.3 %), beyond its threshold of 5 % "
+        "with probability 0.99."
+    )
+    assert "have the engineer in charge decide on traffic now" in message
+
+
+def test_what_the_data_cannot_tell_apart_is_said_with_both_ends() -> None:
+    alert = only(day(2, change(called=True, moved=(DECK, ARCH))))
+    assert alert.message.startswith(
+        "Hanger 3: something moved, and these tests cannot tell what: end stiffness k1 (deck end, "
+        "transverse) fell to 0.50 times what it was (90 % interval 0.40 to 0.63 times), "
+        "probability 0.55; or end stiffness k3 (arch end, transverse) fell to 0.49 times"
+    )
+    assert "A sensor near each end" in alert.message
+    assert "Tension is now" not in alert.message
+
+
+def test_beyond_the_threshold_names_what_the_data_cannot_tell_from_it() -> None:
+    said = change(called=True, moved=(DECK, ARCH))
+    message = only(day(2, said, 0.99, quantity="log10_k1", shift=-0.7)).message  # type: ignore[arg-type]
+    assert "end stiffness k1 (deck end, transverse) fell to 0.20 times" in message
+    assert "beyond its threshold of 0.32 times" in message
+    assert (
+        "cannot tell whether it is end stiffness k1 (deck end, transverse) (probability 0.55) or "
+        "end stiffness k3" in message
+    )
+
+
+def test_a_spring_known_for_sure_sends_the_crew_to_its_end() -> None:
+    deck = replace(DECK, probability=0.95, alike=())
+    message = only(day(2, change(called=True, moved=(deck, ARCH)))).message
+    assert "That it is this that moved: probability 0.95." in message
+    assert "look at the deck end: a worn pin" in message
+
+
+def test_where_the_end_is_not_known_both_are_looked_at() -> None:
+    somewhere = replace(DECK, end=None, alike=())
+    message = only(day(2, change(called=True, moved=(somewhere,)))).message
+    assert "k1 (which end is not known, transverse)" in message
+    assert "look at both ends" in message
+
+
+def test_a_slow_drift_says_since_when_and_leaves_weeks() -> None:
+    message = only(day(9, change(called=True, began=2, sudden=0.1))).message
+    assert (
+        "It came slowly (probability 0.90); it began between 2026-04-30 and 2026-05-03." in message
+    )
+    assert "hit it again within weeks" in message
+
+
+def test_sudden_or_slow_is_left_open_where_it_is() -> None:
+    message = only(day(9, change(called=True, sudden=0.6))).message
+    assert "whether suddenly or slowly cannot be told yet (suddenly: probability 0.60)" in message
+
+
+def test_a_test_that_may_be_a_blunder_is_called_so() -> None:
+    message = only(day(2, change(called=True, outlier_probability=0.7))).message
+    assert "This test itself may be a blunder (probability 0.70)." in message
+
+
+def test_an_alert_holds_the_shifts_it_speaks_of_and_the_change_behind_it() -> None:
+    called = only(day(2, change(called=True)))
+    assert [each.quantity for each in called.drifts] == ["tension"]
+    assert called.change is not None
+    assert only(day(2, change(called=True, moved=(DECK, ARCH)))).drifts == ()
+    assert only(day(2, change(probability=0.2), 0.99)).change is None
+
+
+def test_beyond_the_threshold_after_a_call_speaks_of_the_called_change() -> None:
+    """After a call the watch looks for a further change: what it makes of that is no cause."""
+    further = change(began=9, probability=0.99, sudden=0.5, moved=(ARCH,))
+    call, beyond = alerts_of(
+        [day(2, change(called=True, began=2)), day(9, further, 0.97)], HANGER_3
+    )
+    assert call.change is not None
+    assert beyond.change == replace(call.change, probability=0.99)
+    assert "It is the tension (probability 0.97) that has changed." in beyond.message
+    assert "between 2026-04-30 and 2026-05-03" in beyond.message
+    assert "k3" not in beyond.message
+    assert "once in 200 years" not in beyond.message
+
+
+def test_beyond_the_threshold_is_not_put_on_a_called_change_of_another_quantity() -> None:
+    called = change(called=True, began=2, moved=(DECK, ARCH))
+    _, beyond = alerts_of([day(2, called), day(9, probability=0.97)], HANGER_3)
+    assert beyond.change is None
+    assert "It came" not in beyond.message
+
+
+def test_a_further_change_is_said_to_be_one() -> None:
+    rose = Moved("tension", 0.98, 0.009, 0.0015)
+    calls = [day(n, change(called=True, began=n, moved=(m,))) for n, m in ((2, FELL), (9, rose))]
+    first, second = alerts_of(calls, HANGER_3)
+    assert "further" not in first.message
+    assert second.message.startswith("Hanger 3: a further change: tension rose by 0.9 % (")
+    assert "8.0 % below the 711 kN of the baseline" in second.message
+
+
+def test_beyond_the_threshold_speaks_of_the_called_change_that_went_the_same_way() -> None:
+    rose = change(called=True, began=9, moved=(Moved("tension", 0.98, 0.009, 0.0015),))
+    watched = [day(2, change(called=True, began=2)), day(9, rose), day(12, probability=0.99)]
+    beyond = alerts_of(watched, HANGER_3)[-1]
+    assert beyond.change is not None
+    assert beyond.change.moved == (FELL,)
+    assert "which take up what it sheds" in beyond.message
+
+
+def test_a_call_without_a_suspect_is_still_told() -> None:
+    alert = only(day(2, change(called=True, moved=())))
+    assert alert.message.startswith("Hanger 3: something has changed.")
+    assert alert.key.endswith(":unknown:t2")
+
+
+@pytest.mark.parametrize(
+    ("quantity", "mean", "sd", "words"),
+    [
+        ("tension", -0.01, 0.02, "moved by -1.0 % (90 % interval -4.3 % to +2.3 %)"),
+        ("tension", 0.02, 0.0005, "rose by 2.00 % (90 % interval 1.92 to 2.08 %)"),
+        ("log10_k1", 0.5, 0.1, "rose to 3.2 times what it was (90 % interval 2.2 to 4.6 times)"),
+        ("log10_k1", -3.0, 0.1, "fell to less than 0.01 times what it was "
+         "(90 % interval less than 0.01 to less than 0.01 times)"),
+        ("log10_k1", 1.5, 2.0, "moved to 32 times what it was "
+         "(90 % interval 0.02 to more than 1000 times)"),
+    ],
+)  # fmt: skip
+def test_shifts_read_as_people_say_them(quantity: str, mean: float, sd: float, words: str) -> None:
+    assert shift_words(quantity, mean, sd) == words
+
+
+# ---------------------------------------------------------------- what moved together
+
+
+def _joint(*names: str, shift: float = -0.155, **of_first: object) -> tuple[Moved, ...]:
+    places: dict[str, tuple[Literal["deck", "arch"], Plane]] = {
+        "log10_k1": ("deck", "transverse"),
+        "log10_k2": ("deck", "longitudinal"),
+        "log10_k3": ("arch", "transverse"),
+        "log10_k4": ("arch", "longitudinal"),
+    }
+    moved = [
+        Moved(name, 0.96, shift, 0.02, *places[name], together=tuple(n for n in names if n != name))
+        for name in names
+    ]
+    return replace(moved[0], **of_first), *moved[1:]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("names", "where"),
+    [
+        (("log10_k1", "log10_k2"), "both planes at the deck end"),
+        (("log10_k1", "log10_k3"), "the transverse plane at both ends"),
+        (("log10_k1", "log10_k2", "log10_k3", "log10_k4"), "both planes at both ends"),
+    ],
+)
+def test_what_moved_together_is_told_as_one(names: tuple[str, ...], where: str) -> None:
+    message = only(day(1), day(2, change(called=True, moved=_joint(*names)))).message
+    assert f"Hanger 3: end stiffness in {where} fell to 0.70 times what it was" in message
+    assert "That it is this that moved: probability 0.96." in message
+    look = "the deck end" if "log10_k3" not in names else "both ends"
+    assert f"look at {look}: a worn pin" in message
+
+
+def test_ends_that_cannot_be_told_apart_are_told_as_such_together() -> None:
+    moved = tuple(
+        Moved(
+            f"{plane}_end_stiffness",
+            0.9,
+            -0.15,
+            0.02,
+            None,
+            plane,
+            together=(f"{other}_end_stiffness",),
+        )
+        for plane, other in (PLANES, PLANES[::-1])
+    )
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "end stiffness in both planes (which end is not known) fell to 0.71 times" in message
+
+
+def test_quantities_that_went_different_ways_together_are_told_each() -> None:
+    deck = _joint("log10_k1", "log10_k2")
+    moved = (deck[0], replace(deck[1], shift_mean=-0.4))
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "both planes at the deck end moved together: end stiffness k1 (deck end" in message
+    assert "and end stiffness k2 (deck end, longitudinal) fell to 0.40 times" in message
+
+
+def test_one_and_several_that_explain_the_data_alike_are_told_as_alternatives() -> None:
+    first, second = _joint("log10_k1", "log10_k2", alike=("tension",))
+    moved = (first, second, replace(FELL, probability=0.3, alike=("log10_k1", "log10_k2")))
+    message = only(day(1), day(2, change(called=True, moved=moved))).message
+    assert "cannot tell what: end stiffness in both planes at the deck end fell to 0.70" in message
+    assert "; or tension fell by 8.2 %" in message
+    assert message.count("both planes at the deck end") == 1
+
+
+# ---------------------------------------------------------------- kept between tests
+
+
+def test_what_was_told_comes_back_from_its_text() -> None:
+    stands = AlertState()
+    assert AlertState.from_text("") == AlertState.from_text(stands.to_text()) == stands
+    joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
+    for test in (day(1), day(2, joint), day(3, change(called=True, began=2), probability=0.99)):
+        stands, _ = after(stands, test, HANGER_3)
+    assert stands.beyond
+    assert len(stands.called) == 2
+    assert AlertState.from_text(stands.to_text()) == stands
+
+
+def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
+    history = [day(1), day(2, change(called=True)), day(3, probability=0.99), day(4), day(5)]
+    text, alerts = "", []
+    for test in history:
+        stands, alert = after(AlertState.from_text(text), test, HANGER_3)
+        text = stands.to_text()
+        alerts += [alert] if alert else []
+    assert tuple(alerts) == alerts_of(history, HANGER_3)
+    assert len(alerts) == 2
+
+
+@pytest.mark.parametrize("text", ["{", "{}", "[]", '{"beyond": [1], "call": null, "called": []}'])
+def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="cannot be read"):
+        AlertState.from_text(text)
