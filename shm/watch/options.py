@@ -22,12 +22,12 @@ class WatchOptions:
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     outlier_probability: float = 0.01
-    tension_scatter: float = 0.003
+    tension_scatter: float = 0.005
     spring_scatter_of_step: float = 0.1
     bending_scatter: float = 0.003
     clock_scatter: float = 1e-4
     mode_scatter: float = 5e-4
-    scatter_scales: tuple[float, ...] = (0.7, 1.0, 1.5, 2.2)
+    scatter_scales: tuple[float, ...] = (0.6, 1.0, 1.6, 2.6)
     tension_per_kelvin_sd: float = 0.001
     spring_per_kelvin_sd_of_step: float = 0.1
     tension_per_amplitude_sd: float = 0.002

@@ -58,26 +58,27 @@ def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
 def changed(
     subject: Subject,
     evidence: Evidence,
+    causes: Evidence,
     reading: Reading,
     before: float,
     outlier: float,
     effects: FloatArray,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
-    `outlier` that of this test being a blunder. `effects` (r, n + q) are what a change does to the
+    `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is that of this test being a blunder. `effects` (r, n + q) are what a change does to the
     frequencies that owners look at."""
     now = probability_of_change(evidence, subject.options)
-    began_after, began_by = _began(subject, evidence, reading)
+    began_after, began_by = _began(subject, causes, reading)
     return Change(
         evidence_years=math.exp(min(evidence.log_evidence, 700.0)),
         limit_years=subject.options.limit_years,
         probability=1 - (1 - before) * (1 - now),
-        sudden=_sudden(evidence),
+        sudden=_sudden(causes),
         began_after=began_after,
         began_by=began_by,
-        moved=_moved(subject.quantities, evidence),
+        moved=_moved(subject.quantities, causes),
         outlier_probability=outlier,
-        material_probability=_material(subject, evidence, effects),
+        material_probability=_material(subject, causes, effects),
     )
 
 
@@ -229,7 +230,9 @@ def _company(
     )
 
 
-def drifted(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[Drift, ...]:
+def drifted(
+    subject: Subject, evidence: Evidence, causes: Evidence, reading: Reading
+) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline, called changes and a possible new one.
 
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
@@ -237,6 +240,7 @@ def drifted(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[Dri
     threshold is averaged over all.
     """
     probability = probability_of_change(evidence, subject.options)
+    evidence = causes
     loadings = _of_called(evidence)
     nulls = [
         (
@@ -264,7 +268,12 @@ def drifted(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[Dri
         moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
         threshold = threshold_of(quantity, subject.hanger)
         chance = beyond(
-            quantity, all_weights[moving], all_means[moving, j], all_sds[moving, j], threshold
+            quantity,
+            all_weights[moving],
+            all_means[moving, j],
+            all_sds[moving, j],
+            threshold,
+            subject.options.least_frequency_shift,
         )
         found.append(_drift(subject, quantity, reading, shift, threshold, chance))
     return tuple(found)
@@ -381,12 +390,19 @@ def beyond(
     mean: FloatArray,
     sd: FloatArray,
     threshold: float,
+    least: float = 0.0,
 ) -> float:
-    """Probability of a shift beyond a threshold, the likelier way, by the same mixture."""
+    """Probability of a shift beyond a threshold, the likelier way, by the same mixture.
+
+    Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
+    less than `least`, a spring's coordinate, is not beyond.
+    """
     kept = weights > _NEGLIGIBLE
     weights, mean = weights[kept], mean[kept]
     sd = np.maximum(sd[kept], 1e-12)
     low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    if quantity.name != TENSION:
+        low, high = min(low, -least), max(high, least)
     down = float(weights @ ndtr((low - mean) / sd))
     up = float(weights @ ndtr((mean - high) / sd))
     return min(max(down, up), 1.0)

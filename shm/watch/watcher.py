@@ -24,6 +24,7 @@ from shm.values import (
     Change,
     FloatArray,
     Hanger,
+    IntArray,
     Reading,
     WatchedQuantity,
     WatchedTest,
@@ -37,7 +38,7 @@ from shm.watch.change_point import (
     evidence_of,
     sums_of,
 )
-from shm.watch.conditions import Warmth, years_between
+from shm.watch.conditions import DAYS_PER_YEAR, Warmth, years_between
 from shm.watch.isolated_tests import Seen, counted, outlier_probability
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
@@ -45,6 +46,8 @@ from shm.watch.scatter import differences, learnt
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 3
+_SAME_DAY_YEARS = 1.5 / DAYS_PER_YEAR  # judgement: of one visit: wind, sensors, operator
+_LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 _LEAST_SHARE = 1e-3  # judgement: of a cause in a call, which later tests may yet speak for
 
 
@@ -221,14 +224,13 @@ class Watcher:
                 remedy="Sort the tests by time.",
             )
         state = self._with(state, reading)
+        state = self._bounded(state)
         rows = np.flatnonzero(state.counted)
         evidence = self._evidence(state, rows)
-        alone = evidence.log_of_last if state.counted[-1] else 0.0
-        if alone > self.options.most_of_one_test_nats:
-            weight = state.weight.copy()
-            weight[-1] = self.options.most_of_one_test_nats / alone
-            state = replace(state, weight=weight)
-            evidence = self._evidence(state, rows)
+        causes = evidence
+        if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
+            # How sure it is that anything changed is bounded; which cause it was is for all to say.
+            causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         subject = Subject(self.quantities, self.hanger, self.options, state.start)
         last = state.tests - 1
         outlier = 0.0 if state.counted[-1] else self._outlier(state, last)
@@ -236,18 +238,36 @@ class Watcher:
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
-            drifts=drifted(subject, evidence, reading),
+            drifts=drifted(subject, evidence, causes, reading),
             change=changed(
-                subject, evidence, reading, 1 - state.still_same, outlier, self._effects(state)
+                subject,
+                evidence,
+                causes,
+                reading,
+                1 - state.still_same,
+                outlier,
+                self._effects(state),
             ),
         )
         coefficients = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            begun = np.append(state.called, [_begun(evidence, rows, found.change)], axis=0)
-            sizes = np.append(state.called_precision, [_size_of(evidence)], axis=0)
+            begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
+            sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
             state = replace(state, called=begun, called_precision=sizes, still_same=still)
         return replace(state, coefficients=coefficients), found
+
+    def _bounded(self, state: WatchState) -> WatchState:
+        """The newest test with what is left of its weight: alone it speaks for no change by more
+        than it may, whether it counts by now or only once another agrees with it."""
+        rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
+        alone = self._evidence(state, rows).log_of_last
+        most = self.options.most_of_one_test_nats
+        if alone <= most:
+            return state
+        weight = state.weight.copy()
+        weight[-1] = most / alone
+        return replace(state, weight=weight)
 
     def _with(self, state: WatchState, reading: Reading) -> WatchState:
         """The state with one more test in it, and who counts now."""
@@ -318,10 +338,11 @@ class Watcher:
         )
         return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
-    def _sums(self, state: WatchState) -> Sums:
-        """Of the tests that count."""
+    def _sums(self, state: WatchState, rows: IntArray) -> Sums:
+        """Of the tests `rows`; those of one day scatter together, and say no more than one."""
         structure, layout = self.structure, self.structure.layout
-        rows = np.flatnonzero(state.counted)
+        years = state.years[rows]
+        of_a_day = (np.abs(years[:, None] - years) < _SAME_DAY_YEARS).sum(axis=1)
         slopes, level = state.slopes[rows], state.log_amplitude[rows]
         known = np.isfinite(level)
         usual = float(np.median(level[known])) if known.any() else 0.0
@@ -344,7 +365,8 @@ class Watcher:
         )
         factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
         spread = factors @ np.swapaxes(factors, 1, 2)
-        covariance = common[:, None] + structure.scales[:, None, None] ** 2 * spread[:, None]
+        scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
+        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
         wider = 1 / state.weight[rows]
         return sums_of(
             columns,
@@ -353,8 +375,8 @@ class Watcher:
             wider[:, None, None, None] * covariance,
         )
 
-    def _evidence(self, state: WatchState, rows: np.ndarray) -> Evidence:  # type: ignore[type-arg]
-        """Of the tests that count."""
+    def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
+        """Of the tests `rows`."""
         called = [
             Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
             for (first, years, is_ramp), precision in zip(
@@ -363,7 +385,7 @@ class Watcher:
         ]
         first = int((rows < self.options.baseline_tests).sum())
         return evidence_of(
-            self._sums(state),
+            self._sums(state, rows),
             state.years[rows],
             max(first, 1),
             self.structure.layout,
@@ -420,7 +442,7 @@ def watched(
     return Watch(tuple(tests), tuple(calls))
 
 
-def _begun(evidence: Evidence, rows: np.ndarray, change: Change) -> list[float]:  # type: ignore[type-arg]
+def _begun(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
     """The likeliest first test of a called change, when it began, and whether it goes on."""
     share = evidence.shares.sum(axis=(1, 2, 3, 4))
     first = int(evidence.beginnings[int(share.argmax())])
