@@ -189,7 +189,16 @@ class TemperatureCoefficient:
         return math.isfinite(self.mean) and not self.sd > _INFORMED * self.prior_sd
 
 
-AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "held", "test"]
+AlertKind = Literal[
+    "sudden change",
+    "slow drift",
+    "beyond threshold",
+    "repeat the test",
+    "tests disagree",
+    "gap",
+    "held",
+    "test",
+]
 
 
 @dataclass(frozen=True, eq=False)

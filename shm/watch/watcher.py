@@ -233,7 +233,7 @@ class Watcher:
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         subject = Subject(self.quantities, self.hanger, self.options, state.start)
         last, effects = state.tests - 1, self._effects(state)
-        outlier = 0.0 if state.counted[-1] else self._outlier(state, last)
+        outlier = self._outlier(state, last)
         found = WatchedTest(
             test=reading.test,
             time=reading.time,
