@@ -20,8 +20,8 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
-from typing import Any
 
+from shm.documents import value_of
 from shm.errors import BadInput
 from shm.values import (
     Alert,
@@ -31,7 +31,6 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
-    Moved,
     Posterior,
     Reading,
     WatchedTest,
@@ -347,27 +346,15 @@ class AlertState:
             return cls()
         try:
             kept = json.loads(text)
+            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
             return cls(
-                {(quantity, way): _time(at) for quantity, way, at in kept["beyond"]},
-                kept["call"] and _time(kept["call"]),
-                tuple(_change(each) for each in kept["called"]),
-                kept["odd"],
+                {(quantity, way): at for quantity, way, at in beyond},
+                kept["call"] and value_of(datetime, kept["call"]),
+                value_of(tuple[Change, ...], kept["called"]),
+                int(kept["odd"]),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(
                 f"what was told of a hanger cannot be read: {error!r}.",
                 remedy="Go over the hanger's tests from its baseline on.",
             ) from error
-
-
-def _time(text: str) -> datetime:
-    return datetime.fromisoformat(text)
-
-
-def _change(entry: dict[str, Any]) -> Change:
-    moved = tuple(
-        Moved(**{**each, **{name: tuple(each[name]) for name in ("alike", "together")}})
-        for each in entry["moved"]
-    )
-    times = {name: _time(entry[name]) for name in ("began_after", "began_by")}
-    return Change(**{**entry, **times, "moved": moved})
