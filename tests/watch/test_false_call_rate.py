@@ -9,9 +9,7 @@ import pytest
 
 from shm.values import FloatArray, Reading
 from shm.watch.options import WatchOptions
-from shm.watch.sequential import watch_over, watched
-from tests.helpers.hangers import HANGER_3
-from tests.helpers.synthetic_readings import BOTH_ENDS, START, History, tension
+from tests.helpers.synthetic_readings import BOTH_ENDS, START, History, tension, watch_of
 
 WEAK_STEP = 0.001
 """A change much below the scatter: then the statistic's mean is not that of a few large values."""
@@ -26,7 +24,7 @@ def statistics(history: History, options: WatchOptions, n: int) -> FloatArray:
     found = []
     for seed in range(n):
         readings = history.readings(seed)
-        result = watched(readings, history.quantities, HANGER_3, options)[-1].change
+        result = watch_of(readings, history.quantities, options).tests[-1].change
         # The last test alone speaks for no change: its time is not counted.
         found.append((years(readings, -2) - years(readings, 0), result.evidence_years))
     return np.array(found)
@@ -60,7 +58,7 @@ def test_false_calls_are_no_more_than_stated(scatter: float) -> None:
     called, watched_years = 0, 0.0
     for seed in range(hangers):
         readings = history.readings(seed)
-        calls = watch_over(readings, history.quantities, HANGER_3, options).calls
+        calls = watch_of(readings, history.quantities, options).calls
         called += bool(calls)
         watched_years += years(readings, -1)
 
