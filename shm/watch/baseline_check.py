@@ -58,7 +58,8 @@ def without_mistaken(
     """
     if len(tests) >= _ENOUGH:
         return _against_each_other(tests)
-    kept, found = [], []
+    kept: list[ModalTest] = []
+    found: list[MistakenMode] = []
     for test in tests:
         sound, mistaken = _against_description(test, model)
         kept.append(sound)
@@ -81,7 +82,8 @@ def _against_each_other(
     spread = max(_MAD * float(np.nanmedian(np.abs(off))), _LEAST / _FAR)
     is_odd = np.abs(off) > _FAR * spread
     is_odd &= np.isfinite(table).sum(axis=0) >= _ENOUGH
-    kept, found = [], []
+    kept: list[ModalTest] = []
+    found: list[MistakenMode] = []
     for n, test in enumerate(tests):
         expected = dict(zip(keys, np.exp(level + common[n]).tolist(), strict=True))
         odd = {key for key, is_one in zip(keys, is_odd[n].tolist(), strict=True) if is_one}
@@ -135,8 +137,8 @@ def _best(
     model: Model,
     theta: FloatArray,
     measured: FloatArray,
-    planes: FloatArray,
-    orders: FloatArray,
+    planes: IntArray,
+    orders: IntArray,
     conditions: Conditions,
 ) -> tuple[FloatArray, FloatArray]:
     """The likeliest of parameter sets, a few modes being mistaken, and what it is off by."""
@@ -149,7 +151,7 @@ def _best(
 
 
 def _split(
-    test: ModalTest, odd: set[tuple[str, int]], expected: dict[tuple[str, int], float]
+    test: ModalTest, odd: set[tuple[Plane, int]], expected: dict[tuple[Plane, int], float]
 ) -> tuple[ModalTest, tuple[MistakenMode, ...]]:
     if not odd:
         return test, ()

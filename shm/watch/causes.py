@@ -39,7 +39,7 @@ _SHARES = {
     TIMEBASE: 0.05,
     UNEXPLAINED: 0.07,
 }
-# Places along the hanger, a share of the length; a uniform bar does not tell them from the mirrored.
+# Places along the hanger, a share of the length: a uniform bar is the same from either end.
 _PLACES = (0.06, 0.13, 0.2, 0.28, 0.36, 0.43, 0.5)
 _STRETCHES = ((0.08, 0.15), (0.25, 0.15), (0.5, 0.15), (0.3, 0.4))
 # One unit of each cause: what there is as a rule; six times as much is looked for, too.

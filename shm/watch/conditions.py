@@ -1,4 +1,4 @@
-"""What the conditions of tests leave open: temperatures that nobody wrote down, and how loud it was."""
+"""What the conditions of tests leave open: temperatures that nobody wrote down."""
 
 from __future__ import annotations
 

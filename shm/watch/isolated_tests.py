@@ -36,7 +36,7 @@ class Seen:
     sds: FloatArray
 
     def distance(self, one: int, other: int) -> tuple[float, int, float]:
-        """Squared length of the difference, its modes, and the log determinant of its covariance."""
+        """Squared length of the difference, its modes, log determinant of its covariance."""
         both = np.isfinite(self.variances[one]) & np.isfinite(self.variances[other])
         if not both.any():
             return 0.0, 0, 0.0
@@ -88,7 +88,7 @@ def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
 def _of_baseline(seen: Seen, first: int) -> BoolArray:
     measured = np.isfinite(seen.variances[:first]).any(axis=1)
     if measured.sum() < 3:
-        return measured
+        return np.asarray(measured)
     agreeing = np.array(
         [
             [one != other and seen.agree(one, other) for other in range(first)]
@@ -96,7 +96,7 @@ def _of_baseline(seen: Seen, first: int) -> BoolArray:
         ]
     )
     found = measured & (agreeing.sum(axis=1) >= (measured.sum() - 1) / 2)
-    return found if found.any() else measured
+    return np.asarray(found if found.any() else measured)
 
 
 def outlier_probability(seen: Seen, test: int, before: int, prior: float) -> float:

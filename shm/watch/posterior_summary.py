@@ -65,7 +65,8 @@ def changed(
     effects: FloatArray,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
-    `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is that of this test being a blunder. `effects` (r, n + q) are what a change does to the
+    `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is
+    that of this test being a blunder. `effects` (r, n + q) are what a change does to the
     frequencies that owners look at."""
     now = probability_of_change(evidence, subject.options)
     began_after, began_by = _began(subject, causes, reading)
@@ -147,7 +148,7 @@ def _moved(quantities: Sequence[WatchedQuantity], evidence: Evidence) -> tuple[M
     names = [*(each.name for each in quantities), *causes]
     probability = np.array([min(float(by_direction[part].sum()), 1.0) for part in parts])
     is_tension = [name == TENSION for name in names]
-    order = np.lexsort([is_tension, -probability.round(_DIGITS)]).tolist()
+    order = np.lexsort([np.array(is_tension), -probability.round(_DIGITS)]).tolist()
     return tuple(
         _as_changed(quantities, evidence, names, j, parts[j], float(probability[j])) for j in order
     )

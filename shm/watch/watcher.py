@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import datetime
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -108,7 +109,7 @@ class WatchState:
     def to_bytes(self) -> bytes:
         """The state as a file of numpy arrays, without any pickled object."""
         kept = io.BytesIO()
-        plain = {
+        plain: dict[str, Any] = {
             each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
             for each in fields(self)
             for value in [getattr(self, each.name)]
@@ -297,7 +298,7 @@ class Watcher:
             "doubt": doubt,
             "weight": 1.0,
         }
-        grown = {
+        grown: dict[str, Any] = {
             name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
             for name, row in rows.items()
         }

@@ -179,8 +179,9 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    stands = AlertState({**standing.beyond, **beyond}, call, called)
-    return stands, _alert(news, change, test, hanger, is_further=is_further)
+    stands = AlertState({**standing.beyond, **beyond}, call, called, odd)
+    alert = _alert(news, change, test, hanger, is_further=is_further)
+    return stands, alert or _of_odd(test, hanger, odd)
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -218,7 +219,7 @@ def _still(told: AlertState, test: WatchedTest, level: float) -> AlertState:
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < _ENDS_BELOW * level:
-        return AlertState(beyond)
+        return AlertState(beyond, odd=told.odd)
     return replace(told, beyond=beyond)
 
 

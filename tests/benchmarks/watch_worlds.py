@@ -36,7 +36,7 @@ from shm.bridge import load_hanger  # noqa: E402
 from shm.inference import UpdateOptions, update  # noqa: E402
 from shm.models import build  # noqa: E402
 from shm.modes_document import parse_modes  # noqa: E402
-from shm.values import TENSION, Hanger, ModalTest, Posterior, Reading  # noqa: E402
+from shm.values import TENSION, Hanger, ModalTest, Posterior  # noqa: E402
 from shm.watch import WatchOptions, watch_hanger  # noqa: E402
 from shm.watch.baseline_check import without_mistaken  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
@@ -76,12 +76,13 @@ def seasons(world: str, scenario: str, seed: int, years: float) -> tuple[Any, li
     kind, told = SCENARIOS[scenario]
     creep = CREEP_PER_YEAR if scenario == "creep" else 0.0
     chosen = seed % ON_A_BRIDGE
-    event = module.Event(kind=kind, hanger=chosen, day=BEGINS, **told)
+    first = 1 if world == "tied_arch" else 0  # the number of its first hanger
+    event = module.Event(kind=kind, hanger=first + chosen, day=BEGINS, **told)
     found = module.season(
         seed, hangers=ON_A_BRIDGE, years=years, event=event, relaxation_per_year=creep
     )
     quiet = kind == "none"
-    return found, list(range(ON_A_BRIDGE)) if quiet else [chosen]
+    return found, list(range(first, first + ON_A_BRIDGE)) if quiet else [first + chosen]
 
 
 def hanger_of(description: dict[str, Any], number: int) -> Hanger:
@@ -174,16 +175,19 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
 
 def described_day(season: Any, number: int, tests: Sequence[ModalTest]) -> float:
     """The day of the first test from the season's start."""
-    truth = season.truth[number] if not isinstance(season.truth, dict) else season.truth
-    days = truth["day"] if "day" in truth else season.hangers[number].truth["day"]
+    truth = season.hangers[number].truth
+    days = truth["day"] if "day" in truth else [each["day"] for each in truth["visits"]]
     return float(np.min(days))
 
 
 def true_shift(season: Any, number: int) -> float:
     """Of the tension that lasts, from the first test to the last, a fraction."""
-    hanger = season.hangers[number]
-    truth = getattr(hanger, "truth", None) or season.truth[number]
-    lasting = np.asarray(truth["baseline_tension_n"], float)
+    truth = season.hangers[number].truth
+    lasting = (
+        np.asarray(truth["baseline_tension_n"], float)
+        if "baseline_tension_n" in truth
+        else np.array([each["reference_tension_n"] for each in truth["visits"]])
+    )
     return float(lasting[-1] / lasting[0] - 1)
 
 
@@ -253,7 +257,7 @@ def told(scenario: str, rows: Sequence[dict[str, Any]]) -> str:
     watched_from = [r["baseline"] for r in rows]
     if scenario in ("quiet", "creep"):
         years, false, notices = 0.0, 0, 0
-        for r, b in zip(rows, watched_from):
+        for r, b in zip(rows, watched_from, strict=True):
             firsts = [a["at"] for a in r["alerts"] if is_alert(a)]
             end = r["days"][firsts[0]] if firsts else r["days"][-1]
             years += (end - r["days"][b - 1]) / DAYS_A_YEAR

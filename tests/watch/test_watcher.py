@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shm.watch.sequential import Watch, watch_over, watched
 
 from shm.errors import BadInput
 from shm.values import WatchedTest
-from shm.watch.sequential import Watch, watch_over, watched
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (
     BOTH_ENDS,
