@@ -15,7 +15,7 @@ import numpy as np
 
 from shm.models import Model
 from shm.models.base import Conditions
-from shm.values import PLANES, BoolArray, FloatArray, ModalTest, Mode
+from shm.values import PLANES, BoolArray, FloatArray, IntArray, ModalTest, Mode, Plane
 
 _ENOUGH = 3  # tests: of two that differ, none is the odd one
 _ROUNDS = 3  # technical: medians of what is common to a test, and to a mode

@@ -1,6 +1,6 @@
 """By how much tests of one state differ, and along what: variance components of differences.
 
-A joint that gives in the wind, wires that slip under a hard hit, sensors put elsewhere: what differs
+A joint that gives in the wind, wires that slip, sensors put elsewhere: what differs
 from test to test goes along a few known columns, each by an amount that is the hanger's own. It is
 learnt from the differences of tests that follow each other, which a lasting change touches once,
 by expectation and maximisation (Dempster, Laird and Rubin 1977), about a prior worth a few tests.
