@@ -8,16 +8,20 @@ INSTALL := $(UV) --no-deps --no-build-isolation --editable .
 
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# Who has it set lets each process compile all that it imports anew: the tests begin hundreds.
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-arithmetic lint bench bench-peers docs tables lock clean
+.PHONY: demo test test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
 
-# A third process, because many tests wait for a daemon, a server or a browser.
-test: lint
-	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile
-	$(MAKE) test-arithmetic
+# What takes one processor goes side by side: the types, and the numerics twice. Then a third process,
+# because many tests wait for a daemon, a server or a browser; files go out in the order of their
+# names, because by their number of tests one with a single long test would come last, alone.
+test: .venv/development
+	$(MAKE) --jobs 3 lint test-arithmetic
+	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
 # numpy, OpenBLAS and the C library choose by the processor how many numbers they add at once and
 # whether they round between multiplying and adding: another processor gives other last digits, and
@@ -34,8 +38,12 @@ SLOW := $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
 NUMERICS := $(BIN)/python -m pytest --quiet \
 	tests/models tests/gap tests/inference tests/watch $(SLOW:%=--ignore=%)
 
-test-arithmetic: .venv/development
+test-arithmetic: without-avx512 without-avx2
+
+without-avx512: .venv/development
 	OPENBLAS_CORETYPE=Haswell NPY_DISABLE_CPU_FEATURES="$(filter X86_V4 AVX512%,$(CHOSEN_BY))" $(NUMERICS)
+
+without-avx2: .venv/development
 	OPENBLAS_CORETYPE=Sandybridge NPY_DISABLE_CPU_FEATURES="$(CHOSEN_BY)" \
 		GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2 $(NUMERICS)
 

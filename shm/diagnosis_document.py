@@ -6,26 +6,14 @@ As all documents it holds NaN until `shm.documents.dump` writes null; reading ta
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
-from typing import Any, TypeVar
+from dataclasses import asdict
+from typing import Any
 
-from shm.values import (
-    NAN,
-    Cause,
-    Diagnosis,
-    EffectEstimate,
-    GapPlace,
-    NextMeasurement,
-    Outlier,
-    Residual,
-    Shrinkage,
-    TensionEstimate,
-    Trend,
-)
+from shm.documents import value_of
+from shm.values import Cause, Diagnosis
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 
-T = TypeVar("T")
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
     "model_error_percent", "seed", "seconds",
@@ -65,57 +53,19 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 
 
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
-    """A diagnosis back from its document.
+    """A diagnosis back from its document; raises KeyError, TypeError or ValueError.
 
     One from before outliers and 95 % intervals were told has none of them.
     """
-    return Diagnosis(
-        **_values(Diagnosis, {name: document[name] for name in _PLAIN}),
-        tests=tuple(document["tests"]),
-        where=tuple(_noun(Residual, each) for each in document["where"]),
-        trends=tuple(_noun(Trend, each) for each in document["trends"]),
-        places=tuple(_place(each) for each in document["places"]),
-        causes=tuple(_cause(each) for each in document["causes"]),
-        groups=tuple(tuple(group) for group in document["groups"]),
-        shrinkage=_noun(Shrinkage, document["shrinkage"]),
-        tension_before_n=_noun(TensionEstimate, document["tension_n"]["before"]),
-        tension_after_n=_noun(TensionEstimate, document["tension_n"]["after"]),
-        next_measurements=tuple(_next(each) for each in document["next_measurement"]),
-        invisible=tuple((each["effect"], each["why"]) for each in document["invisible"]),
-        left_out=tuple(document["left_out"]),
-        remarks=tuple(document["remarks"]),
-        outliers=tuple(_noun(Outlier, each) for each in document.get("outliers", ())),
-    )
-
-
-def _place(document: Mapping[str, Any]) -> GapPlace:
-    profile = tuple((float(x_m), _number(density)) for x_m, density in document["profile"])
-    return _noun(GapPlace, {**document, "profile": profile})
-
-
-def _cause(document: Mapping[str, Any]) -> Cause:
-    parameters = tuple(
-        _noun(EffectEstimate, {**estimate, "name": name})
-        for name, estimate in document["parameters"].items()
-    )
-    elsewhere = tuple(document["also_at"])
-    return _noun(Cause, {**document, "parameters": parameters, "also_at": elsewhere})
-
-
-def _next(document: Mapping[str, Any]) -> NextMeasurement:
-    return _noun(NextMeasurement, {**document, "separates": tuple(document["separates"])})
-
-
-def _noun(kind: type[T], document: Mapping[str, Any]) -> T:
-    return kind(**_values(kind, document))
-
-
-def _values(kind: type[Any], document: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of `kind` that `document` holds, with NaN for the numbers that are null."""
-    numbers = {each.name for each in fields(kind) if each.type == "float"}
-    known = {each.name for each in fields(kind)} & document.keys()
-    return {name: _number(document[name]) if name in numbers else document[name] for name in known}
-
-
-def _number(value: float | None) -> float:
-    return NAN if value is None else float(value)
+    tension = document["tension_n"]
+    renamed = {
+        "causes": [
+            {**cause, "parameters": [{**e, "name": n} for n, e in cause["parameters"].items()]}
+            for cause in document["causes"]
+        ],
+        "tension_before_n": tension["before"],
+        "tension_after_n": tension["after"],
+        "next_measurements": document["next_measurement"],
+        "invisible": [(each["effect"], each["why"]) for each in document["invisible"]],
+    }
+    return value_of(Diagnosis, {**document, **renamed})

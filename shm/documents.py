@@ -1,16 +1,24 @@
-"""JSON documents of the values: posteriors, drifts, alerts; unknown numbers are null in JSON."""
+"""JSON documents of the values: posteriors, drifts, alerts; unknown numbers are null in JSON.
+
+What is read becomes a value by the types that its class declares: `value_of`, by cattrs. msgspec
+has no hook for a built-in type, so a null could not be NaN.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
 from datetime import UTC, datetime
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
+import cattrs
 import numpy as np
+from cattrs.cols import homogenous_tuple_structure_factory
+from cattrs.gen import make_dict_structure_fn, make_hetero_tuple_structure_fn
+from cattrs.v import transform_error
 
 from shm.values import (
     NAN,
@@ -56,7 +64,135 @@ def parse_time(text: str) -> datetime:
     return time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)
 
 
-# ---------------------------------------------------------------- posteriors
+# ---------------------------------------------------------------- reading
+
+
+T = TypeVar("T")
+_Hook = Callable[[Any, Any], Any]
+
+
+class Misfit(ValueError):
+    """What in a document does not fit the value that it should be; `key` is the one at fault."""
+
+    def __init__(self, said: str, key: str):
+        super().__init__(said)
+        self.key = key
+
+
+def value_of(kind: type[T], node: object, path: str = "", by: cattrs.Converter | None = None) -> T:
+    """A part of a document as a value of a kind, its types checked; raises Misfit.
+
+    `path` is where the part stands: of `tests[0]` it may say `tests[0].modes[1]: order = 2.5 is
+    not a whole number`. `by` is a converter of `reader` with hooks of its own.
+    """
+    try:
+        return (by or _READER).structure(node, kind)
+    except (cattrs.BaseValidationError, ValueError) as error:
+        said, _, at = transform_error(error, path, _said)[0].rpartition(" @ ")
+    label, _, key = at.rpartition(".")
+    raise Misfit(f"{label and label + ': '}{key} {said}".strip(), key.partition("[")[0])
+
+
+def _said(error: BaseException, _: object) -> str:
+    return "is missing" if isinstance(error, KeyError) else str(error)
+
+
+def number(node: Any) -> float:
+    """A number of a document, where null is what is not known; raises ValueError."""
+    if node is None:
+        return NAN
+    if isinstance(node, int | float) and not isinstance(node, bool):
+        return float(node)
+    raise ValueError(f"= {node!r} is not a number")
+
+
+_LARGEST = 1e300  # technical: a square root or two of what follows from it must not overflow
+
+
+def finite(node: Any) -> float:
+    """A number that a person wrote, where null is what is not known; raises ValueError."""
+    if node is None or (isinstance(node, int | float) and abs(node) < _LARGEST):
+        return number(node)
+    raise ValueError(f"= {node!r} is not a number")
+
+
+def reader(
+    number: Callable[[Any], float] = number, make: Callable[..., _Hook] = make_dict_structure_fn
+) -> cattrs.Converter:
+    """A converter of documents to frozen values, which takes nothing for what it is not.
+
+    `number` says what a number is, `make` makes the hooks of our classes. By them null is NaN where
+    a number is meant, and keys that the value does not have are left alone.
+    """
+    made = cattrs.Converter()
+    made.register_structure_hook(float, lambda node, _: number(node))
+    made.register_structure_hook(datetime, lambda node, _: _time(node))
+    for plain, what in ((int, "a whole number"), (bool, "true or false"), (str, "a text")):
+        made.register_structure_hook(plain, _plain(plain, what))
+    made.register_structure_hook_factory(_is_of(np.ndarray), lambda _: _plain(np.ndarray, "arrays"))
+    made.register_structure_hook_factory(_is_of(Literal), _one_of)
+    made.register_structure_hook_factory(is_dataclass, _only(Mapping, "an object", make))
+    made.register_structure_hook_factory(_is_of(tuple), _only(list | tuple, "a list", _row))
+    return made
+
+
+def _time(node: Any) -> datetime:
+    try:
+        return parse_time(node)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"= {node!r} is not an ISO 8601 time") from None
+
+
+def _plain(kind: type, what: str) -> _Hook:
+    """Lets through what is of a kind; true and false are no whole numbers."""
+
+    def hook(node: Any, _: Any) -> Any:
+        if isinstance(node, kind) and isinstance(node, bool) <= (kind is bool):
+            return node
+        raise ValueError(f"= {node!r} is not {what}")
+
+    return hook
+
+
+def _one_of(literal: Any) -> _Hook:
+    known = get_args(literal)
+
+    def hook(node: Any, _: Any) -> Any:
+        if isinstance(node, str) and node in known:
+            return node
+        raise ValueError(f"= {node!r} is not one of {', '.join(known)}")
+
+    return hook
+
+
+def _only(of: Any, what: str, make: Callable[..., _Hook]) -> Callable[..., _Hook]:
+    """Refuses what is not of a kind before cattrs takes it apart."""
+
+    def hook_for(kind: Any, by: cattrs.Converter) -> _Hook:
+        take = make(kind, by)
+
+        def hook(node: Any, _: Any) -> Any:
+            if isinstance(node, of):
+                return take(node, kind)
+            raise ValueError(f"is not {what}")
+
+        return hook
+
+    return hook_for
+
+
+def _row(kind: Any, by: cattrs.Converter) -> _Hook:
+    long = get_args(kind)[1:] == (...,)
+    make = homogenous_tuple_structure_factory if long else make_hetero_tuple_structure_fn
+    hook: _Hook = make(kind, by)
+    return hook
+
+
+def _is_of(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
+
+
+_READER = reader()
 
 
 _ALIKE = 0.75  # of a key to another, from which on a slip of the hand is likelier than a key
@@ -70,6 +206,9 @@ def key_meant(key: str, known: Sequence[str]) -> str | None:
     if key in known:
         return None
     return next(iter(get_close_matches(key, known, n=1, cutoff=_ALIKE)), None)
+
+
+# ---------------------------------------------------------------- posteriors
 
 
 def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
@@ -139,18 +278,6 @@ def averaged_document(averaged: Averaged) -> dict[str, Any]:
     return {**asdict(averaged), "caveats": list(averaged.caveats)}
 
 
-def averaged_from(document: Mapping[str, Any]) -> Averaged:
-    """The same back from its document."""
-    tension_n = {name: _known(value) for name, value in document["tension_n"].items()}
-    names = ("repeatability_sd_n", "probability_above_limit", "probability_slack")
-    numbers = {name: _known(document[name]) for name in names}
-    return Averaged(Summary(**tension_n), caveats=tuple(document["caveats"]), **numbers)
-
-
-def _known(value: float | None) -> float:
-    return NAN if value is None else float(value)
-
-
 # ---------------------------------------------------------------- drift
 
 
@@ -162,4 +289,8 @@ def drift_document(drift: Drift) -> dict[str, Any]:
 def alert_document(alert: Alert) -> dict[str, Any]:
     """What a hook gets on its standard input."""
     tension = alert.tension and averaged_document(alert.tension)
-    return {"schema": "shm.alert/1", **asdict(alert), "tension": tension}
+    document = {"schema": "shm.alert/1", **asdict(alert), "tension": tension}
+    if alert.alerts:
+        return {**document, "alerts": [alert_document(each) for each in alert.alerts]}
+    del document["alerts"]
+    return document

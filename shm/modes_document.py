@@ -8,28 +8,28 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, fields
-from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
-from shm.documents import key_meant, parse_time
+from cattrs import Converter
+from cattrs.gen import make_dict_structure_fn
+
+from shm.documents import Misfit, finite, key_meant, reader, value_of
 from shm.errors import BadInput
-from shm.values import (
-    LONGEST_TEST_ID,
-    NAN,
-    PLANES,
-    AddedMass,
-    ModalTest,
-    Mode,
-    ShapePoint,
-    is_test_id,
-)
+from shm.values import LONGEST_TEST_ID, ModalTest, Mode, is_test_id
 
 MODES_SCHEMA = "shm.modes/1"
-_LARGEST = 1e300  # technical: a square root or two of what follows from it must not overflow
 _HIGHEST_ORDER = 200  # technical: models solve for every order below; no hammer reaches it
+_ORDERS = f"1, 2, 3, ... up to {_HIGHEST_ORDER}"
+_LEAVE_OUT = "Leave it out where unknown."
+_REMEDIES = {
+    "plane": "Correct it.", "order": f"Give {_ORDERS}.", "frequency_hz": "Correct it.",
+    "time": "Write 2026-05-01T10:00:00Z.", "shape": "Give a list of points, with x_m and value.",
+    "added_mass": "Give mass_kg and x_m.", "irregular": "Correct it.",
+    "modes": "Give plane, order and frequency_hz of each.",
+}  # fmt: skip
 _TEST_KEYS = (
     "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
     "tension_read_sd_n", "modes",
@@ -99,7 +99,7 @@ def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
             remedy="Make one with `shm identify FILE --json`.",
         )
     hanger = document.get("hanger")
-    if hanger is not None and not _is_whole(hanger, 0):
+    if hanger is not None and (type(hanger) is not int or not 0 <= hanger < 2**31):
         raise BadInput(
             f"hanger = {hanger!r} is not a whole number.", file=file, remedy="Give its number."
         )
@@ -118,25 +118,18 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
             f"{label} has no list `modes`.", file=file, remedy="Give its modes or drop the test."
         )
     _refuse_misspelt(test, _TEST_KEYS, label, file)
-    modes = tuple(
-        _parse_mode(mode, f"{label}.modes[{i}]", file) for i, mode in enumerate(test["modes"])
-    )
-    keys = [(mode.plane, mode.order) for mode in modes]
-    for plane, order in keys:
-        if keys.count((plane, order)) > 1:
-            raise BadInput(
-                f"{label}: {plane} mode {order} is given twice.", file=file, remedy="Keep one."
-            )
-    return ModalTest(
-        id=_id(test.get("id", f"t{index + 1}"), label, file),
-        modes=modes,
-        hanger=hanger,
-        time=_time(test.get("time"), label, file),
-        temperature_c=_number(test, "temperature_c", label, file),
-        amplitude=_number(test, "amplitude", label, file),
-        added_mass=_added_mass(test.get("added_mass"), label, file),
-        **_tension_read(test, label, file),
-    )
+    for i, mode in enumerate(test["modes"]):
+        _refuse_misspelt(mode, _MODE_KEYS, f"{label}.modes[{i}]", file)
+    filled = {**test, "hanger": hanger, "id": _id(test.get("id", f"t{index + 1}"), label, file)}
+    try:
+        found = value_of(ModalTest, filled, label, _READER)
+    except Misfit as error:
+        remedy = _REMEDIES.get(error.key, _LEAVE_OUT)
+        raise BadInput(f"{error}.", file=file, remedy=remedy) from error
+    for wrong, problem, remedy in _faults(found):
+        if wrong:
+            raise BadInput(f"{label}{problem}.", file=file, remedy=remedy)
+    return found
 
 
 def _id(value: Any, label: str, file: str | Path) -> str:
@@ -150,24 +143,8 @@ def _id(value: Any, label: str, file: str | Path) -> str:
     return text
 
 
-def _tension_read(test: Mapping[str, Any], label: str, file: str | Path) -> dict[str, float]:
-    keys = ("tension_read_n", "tension_read_sd_n")
-    values = {key: _number(test, key, label, file) for key in keys}
-    read, sd = values.values()
-    if read <= 0 or sd <= 0 or (math.isnan(read) and math.isfinite(sd)):
-        raise BadInput(
-            f"{label}: tension_read_n and tension_read_sd_n are a tension and its standard "
-            f"deviation, above 0.",
-            file=file,
-            remedy="Give the tension in N, and its standard deviation where you know it.",
-        )
-    return values
-
-
-def _refuse_misspelt(
-    table: Mapping[str, Any], known: Sequence[str], label: str, file: str | Path
-) -> None:
-    for key in table:
+def _refuse_misspelt(table: Any, known: Sequence[str], label: str, file: str | Path) -> None:
+    for key in table if isinstance(table, dict) else ():
         meant = key_meant(str(key), known)
         if meant:
             raise BadInput(
@@ -177,103 +154,37 @@ def _refuse_misspelt(
             )
 
 
-def _parse_mode(mode: Any, label: str, file: str | Path) -> Mode:
-    if not isinstance(mode, dict) or mode.get("plane") not in PLANES:
-        raise BadInput(
-            f"{label}: plane must be one of {', '.join(PLANES)}.", file=file, remedy="Correct it."
-        )
-    _refuse_misspelt(mode, _MODE_KEYS, label, file)
-    order = mode.get("order")
-    if not _is_whole(order, 1) or order > _HIGHEST_ORDER:
-        raise BadInput(
-            f"{label}: order must be 1, 2, 3, ... up to {_HIGHEST_ORDER}.",
-            file=file,
-            remedy="Correct it.",
-        )
-    frequency = _number(mode, "frequency_hz", label, file)
-    if not frequency > 0:
-        raise BadInput(f"{label}: frequency_hz must be positive.", file=file, remedy="Correct it.")
-    frequency_sd = _number(mode, "frequency_sd_hz", label, file)
-    if frequency_sd < 0:
-        raise BadInput(
-            f"{label}: frequency_sd_hz is negative.",
-            file=file,
-            remedy="Leave it out where unknown.",
-        )
-    irregular = mode.get("irregular", False)
-    if not isinstance(irregular, bool):
-        raise BadInput(f"{label}: irregular is true or false.", file=file, remedy="Correct it.")
-    return Mode(
-        plane=mode["plane"],
-        order=order,
-        frequency_hz=frequency,
-        frequency_sd_hz=frequency_sd,
-        damping_ratio=_number(mode, "damping_ratio", label, file),
-        damping_sd=_number(mode, "damping_sd", label, file),
-        shape=_shape(mode.get("shape"), label, file),
-        acceleration_m_s2=_number(mode, "acceleration_m_s2", label, file),
-        irregular=irregular,
+def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
+    """What may be wrong with values that are of the right types: whether, what, the remedy."""
+    places = [(mode.plane, mode.order) for mode in test.modes]
+    for i, mode in enumerate(test.modes):
+        at = f".modes[{i}]:"
+        yield not 1 <= mode.order <= _HIGHEST_ORDER, f"{at} order must be {_ORDERS}", "Correct it."
+        yield not mode.frequency_hz > 0, f"{at} frequency_hz must be positive", "Correct it."
+        yield mode.frequency_sd_hz < 0, f"{at} frequency_sd_hz is negative", _LEAVE_OUT
+        twice = places.count(places[i]) > 1
+        yield twice, f": {mode.plane} mode {mode.order} is given twice", "Keep one."
+    mass = test.added_mass
+    yield (
+        mass is not None and not (mass.mass_kg > 0 and mass.x_m >= 0),
+        ".added_mass needs a positive mass_kg and an x_m",
+        "Give both, in kg and m.",
+    )
+    read, sd = test.tension_read_n, test.tension_read_sd_n
+    yield (
+        read <= 0 or sd <= 0 or (math.isnan(read) and math.isfinite(sd)),
+        ": tension_read_n and tension_read_sd_n are a tension and its standard deviation, above 0",
+        "Give the tension in N, and its standard deviation where you know it.",
     )
 
 
-def _shape(points: Any, label: str, file: str | Path) -> tuple[ShapePoint, ...]:
-    if points is None:
-        return ()
-    if not isinstance(points, list):
-        raise BadInput(f"{label}: shape is not a list.", file=file, remedy="Give a list of points.")
-    return tuple(_shape_point(p, f"{label}.shape[{i}]", file) for i, p in enumerate(points))
-
-
-def _shape_point(point: Any, label: str, file: str | Path) -> ShapePoint:
-    if not isinstance(point, dict):
-        raise BadInput(f"{label} is not an object.", file=file, remedy="Give x_m and value.")
-    return ShapePoint(
-        **{key: _number(point, key, label, file) for key in ("x_m", "value", "cross", "sd")}
+def _sparse(kind: Any, by: Converter) -> Callable[[Any, Any], Any]:
+    """What is null is as good as left out, and what number is left out is not known."""
+    take = make_dict_structure_fn(kind, by)
+    numbers = dict.fromkeys(each.name for each in fields(kind) if each.type == "float")
+    return lambda node, _: take(
+        {**numbers, **{key: value for key, value in node.items() if value is not None}}, kind
     )
 
 
-def _added_mass(mass: Any, label: str, file: str | Path) -> AddedMass | None:
-    if mass is None:
-        return None
-    label = f"{label}.added_mass"
-    if not isinstance(mass, dict):
-        raise BadInput(f"{label} is not an object.", file=file, remedy="Give mass_kg and x_m.")
-    values = {key: _number(mass, key, label, file) for key in ("mass_kg", "x_m")}
-    if not values["mass_kg"] > 0 or not values["x_m"] >= 0:
-        raise BadInput(
-            f"{label} needs a positive mass_kg and an x_m.",
-            file=file,
-            remedy="Give both, in kg and m.",
-        )
-    return AddedMass(**values)
-
-
-def _number(table: Mapping[str, Any], key: str, label: str, file: str | Path) -> float:
-    value = table.get(key)
-    if value is None:
-        return NAN
-    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGEST:
-        return float(value)
-    raise BadInput(
-        f"{label}: {key} = {value!r} is not a number.",
-        file=file,
-        remedy="Leave it out where unknown.",
-    )
-
-
-def _is_whole(value: Any, least: int) -> TypeGuard[int]:
-    """Whether a value is a whole number from `least` that any database holds."""
-    return type(value) is int and least <= value < 2**31
-
-
-def _time(text: Any, label: str, file: str | Path) -> datetime | None:
-    if text is None:
-        return None
-    try:
-        return parse_time(text)
-    except (TypeError, ValueError, OverflowError):
-        raise BadInput(
-            f"{label}: time = {text!r} is not an ISO 8601 time.",
-            file=file,
-            remedy="Write 2026-05-01T10:00:00Z.",
-        ) from None
+_READER = reader(finite, _sparse)

@@ -151,6 +151,10 @@ class Settings:
     hook_backoff_seconds: float = _row(
         5.0, "s", "wait after a failed delivery, doubled each time", 0, 86400
     )
+    # Hangers of one bridge are hit one after the other and worked through some seconds each.
+    alert_grouping_seconds: float = _row(
+        60.0, "s", "alike alerts of several hangers so close go as one message; 0: never", 0, 3600
+    )
 
     web_hosts: str = _row(
         "", "", "names, parted by commas, by which the web interface may be called", None, None

@@ -8,6 +8,7 @@ from __future__ import annotations
 import getpass
 import os
 import time
+from collections.abc import Collection
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store import StoredAlert
+from shm.store.stored_silences import silenced_until
 from shm.values import Alert
 from shm_cli import completion
 from shm_cli.common import (
@@ -31,16 +33,18 @@ from shm_cli.common import (
     table,
 )
 from shm_cli.parameter_types import Words
+from shm_cli.silences import silence, silences, unsilence
 
 
 @click.command("ack")
 @click.argument("alert_id", type=int, metavar="ID")
 @click.option("--why", type=Words(), required=True, help="What came of it, for the record.")
+@click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
 @click.option("--who", show_default="the user's name", help="For the record.")
 @json_option
 @click.pass_context
 def acknowledge(
-    ctx: click.Context, alert_id: int, why: str, who: str | None, as_json: bool
+    ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str | None, as_json: bool
 ) -> None:
     """Take note of an alert, on the record.
 
@@ -49,28 +53,35 @@ def acknowledge(
     is now, see `shm drift rebaseline`.
 
     \b
-    Example: shm alerts ack 4 --why "crew was there on 3 May: pin replaced"
+    Example: shm alerts ack 4 --why "crew is on its way"
+    Example: shm alerts ack 4 --resolved --why "crew was there on 3 May: pin replaced"
     """
     with opened_store(ctx) as (_, store):
-        noted = store.alerts.acknowledge(alert_id, who or getpass.getuser(), why, utc_now())
+        note = store.alerts.resolve if resolved else store.alerts.acknowledge
+        noted = note(alert_id, who or getpass.getuser(), why, utc_now())
     if as_json:
         show({"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)})
         return
-    click.echo(f"Alert {alert_id} of hanger {noted.alert.hanger} is acknowledged.")
+    done = "resolved" if resolved else "acknowledged"
+    click.echo(f"Alert {alert_id} of hanger {noted.alert.hanger} is {done}.")
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
-    """What `shm alerts --json` says of it: `acknowledged` is null while the alert is open."""
-    noted = stored.acknowledgement
-    if noted is None:
-        return {"acknowledged": None}
-    return {"acknowledged": {"who": noted.who, "why": noted.why, "at": noted.at}}
+    """What `shm alerts --json` says of it: `acknowledged` is null while the alert is open, and
+    `resolved` while its condition stands.
+    """
+    noted, ended = stored.acknowledgement, stored.resolution
+    return {
+        "acknowledged": noted and {"who": noted.who, "why": noted.why, "at": noted.at},
+        "resolved": ended and {"who": ended.who, "why": ended.why, "at": ended.at},
+    }
 
 
 def acknowledgement_words(stored: StoredAlert) -> str:
-    """`open`, or who took note of it, when and why."""
-    noted = stored.acknowledgement
-    return "open" if noted is None else f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    """`open`, or who took note of it, when and why; that it is resolved."""
+    noted, ended = stored.acknowledgement, stored.resolution
+    said = "open" if noted is None else f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 
 if TYPE_CHECKING:
@@ -91,7 +102,8 @@ def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         _list(ctx, hanger_id, as_json)
 
 
-command.add_command(acknowledge)
+for _verb in (acknowledge, silence, silences, unsilence):
+    command.add_command(_verb)
 
 
 @command.command()
@@ -166,18 +178,31 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
             workspace.bridge.hanger(hanger_id)
         alerts = store.alerts.list_all(hanger_id)
         deliveries = store.alerts.list_deliveries()
-    rows = [_row(stored, deliveries) for stored in alerts]
+        made = store.silences.list_all()
+    escalates = {each.name for each in workspace.bridge.hooks if each.escalation_after_seconds}
+    now = utc_now()
+    rows = [
+        {
+            **_row(stored, deliveries, escalates),
+            "silenced_until": silenced_until(made, stored.alert.hanger, now)
+            if stored.resolution is None
+            else None,
+        }
+        for stored in alerts
+    ]
     if as_json:
         show({"alerts": rows})
         return
     if not alerts:
         click.echo("No alert has been raised.")
         return
-    made = table("alerts", "number", "hanger", "test of", "kind", "hooks", "acknowledged")
+    shown = table("alerts", "number", "hanger", "test of", "kind", "hooks", "acknowledged")
     for stored, row in zip(alerts, rows, strict=True):
-        states = ", ".join(f"{each['hook']}: {each['state']}" for each in row["deliveries"])
+        states = ", ".join(_delivery_words(each) for each in row["deliveries"])
+        if (until := row["silenced_until"]) is not None:
+            states = f"silenced until {until:%Y-%m-%d %H:%M}; {states}"
         alert = stored.alert
-        made.add_row(
+        shown.add_row(
             str(stored.id),
             str(alert.hanger),
             f"{alert.time:%Y-%m-%d}",
@@ -185,12 +210,22 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
             states or "none",
             acknowledgement_words(stored),
         )
-    show_table(made)
+    show_table(shown)
     for stored in alerts:
         click.echo("\n" + paragraph(f"{stored.id}. {stored.alert.message}"))
 
 
-def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any]:
+def _delivery_words(delivery: dict[str, Any]) -> str:
+    what = "resolved " if delivery["news"] == "resolved" else ""
+    if delivery["escalation"]:
+        words = {"delivered": "escalated", "waiting": "escalates unless acknowledged"}
+        return f"{delivery['hook']}: {what}{words.get(delivery['state'], delivery['state'])}"
+    return f"{delivery['hook']}: {what}{delivery['state']}"
+
+
+def _row(
+    stored: StoredAlert, deliveries: tuple[Delivery, ...], escalates: Collection[str]
+) -> dict[str, Any]:
     return {
         "id": stored.id,
         "raised_at": stored.raised_at,
@@ -199,6 +234,8 @@ def _row(stored: StoredAlert, deliveries: tuple[Delivery, ...]) -> dict[str, Any
         "deliveries": [
             {
                 "hook": delivery.hook,
+                "news": delivery.news.value,
+                "escalation": delivery.hook in escalates,
                 "state": delivery.state.value,
                 "attempts": delivery.attempts,
                 "last_error": delivery.last_error or None,

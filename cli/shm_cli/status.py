@@ -32,6 +32,7 @@ from shm.store import (
 )
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
+from shm_cli.silences import said_of
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import never_taken, scan
 
@@ -89,6 +90,8 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
+    for said in document["silences"]:
+        click.echo(said)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     made = table(
         "hangers",
@@ -172,7 +175,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     open_at = Counter(each.alert.hanger for each in alerts if each.acknowledgement is None)
     counts = store.recordings.stage_counts()
     ended = sum(counts[stage] for stage in ENDED)
-    held = store.recordings.list_holds()
+    held, now = store.recordings.list_holds(), utc_now()
     return {
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
@@ -189,6 +192,9 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "open_alerts": open_at.total(),
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
+        "silences": [
+            said_of(each) for each in store.silences.list_current(now) if each.starts_at <= now
+        ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),

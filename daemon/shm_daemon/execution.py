@@ -64,6 +64,7 @@ class Workers(Executor):
     def __init__(self, count: int, prepare: Callable[[], object] | None = None):
         self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
         self._prepare, self._idle, self._ended = prepare, list[_Worker](), False
+        self._changing = threading.Lock()  # of what is at rest, and whether any more may begin
         self._threads.submit(self._begin_early)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
@@ -74,20 +75,34 @@ class Workers(Executor):
         return self._threads.submit(self._run, fn, fresh=True)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Ends the processes that are at rest; those at work end with their step, or with us."""
+        """Ends the processes that are at rest; those at work end with their step, or with us.
+
+        None is begun from here on: a step that has none yet raises WorkerDied.
+        """
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
-        self._ended = True
-        while self._idle:
-            self._idle.pop().end()
+        with self._changing:
+            self._ended = True
+            resting, self._idle = self._idle, []
+        for worker in resting:
+            worker.end()
 
     def _begin_early(self) -> None:
         """The first process imports what it needs while we go on."""
         with suppress(ShmError):
-            self._rest(_Worker(self._prepare))
+            self._rest(self._worker(fresh=True))
+
+    def _worker(self, *, fresh: bool) -> _Worker:
+        """A process at rest, or a new one."""
+        from shm.pipeline import steps as steps  # before the lock: it can take seconds
+
+        with self._changing:
+            if self._ended:  # whoever ended us has looked for our processes: none would find it
+                raise WorkerDied("its process was not begun, because all end.", from_outside=True)
+            return self._idle.pop() if self._idle and not fresh else _Worker(self._prepare)
 
     def _run(self, step: Callable[[], T], *, fresh: bool) -> T:
         while True:
-            worker = self._idle.pop() if self._idle and not fresh else _Worker(self._prepare)
+            worker = self._worker(fresh=fresh)
             try:
                 found: T = worker.do(step)
             except WorkerDied:
@@ -102,9 +117,11 @@ class Workers(Executor):
                     self._rest(worker)
 
     def _rest(self, worker: _Worker) -> None:
-        if worker.lives and not self._ended:
-            self._idle.append(worker)
-        else:
+        with self._changing:
+            rests = worker.lives and not self._ended
+            if rests:
+                self._idle.append(worker)
+        if not rests:
             worker.end()
 
 

@@ -35,6 +35,7 @@ _RECEIVING_S = 1.0
 _HINT_DELAY_S = 0.1
 _UNREADABLE_S = 60.0
 _STANDING_BY_S = 1.0
+_DELIVERING_S = 10.0  # technical: an escalation is promised within 60 s, however seldom is scanned
 
 log = logging.getLogger(__name__)
 
@@ -180,8 +181,11 @@ class Daemon:
         return True
 
     def _rest(self) -> set[str]:
-        """Waits for a ring or until the next scan, with a sign from time to time."""
-        while (pause_s := self._scan_at - time.monotonic()) > self._longest_wait_s:
+        """Waits for a ring, the next scan or the next look at what is owed to hooks, with a sign
+        from time to time.
+        """
+        look_at = time.monotonic() + _DELIVERING_S
+        while (pause_s := min(self._scan_at, look_at) - time.monotonic()) > self._longest_wait_s:
             if (heard := self._wakeup.wait(self._longest_wait_s)) or self._wakeup.stopped:
                 return heard
             self._pulse.beat()
@@ -199,6 +203,8 @@ class Daemon:
             if is_whole:
                 self._scan()
             left = self._flow.advance() or self._flow.suspects_due_s() is not None
+            if self._once and not left and not self._tracker.watching:
+                left = self._flow.advance(hurry=True)
             if is_whole:
                 self._tell_failure("")
             return left

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from shm.blind.layout import Trial, read_document
-from shm.documents import dump
+from shm.documents import dump, value_of
 from shm.errors import BadInput
-from shm.values import TrueCase, TrueEffect, TrueFrequency
+from shm.values import TrueCase
 
 KEY_SCHEMA = "shm.blind_key/1"
 
@@ -77,21 +77,8 @@ def _case_document(case: TrueCase) -> dict[str, Any]:
 
 
 def _case(document: Mapping[str, Any]) -> TrueCase:
-    effects = tuple(
-        TrueEffect(
-            each["name"],
-            each["at"],
-            {name: float(value) for name, value in each["values"].items()},
-            float(each["size"]),
-        )
+    effects = [
+        {**each, "values": {name: float(value) for name, value in each["values"].items()}}
         for each in document["effects"]
-    )
-    frequencies = tuple(TrueFrequency(**each) for each in document["frequencies"])
-    return TrueCase(
-        **{
-            **document,
-            "effects": effects,
-            "frequencies": frequencies,
-            "left_out": tuple(document["left_out"]),
-        }
-    )
+    ]
+    return value_of(TrueCase, {**document, "effects": effects})

@@ -62,7 +62,9 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
             "Give lengths and diameters in m, areas in m2.",
         )
     return Hanger(
-        id=_whole_number(table),
+        id=table.value(
+            "id", int, "is not a whole number", "Give id = 1, 2, 3, ...", holds=lambda id_: id_ >= 0
+        ),
         length_m=length_m,
         elastic_modulus_pa=elastic_modulus,
         area_m2=area,
@@ -90,25 +92,21 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
 def _kind(table: Table) -> Kind:
     """A strand where it says so, or where its wires are said to slip."""
     slips = table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1) < 1
-    value = table.values.get("kind", "strand" if slips else "rod")
-    for kind in get_args(Kind):
-        if value == kind:
-            return cast(Kind, kind)
-    raise table.refusal(f"kind = {value!r} is no kind of hanger", 'Write "rod" or "strand".')
+    remedy, usual = 'Write "rod" or "strand".', "strand" if slips else "rod"
+    return cast(Kind, table.value("kind", Kind, "is no kind of hanger", remedy, usual))
 
 
 def _fittings(table: Table, length_m: float) -> tuple[float, float]:
     """Lengths of the deck-end and the arch-end fitting; none where nothing is said."""
-    both = table.values.get("fittings_m", [0.0, 0.0])
-    numbers = isinstance(both, list) and all(
-        isinstance(each, int | float) and not isinstance(each, bool) and each >= 0 for each in both
+    deck_m, arch_m = table.value(
+        "fittings_m",
+        tuple[float, float],
+        "is not two lengths that leave half of the hanger free",
+        "Write fittings_m = [DECK, ARCH], the lengths in m of forks, sockets or threads.",
+        usual=(0.0, 0.0),
+        holds=lambda both: min(both) >= 0 and sum(both) < length_m / 2,
     )
-    if not numbers or len(both) != 2 or sum(both) >= length_m / 2:
-        raise table.refusal(
-            f"fittings_m = {both!r} is not two lengths that leave half of the hanger free",
-            "Write fittings_m = [DECK, ARCH], the lengths in m of forks, sockets or threads.",
-        )
-    return float(both[0]), float(both[1])
+    return deck_m, arch_m
 
 
 def _limits(table: Table | None) -> Limits:
@@ -139,24 +137,16 @@ def _section(table: Table) -> tuple[float, float, float]:
     return area, moment, area * table.positive("density_kg_m3")
 
 
-def _whole_number(table: Table) -> int:
-    value = table.values.get("id")
-    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
-        return value
-    raise table.refusal("id must be a whole number", "Give id = 1, 2, 3, ...")
-
-
 def _models(table: Table) -> tuple[str, ...]:
-    if "models" not in table:
-        return ()
-    names = table.values["models"]
-    texts = isinstance(names, list) and all(isinstance(name, str) and name for name in names)
-    if not texts or not names or len(set(names)) < len(names):
-        raise table.refusal(
-            f"models = {names!r} is not a list of different names",
-            'Write models = ["beam1", "beam2"], or leave it out to admit all.',
-        )
-    return tuple(names)
+    names: tuple[str, ...] = table.value(
+        "models",
+        tuple[str, ...],
+        "is not a list of different names",
+        'Write models = ["beam1", "beam2"], or leave it out to admit all.',
+        usual=(),
+        holds=lambda names: names and all(names) and len(set(names)) == len(names),
+    )
+    return names
 
 
 def _thresholds(table: Table | None) -> Thresholds:
@@ -225,7 +215,6 @@ def _turnbuckles(tables: list[Table], hanger_length_m: float) -> tuple[Turnbuckl
     return tuple(turnbuckle for turnbuckle, _ in found)
 
 
-_KINDS: tuple[Support, ...] = get_args(Support)
 _KNOWN_SUPPORTS = ("deck", "arch", "both", "hanging_mass_kg")
 
 
@@ -251,13 +240,8 @@ def supports_of(table: Table | None) -> Supports:
 
 
 def _support_kind(table: Table, key: str, usual: Support) -> Support:
-    value = table.values.get(key, usual)
-    for kind in _KINDS:
-        if value == kind:
-            return kind
-    raise table.refusal(
-        f"{key} = {value!r} is no way to hold an end", f"Known: {', '.join(_KINDS)}."
-    )
+    remedy = f"Known: {', '.join(get_args(Support))}."
+    return cast(Support, table.value(key, Support, "is no way to hold an end", remedy, usual))
 
 
 _LARGEST_SCATTER = 0.5  # judgement: who is half off wrote another unit
@@ -302,15 +286,8 @@ def _effect(table: Table, effect: str) -> Table:
 
 
 def _range(table: Table, parameter: str) -> tuple[float, float]:
-    values = table.values[parameter]
     remedy = f"Write {parameter} = [LOWER, UPPER], two finite numbers."
-    if not isinstance(values, list) or len(values) != 2 or not all(map(_is_number, values)):
-        raise table.refusal(f"{parameter} = {values!r} is not a range", remedy)
-    lower, upper = map(float, values)
+    lower, upper = table.value(parameter, tuple[float, float], "is not a range", remedy)
     if lower >= upper:
-        raise table.refusal(f"{parameter} = {values!r} does not rise", remedy)
+        raise table.refusal(f"{parameter} = [{lower:g}, {upper:g}] does not rise", remedy)
     return lower, upper
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ipaddress
 import string
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
@@ -16,6 +16,8 @@ from urllib.parse import SplitResult, urlsplit
 from shm.bridge.table import Table
 from shm.errors import BadInput
 
+_ESCALATION = "escalation_after_seconds"
+_LONGEST_ESCALATION_S = 366 * 86400.0  # judgement: what nobody saw for a year, nobody will
 _ADDRESS = 'Write url = "https://host/path".'
 _WHERE_SECRETS_STAND = (
     'Write it into a file that only you can read and name it: secret_file = "webhook.secret"; or '
@@ -43,9 +45,14 @@ APPRISE_SCHEMES = frozenset(_SERVICES.split())
 
 @dataclass(frozen=True)
 class Hook:
-    """Something that is told of each alert."""
+    """Something that is told of each alert.
+
+    With `escalation_after_seconds` it is told only of those that nobody has acknowledged so long
+    after they were raised.
+    """
 
     name: str
+    escalation_after_seconds: float | None = field(default=None, kw_only=True)
 
     @property
     def kind(self) -> str:
@@ -98,7 +105,21 @@ def hook_of(values: Mapping[str, Any], path: Path) -> Hook:
             f"it needs exactly one of {', '.join(_KINDS)}",
             'Write command = ["/path/to/program", "argument"] or url = "https://host/path".',
         )
-    return readers.pop()(table, name)
+    seconds = _escalation_after_seconds(table)
+    return replace(readers.pop()(table, name), escalation_after_seconds=seconds)
+
+
+def _escalation_after_seconds(table: Table) -> float | None:
+    seconds = table.values.get(_ESCALATION)
+    if seconds is None:
+        return None
+    is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
+    if not is_number or not 1 <= seconds <= _LONGEST_ESCALATION_S:
+        raise table.refusal(
+            f"{_ESCALATION} is not a number of seconds from 1 to a year",
+            f"Write {_ESCALATION} = 3600.",
+        )
+    return float(seconds)
 
 
 def apprise_scheme(address: str) -> str:
@@ -116,24 +137,24 @@ def apprise_scheme(address: str) -> str:
 
 
 def _command(table: Table, name: str) -> Hook:
-    table.refuse_unknown(("name", "command"))
+    table.refuse_unknown(("name", _ESCALATION, "command"))
     return CommandHook(name, _texts(table, "command", '["/path/to/program", "argument"]'))
 
 
 def _webhook(table: Table, name: str) -> Hook:
     if "secret" in table:
         raise table.refusal("bridge.toml is no place for a secret", _WHERE_SECRETS_STAND)
-    table.refuse_unknown(("name", "url", "secret_file", "secret_env", "allow_http"))
+    table.refuse_unknown(("name", _ESCALATION, "url", "secret_file", "secret_env", "allow_http"))
     if ("secret_file" in table) == ("secret_env" in table):
         raise table.refusal("it needs a secret to sign with, in one place", _WHERE_SECRETS_STAND)
-    secrets = {
-        key: _text(table, key, _WHERE_SECRETS_STAND) for key in ("secret_file", "secret_env")
-    }
-    return WebhookHook(name, _url(table), **secrets)
+    in_file, in_environment = (
+        _text(table, key, _WHERE_SECRETS_STAND) for key in ("secret_file", "secret_env")
+    )
+    return WebhookHook(name, _url(table), in_file, in_environment)
 
 
 def _apprise(table: Table, name: str) -> Hook:
-    table.refuse_unknown(("name", "apprise", "apprise_file"))
+    table.refuse_unknown(("name", _ESCALATION, "apprise", "apprise_file"))
     if "apprise_file" in table and "apprise" not in table:
         return AppriseHook(name, address_file=_text(table, "apprise_file", "Name a file."))
     if "apprise_file" in table:

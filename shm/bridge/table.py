@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shm.documents import Misfit, finite, reader, value_of
 from shm.errors import BadInput
+
+_READER = reader(finite)
 
 
 @dataclass(frozen=True)
@@ -34,41 +36,50 @@ class Table:
         for key in self.values.keys() - set(names):
             raise self.refusal(f"unknown key {key}", f"Known: {', '.join(names)}.")
 
+    def value(
+        self,
+        key: str,
+        kind: Any,
+        wrong: str,
+        remedy: str,
+        usual: Any = None,
+        holds: Callable[[Any], bool] = lambda _: True,
+    ) -> Any:
+        """What stands at a key, of a kind for which something `holds`; else it is `wrong`.
+
+        Where the key is missing it is `usual`. Raises BadInput, also where that is None.
+        """
+        if key not in self:
+            if usual is None:
+                raise self.refusal(f"{key} is missing", remedy)
+            return usual
+        try:
+            found = value_of(kind, self.values[key], by=_READER)
+            if holds(found):
+                return found
+        except Misfit:
+            pass  # the table says what is wrong in its own words
+        raise self.refusal(f"{key} = {self.values[key]!r} {wrong}", remedy)
+
     def positive(self, key: str) -> float:
         """A number above 0; raises BadInput where it is missing or none."""
-        value = self._number(key, f"Give {key} in SI units.")
-        if value > 0:
-            return value
-        raise self.refusal(
-            f"{key} = {self.values[key]!r} is not a positive number", f"Give {key} in SI units."
-        )
+        remedy, wrong = f"Give {key} in SI units.", "is not a positive number"
+        return float(self.value(key, float, wrong, remedy, holds=lambda value: value > 0))
 
     def not_negative(self, key: str) -> float:
         """A number from 0 up; raises BadInput where it is missing or none."""
-        value = self._number(key, f"Give {key} in SI units.")
-        if value >= 0:
-            return value
-        raise self.refusal(f"{key} = {self.values[key]!r} is negative", f"Give {key} in SI units.")
+        remedy, wrong = f"Give {key} in SI units.", "is not a number from 0 up"
+        return float(self.value(key, float, wrong, remedy, holds=lambda value: value >= 0))
 
     def fraction(self, key: str, default: float, low: float, high: float) -> float:
         """A number from `low` to `high`, both included; `default` where the key is missing."""
         if key not in self:
             return default
         remedy = f"Give a number from {low:g} to {high:g}."
-        value = self._number(key, remedy)
+        value = float(self.value(key, float, "is not a number", remedy))
         if low <= value <= high:
             return value
         raise self.refusal(f"{key} = {value:g} is not from {low:g} to {high:g}", remedy)
-
-    def _number(self, key: str, remedy: str) -> float:
-        value = self.values.get(key)
-        if value is None:
-            raise self.refusal(f"{key} is missing", remedy)
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            raise self.refusal(f"{key} = {value!r} is not a number", remedy)
-        if not math.isfinite(value):
-            raise self.refusal(f"{key} = {value!r} is not a number", remedy)
-        return float(value)
 
     def table(self, key: str) -> Table | None:
         """The sub-table `key`; None where there is none."""

@@ -206,6 +206,8 @@ def _branch(landscape: Landscape, z: FloatArray) -> Branch:
 
 def _downhill(landscape: Landscape, views: Views) -> _Downhill:
     columns = np.concatenate([views.slopes, views.residual[..., None]], axis=2)
+    # What cannot be predicted pulls nowhere: no factorisation takes a NaN.
+    columns = np.where(np.isfinite(columns), columns, 0.0)
     log = landscape.likelihood.by_node(views.residual)
     log = np.where(np.isfinite(log), log, NEVER)
     gram = landscape.likelihood.gram(columns)

@@ -138,18 +138,21 @@ class Flow:
 
     def drain(self, after_each: Callable[[], object] = lambda: None) -> None:
         """Works until nothing waits that could be done now; calls `after_each` on the way."""
-        while self.advance():
+        while self.advance() or self.advance(hurry=True):
             after_each()
             under_way = [running.future for running in self._running.values()]
             wait(under_way, return_when=FIRST_COMPLETED)
 
-    def advance(self) -> bool:
-        """Keeps what is finished, begins what waits; whether anything is under way."""
+    def advance(self, *, hurry: bool = False) -> bool:
+        """Keeps what is finished, begins what waits; whether anything is under way.
+
+        With `hurry` alerts are not held for alike ones: who calls is about to end.
+        """
         for key, running in list(self._running.items()):
             if running.future.done():
                 self._finish(running)
                 del self._running[key]
-        self._begin_deliveries()
+        self._begin_deliveries(hurry)
         self._begin_steps()
         return bool(self._running)
 
@@ -162,8 +165,9 @@ class Flow:
 
     # ------------------------------------------------------------ begin
 
-    def _begin_deliveries(self) -> None:
+    def _begin_deliveries(self, hurry: bool) -> None:
         if self.notifier is not None:
+            self.jobs.begin_messages(hurry=hurry)
             under_way = [run.job.delivery for run in self._running.values() if run.job.delivery]
             for job in self.jobs.owed(self.notifier, under_way):
                 self._begin(job, self._couriers)
@@ -216,7 +220,7 @@ class Flow:
         if error is None:
             self._keep(running)
         elif job.delivery is not None:
-            self._put_off(job.delivery, error)
+            self._put_off(job.delivery, job.message or job.delivery.alert, error)
         elif isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
             self._note_death(running, error)
         elif (wait_s := _passes_in_s(error)) is not None:
@@ -318,7 +322,7 @@ class Flow:
             why = (reason["message"], reason["remedy"])
             log.warning("%s is refused: %s %s", name, *why, extra=about)
 
-    def _put_off(self, delivery: Delivery, error: BaseException) -> None:
+    def _put_off(self, delivery: Delivery, message: Alert, error: BaseException) -> None:
         """A delivery that failed is tried again, ever later, until it has failed too often.
 
         One that the hook refused is given up at once.
@@ -329,10 +333,10 @@ class Flow:
         again = not refused and delivery.attempts + 1 < settings.hook_attempts
         next_attempt_at = now + wait if again else None
         self.store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
-        about = {**_about_alert(delivery.alert), "hook": delivery.hook}
+        about = {**_about_alert(message), "hook": delivery.hook}
         end = "" if again else "; given up: nobody is told of it by this hook"
         said = "hook %s failed on %s: %s%s"
-        log.warning(said, delivery.hook, delivery.alert.key, error, end, extra=about)
+        log.warning(said, delivery.hook, message.key, error, end, extra=about)
 
 
 def _still_waits(until: datetime, now: datetime) -> bool:
@@ -384,7 +388,7 @@ def _refusal(deaths: Deaths, error: BaseException) -> ShmError:
 def _about(job: Job) -> dict[str, object]:
     """What a job is about, for those who look for it in the log."""
     if job.delivery is not None:
-        about = _about_alert(job.delivery.alert)
+        about = _about_alert(job.message or job.delivery.alert)
         return {**about, "hook": job.delivery.hook, "stage": job.key[0]}
     named = {"recording": job.recordings, "hanger": (job.hanger,), "test": job.names}
     single = {key: ids[0] for key, ids in named.items() if len(ids) == 1 and ids[0] is not None}

@@ -12,10 +12,13 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
+from shm.pipeline.ending import gap_stands as watch_gap_stands
+from shm.pipeline.ending import why_over
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
 from shm.pipeline.remote_file import Opens, RemoteFile
+from shm.pipeline.telling import Terms, after_works, message_of, plan, works_before
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
@@ -69,6 +72,7 @@ class Job:
     delivery: Delivery | None = None
     hanger: int | None = None
     names: tuple[str, ...] = ()
+    message: Alert | None = None
 
 
 def wait_after(attempts: int, settings: Settings) -> timedelta:
@@ -108,8 +112,24 @@ class Jobs:
             elif not received:
                 yield from self._first_tests(hanger, waiting[hanger.id])
 
+    def begin_messages(self, *, hurry: bool = False) -> None:
+        """Decides which alerts go to which hook now, as one message or alone, and keeps that."""
+        unsent = self.store.alerts.list_unsent()
+        if not unsent:
+            return
+        hooks = self.workspace.bridge.hooks
+        escalation_s = {
+            hook.name: hook.escalation_after_seconds
+            for hook in hooks
+            if hook.escalation_after_seconds is not None
+        }
+        terms = Terms(self.workspace.settings.alert_grouping_seconds, escalation_s, hurry)
+        now = self.clock()
+        made = plan(unsent, self.store.silences.list_all(), now, terms)
+        self.store.alerts.begin_messages(made.messages, made.not_needed, now)
+
     def owed(self, notifier: Notifier, under_way: Sequence[Delivery]) -> Iterator[Job]:
-        """Deliveries that are due, as many as there is room for beside those `under_way`.
+        """Messages that are due, as many as there is room for beside those `under_way`.
 
         A hook that hangs takes no more than its own share of the room.
         """
@@ -118,13 +138,17 @@ class Jobs:
             return
         ids = [delivery.id for delivery in under_way]
         waits = [wait_after(count, self.workspace.settings) for count in range(_DOUBLINGS)]
-        for delivery in self.store.alerts.list_due_deliveries(
-            self.clock(), 2 * DELIVERIES, ids, waits
-        ):
+        now, most = self.clock(), 2 * DELIVERIES
+        due = self.store.alerts.list_due_deliveries(now, most, ids, waits, begun=True)
+        parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
+        for part in self.store.alerts.list_of_messages([each.id for each in due]) if due else ():
+            parts[part.message_id].append(part)
+        for delivery in due:
             if taken[delivery.hook] < _DELIVERIES_A_HOOK and taken.total() < DELIVERIES:
                 taken[delivery.hook] += 1
-                prepare = partial(self._deliver, notifier, delivery)
-                yield Job(("deliver", delivery.id), prepare, delivery=delivery)
+                message = message_of(parts[delivery.id])
+                prepare = partial(self._deliver, notifier, delivery, message)
+                yield Job(("deliver", delivery.id), prepare, delivery=delivery, message=message)
 
     def _waiting_tests(
         self, limit: int, held: Collection[int]
@@ -239,6 +263,9 @@ class Jobs:
 
     def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
         test = self.store.tests.get(waiting.id)
+        silences = self.store.silences.list_all()
+        if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
+            return Step(partial(int), lambda _: self.store.watch.pass_over(test, self.clock()))
         current = self.store.posteriors.of_test(test)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
         baseline = self.store.watch.baseline(hanger.id, current.model, test.time)
@@ -254,6 +281,8 @@ class Jobs:
         beside = tests_beside(self.store, baseline, test)
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
+        standing = self.store.alerts.list_standing(hanger.id, baseline.id)
+        gap_stands = watch_gap_stands(baseline.posterior, current)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -261,13 +290,23 @@ class Jobs:
                 return None
             watched, alert, content = found
             state = KeptWatch(needed.key, test.time, content)
-            return self.store.watch.save(test, baseline, watched, alert, hooks, self.clock(), state)
+            if alert is not None and silences:
+                earlier = [each.alert for each in self.store.alerts.list_all(hanger.id)]
+                works = works_before(alert, silences, earlier)
+                alert = alert if works is None else after_works(alert, works)
+            ended = {
+                each.id: why
+                for each in standing
+                if (why := why_over(each.alert, watched, hanger, gap_stands=gap_stands))
+            }
+            now = self.clock()
+            return self.store.watch.save(test, baseline, watched, alert, hooks, now, state, ended)
 
         return Step(run, keep)
 
-    def _deliver(self, notifier: Notifier, delivery: Delivery) -> Step:
+    def _deliver(self, notifier: Notifier, delivery: Delivery, message: Alert) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}
-        run = partial(_notify, notifier, hooks.get(delivery.hook), delivery)
+        run = partial(_notify, notifier, hooks.get(delivery.hook), delivery.hook, message)
         return Step(run, lambda _: self.store.alerts.save_delivery(delivery, self.clock()))
 
 
@@ -284,10 +323,10 @@ def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[Wa
     )
 
 
-def _notify(notifier: Notifier, hook: Hook | None, delivery: Delivery) -> None:
+def _notify(notifier: Notifier, hook: Hook | None, name: str, message: Alert) -> None:
     if hook is None:
-        raise ShmError(f"no hook {delivery.hook} in bridge.toml.", remedy="Describe it again.")
-    notifier(hook, delivery.alert)
+        raise ShmError(f"no hook {name} in bridge.toml.", remedy="Describe it again.")
+    notifier(hook, message)
 
 
 def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime) -> list[str]:

@@ -4,40 +4,24 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from datetime import datetime
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from shm.documents import averaged_from, parse_time
+from shm.documents import number, value_of
 from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.values import (
-    NAN,
-    Alert,
-    AlertKind,
     Change,
     Drift,
-    ForeignMode,
     FrequencyResponse,
     ModalTest,
-    Moved,
     Posterior,
-    PredictedFrequency,
-    QualityCheck,
     ResponsePoint,
     WatchedTest,
 )
 
-_POSTERIOR_PLAIN = ("model", "hanger", "seed", "evaluations")
-_POSTERIOR_NUMBERS = (
-    "nominal_tension_n",
-    "log_evidence",
-    "log_evidence_sd",
-    "effective_sample_size",
-    "r_hat",
-    "seconds",
-)
 _POSTERIOR_ARRAYS = ("samples", "log_likelihood", "most_probable")
 
 
@@ -96,18 +80,6 @@ def test_from_document(document: Mapping[str, Any], hanger: int) -> ModalTest:
     return parse_modes({"schema": MODES_SCHEMA, "hanger": hanger, "tests": [document]})[0]
 
 
-def quality_from(entry: Mapping[str, Any]) -> QualityCheck:
-    """A quality figure back from its document."""
-    numbers = {name: number(entry[name]) for name in ("value", "limit")}
-    return QualityCheck(**{**entry, **numbers})
-
-
-def foreign_from(entry: Mapping[str, Any]) -> ForeignMode:
-    """What was set aside, back from its document."""
-    numbers = {name: number(entry[name]) for name in ("frequency_hz", "damping_ratio")}
-    return ForeignMode(**{**entry, **numbers})
-
-
 # ---------------------------------------------------------------- posteriors
 
 
@@ -117,69 +89,19 @@ def pack_samples(posterior: Posterior) -> bytes:
 
 
 def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
-    """A posterior, complete with samples, back from its document and bytes."""
-    arrays = unpack(blob)
-    values: dict[str, Any] = {name: document[name] for name in _POSTERIOR_PLAIN}
-    values |= {name: number(document[name]) for name in _POSTERIOR_NUMBERS}
-    values |= {name: arrays[name] for name in _POSTERIOR_ARRAYS}
-    return Posterior(
-        names=tuple(document["parameters"]),
-        predicted=tuple(_predicted(entry) for entry in document["predicted"]),
-        tests=tuple(document["tests"]),
-        method=document.get("method", "tmcmc"),  # absent before there was another
-        **_since_described(document),
-        **values,
-    )
+    """A posterior, complete with samples, back from its document and bytes.
+
+    What documents of former versions lack was then as it is where nothing is said.
+    """
+    predicted = [
+        {**entry, "mean_hz": entry["frequency_hz"]["mean"], "sd_hz": entry["frequency_hz"]["sd"]}
+        for entry in document["predicted"]
+    ]
+    names = list(document["parameters"])
+    return value_of(Posterior, {**document, **unpack(blob), "names": names, "predicted": predicted})
 
 
-def _since_described(document: Mapping[str, Any]) -> dict[str, Any]:
-    """What documents of before there were priors of a description lack: these were the thesis's."""
-    numbers = (
-        "repeatability_sd_n",
-        "misfit_percent",
-        "log_occam",
-        "tension_of_other_ends_n",
-        "tension_of_other_orders_n",
-        "description_off_sd",
-        "reading_off_sd",
-    )
-    return {
-        "priors": document.get("priors", "thesis"),
-        "at_bounds": tuple(document.get("at_bounds", ())),
-        **{name: number(document.get(name)) for name in numbers},
-    }
-
-
-def _predicted(entry: Mapping[str, Any]) -> PredictedFrequency:
-    frequency = entry["frequency_hz"]
-    return PredictedFrequency(
-        plane=entry["plane"],
-        order=entry["order"],
-        mean_hz=number(frequency["mean"]),
-        sd_hz=number(frequency["sd"]),
-        measured_hz=number(entry["measured_hz"]),
-    )
-
-
-def number(value: float | None) -> float:
-    """A number of a document, where null is what is not known."""
-    return NAN if value is None else float(value)
-
-
-# ---------------------------------------------------------------- alerts
-
-
-def alert_from_document(document: Mapping[str, Any]) -> Alert:
-    """An alert back from its document; one of the first schemas has no kinds and no change."""
-    change, tension = document.get("change"), document.get("tension")
-    return Alert(
-        **{name: document[name] for name in ("key", "hanger", "test", "message")},
-        time=parse_time(document["time"]),
-        drifts=tuple(_drift(entry) for entry in document["drifts"]),
-        kinds=cast(tuple[AlertKind, ...], tuple(document.get("kinds", ()))),
-        change=None if change is None else _change(change),
-        tension=None if tension is None else averaged_from(tension),
-    )
+# ---------------------------------------------------------------- watches
 
 
 def watch_document(watched: WatchedTest) -> dict[str, Any]:
@@ -191,48 +113,10 @@ def watch_from(
     document: Mapping[str, Any], test: str, time: datetime, drifts: Sequence[Drift]
 ) -> WatchedTest:
     """The watch after a test back from its document and its drifts."""
-    return WatchedTest(
-        test=test,
-        time=time,
-        temperature_c=number(document["temperature_c"]),
-        drifts=tuple(drifts),
-        change=change_from(document),
-    )
+    temperature_c = number(document["temperature_c"])
+    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document))
 
 
 def change_from(document: Mapping[str, Any]) -> Change:
     """What the sequential test says after a test back from the document of its watch."""
-    return _change(document["change"])
-
-
-def _change(entry: Mapping[str, Any]) -> Change:
-    numbers = {name: number(entry[name]) for name in _CHANGE_NUMBERS}
-    return Change(
-        began_after=parse_time(entry["began_after"]),
-        began_by=parse_time(entry["began_by"]),
-        moved=tuple(_moved(each) for each in entry["moved"]),
-        **numbers,
-    )
-
-
-def _moved(entry: Mapping[str, Any]) -> Moved:
-    numbers = {name: number(entry[name]) for name in _MOVED_NUMBERS}
-    others = {name: tuple(entry[name]) for name in ("alike", "together") if name in entry}
-    return Moved(**{**entry, **numbers, **others})
-
-
-def _drift(entry: Mapping[str, Any]) -> Drift:
-    values = {field.name: entry[field.name] for field in fields(Drift)}
-    numbers = {name: number(values[name]) for name in _DRIFT_NUMBERS}
-    return Drift(**{**values, **numbers, "time": parse_time(entry["time"])})
-
-
-_CHANGE_NUMBERS = (
-    "evidence_years",
-    "limit_years",
-    "probability",
-    "sudden",
-    "outlier_probability",
-)
-_MOVED_NUMBERS = ("probability", "shift_mean", "shift_sd")
-_DRIFT_NUMBERS = ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")
+    return value_of(Change, document["change"])

@@ -69,3 +69,59 @@ class Document(sa.types.TypeDecorator[Any]):
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
         return None if value is None else dump(value)
+
+
+metadata = sa.MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+
+def identity() -> sa.Column[int]:
+    """The number of a row."""
+    return sa.Column("id", sa.Integer, primary_key=True)
+
+
+def reference(table: str, *, nullable: bool = False) -> sa.Column[int]:
+    """The number of a row of another table."""
+    return sa.Column(f"{table[:-1]}_id", sa.ForeignKey(f"{table}.id"), nullable=nullable)
+
+
+def lineage() -> tuple[sa.Column[str], ...]:
+    """Where a result comes from."""
+    return (
+        sa.Column("input_sha256", sa.String(64), nullable=False),
+        sa.Column("settings_sha256", sa.String(64), nullable=False),
+        sa.Column("version", sa.String(32), nullable=False),
+    )
+
+
+def model() -> sa.Column[str]:
+    """The name of a model class."""
+    # An adopted class is named after its effects, where they act and their ranges.
+    return sa.Column("model", sa.String(512), nullable=False)
+
+
+def superseded_at() -> sa.Column[Any]:
+    """When a later run replaced it."""
+    # What a later run has replaced stays with its lineage; empty of what is in force.
+    return sa.Column("superseded_at", UtcTime)
+
+
+def index_in_force(name: str, *columns: str) -> sa.Index:
+    """An index of what is in force."""
+    # `superseded_at` stands behind the samples or the frequency response of a row, which may be a
+    # hundred pages of the file: an index of what is in force spares reading past them.
+    where = sa.text("superseded_at IS NULL")
+    return sa.Index(name, *columns, sqlite_where=where, postgresql_where=where)
+
+
+def unique_where(condition: str, table: str, *columns: str) -> sa.Index:
+    """Unique among rows in which `condition` is empty."""
+    where = sa.text(f"{condition} IS NULL")
+    name = f"uq_{table}_{'_'.join(columns)}"
+    return sa.Index(name, *columns, unique=True, sqlite_where=where, postgresql_where=where)

@@ -12,14 +12,9 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
+from shm.documents import value_of
 from shm.errors import DamagedRow
-from shm.store.blobs import (
-    alert_from_document,
-    change_from,
-    posterior_from,
-    test_from_document,
-    unpack,
-)
+from shm.store.blobs import change_from, posterior_from, test_from_document, unpack
 from shm.store.checksums import (
     Values,
     checksum_of,
@@ -34,6 +29,7 @@ from shm.store.columns import Document
 from shm.store.copying import Rows
 from shm.store.numbering import forget
 from shm.store.tables import APART
+from shm.values import Alert
 
 
 def damaged_among(table: sa.Table, rows: Rows) -> Iterator[DamagedRow]:
@@ -78,7 +74,7 @@ _DECODERS: Mapping[str, Callable[[Values], object]] = {
     "tests": _decode_test,
     "posteriors": lambda row: posterior_from(loads(row["document"]), row["samples"]),
     "watches": lambda row: change_from(loads(row["document"])),
-    "alerts": lambda row: alert_from_document(loads(row["document"])),
+    "alerts": lambda row: value_of(Alert, loads(row["document"])),
 }
 
 

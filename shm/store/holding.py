@@ -10,14 +10,14 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.documents import value_of
 from shm.errors import NothingThere, UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.blobs import number as number_from
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.files import in_force, write_event, write_step
-from shm.store.outbox import raise_alert
+from shm.store.outbox import raise_alert, resolve
 from shm.store.recording_rows import Decision, HeldTest, Hold
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
@@ -29,7 +29,7 @@ from shm.store.tables import (
     recordings,
     tests,
 )
-from shm.values import Alert, Doubt, Fingerprint
+from shm.values import Alert, Fingerprint
 
 _holds = sa.select(holds, recordings.c.file_name, recordings.c.hanger).join(recordings)
 
@@ -90,19 +90,7 @@ def fingerprint_from(row: Row[Any]) -> Fingerprint:
 
 def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
     """The tests of a hold back from its document."""
-    return tuple(
-        HeldTest(
-            each["position"],
-            each["name"],
-            tuple(_doubt_from(doubt) for doubt in each["doubts"]),
-            number_from(each["tension_shift"]),
-        )
-        for each in document["tests"]
-    )
-
-
-def _doubt_from(document: Mapping[str, Any]) -> Doubt:
-    return Doubt(**{**document, "instead_of": tuple(document.get("instead_of", ()))})
+    return value_of(tuple[HeldTest, ...], document["tests"])
 
 
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
@@ -292,6 +280,9 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
         insert(
             connection, acknowledgements, {"alert_id": alert_id, "who": who, "why": told, "at": at}
         )
+    notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
+    if notice is not None:
+        resolve(connection, notice, who, told, at)
     write_event(connection, at, str(hold.decision), hold.recording_id, hold.file_name, told)
     return replace(hold, decided_at=at, who=who, why=why)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 
-from shm.store.rows import Acknowledgement, DeliveryState, Stage
+from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, Stage
 from shm.values import Averaged, Summary
 
 
@@ -113,6 +113,7 @@ class DeliveryRow:
     state: DeliveryState
     attempts: int
     last_error: str
+    news: News = News.RAISED
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,7 @@ class AlertRow:
     message: str
     acknowledgement: Acknowledgement | None
     deliveries: tuple[DeliveryRow, ...]
+    resolution: Resolution | None = None
 
 
 class EventKind(StrEnum):

@@ -16,6 +16,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row, RowMapping
 
+from shm.store.missing_alert_rules import ALERT_RULES
 from shm.store.missing_rules import (
     HISTORY,
     RESTORE,
@@ -104,7 +105,9 @@ def _by_rules(connection: Connection) -> Iterator[MissingRow]:
 
 @cache
 def _queries() -> tuple[tuple[Rule, sa.TextClause], ...]:
-    return tuple((rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in RULES)
+    return tuple(
+        (rule, sa.text(_lacking(rule).replace(":", "\\:"))) for rule in (*RULES, *ALERT_RULES)
+    )
 
 
 def _lacking(rule: Rule) -> str:
@@ -265,7 +268,9 @@ def _recording_of(connection: Connection, test: int) -> object:
 
 def _told_to(connection: Connection, alerts: _Documents) -> Iterator[MissingRow]:
     """What is owed of alerts, holds that were told of, and notices of holds."""
-    owed = set(_counts(connection, "SELECT alert_id, hook, 1 FROM deliveries"))
+    owed = set(
+        _counts(connection, "SELECT alert_id, hook, 1 FROM deliveries WHERE news = 'raised'")
+    )
     rows = connection.execute(sa.text("SELECT id, decision FROM holds"))
     decisions: dict[int, str | None] = {row.id: row.decision for row in rows}
     holds = set(decisions)

@@ -95,18 +95,6 @@ RULES = (
         ("events", "holds"),
     ),
     Rule(
-        "acknowledgements",
-        "the acknowledgement of alert {alert} is missing: its hold was {decision}.",
-        "Acknowledge it anew: `shm alerts ack {alert} --why WHY`.",
-        """
-        SELECT a.id AS alert, h.decision FROM holds h JOIN recordings r ON r.id = h.recording_id
-        JOIN alerts a ON a.key = 'hanger-' || CAST(r.hanger AS TEXT) || ':held-'
-            || CAST(h.id AS TEXT)
-        WHERE h.decision IS NOT NULL
-            AND NOT EXISTS (SELECT 1 FROM acknowledgements k WHERE k.alert_id = a.id)
-        """,
-    ),
-    Rule(
         "events",
         "an event of recording {recording} is missing: steps tell of {steps} refusals, events of "
         "{events}.",
@@ -232,22 +220,11 @@ RULES = (
         JOIN steps a ON a.recording_id = t.recording_id AND a.stage = 'archived'
         WHERE EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)
             AND NOT EXISTS (
-                SELECT 1 FROM deliveries d WHERE d.alert_id = x.id AND d.state = 'waiting')
+                SELECT 1 FROM deliveries d WHERE d.alert_id = x.id AND d.state = 'waiting'
+                AND d.news = 'raised')
         GROUP BY x.test_id
         """,
         ("told", "steps"),
-    ),
-    Rule(
-        "deliveries",
-        "a delivery is missing: test {test} has a step notified, and no alert of it was told.",
-        HISTORY,
-        """
-        SELECT s.test_id AS test, count(*) AS steps,
-            (SELECT count(*) FROM alerts x WHERE x.test_id = s.test_id
-                AND EXISTS (SELECT 1 FROM deliveries d WHERE d.alert_id = x.id)) AS told
-        FROM steps s WHERE s.stage = 'notified' GROUP BY s.test_id
-        """,
-        ("steps", "told"),
     ),
     Rule(
         "fingerprints",
@@ -380,6 +357,9 @@ RULES = (
             AND (t.hanger, t.name) NOT IN (SELECT o.hanger, o.name FROM baselines b
                 JOIN posterior_tests p ON p.posterior_id = b.posterior_id
                 JOIN tests o ON o.id = p.test_id)
+            AND NOT EXISTS (SELECT 1 FROM silences m WHERE m.is_maintenance
+                AND (m.hanger IS NULL OR m.hanger = t.hanger) AND m.starts_at <= t.time
+                AND t.time < coalesce(m.ended_at, m.ends_at))
         """,
     ),
     Rule(

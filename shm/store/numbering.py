@@ -32,6 +32,8 @@ NUMBERED = (
     "steps",
     "archive_copies",
     "tokens",
+    "resolutions",
+    "silences",
 )
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""

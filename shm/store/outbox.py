@@ -9,20 +9,24 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import alert_document
+from shm.documents import alert_document, value_of
 from shm.errors import DamagedRow
-from shm.store.blobs import alert_from_document
 from shm.store.checksums import decoding, loads, note_damage
 from shm.store.database import insert
-from shm.store.rows import Acknowledgement, DeliveryState, StoredAlert
-from shm.store.tables import acknowledgements, alerts, deliveries, tests
+from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, StoredAlert
+from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, tests
 from shm.values import Alert
 
 stored_alerts = sa.select(
     alerts,
     tests.c.name.label("test"),
     *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
-).select_from(alerts.outerjoin(acknowledgements).outerjoin(tests, tests.c.id == alerts.c.test_id))
+    *(resolutions.c[name].label(f"end_{name}") for name in ("who", "why", "at")),
+).select_from(
+    alerts.outerjoin(acknowledgements)
+    .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
+    .outerjoin(tests, tests.c.id == alerts.c.test_id)
+)
 
 
 def raise_alert(
@@ -47,14 +51,46 @@ def raise_alert(
     }
     alert_id = insert(connection, alerts, values)
     for hook in hooks:
-        insert(connection, deliveries, _owed(alert_id, hook, at))
+        insert(connection, deliveries, _owed(alert_id, hook, News.RAISED, at))
     return StoredAlert(alert_id, alert, at)
 
 
-def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
+def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
+    """Notes that the condition of an alert ended; False where that is noted already.
+
+    Each hook that was told of the alert is owed that news.
+    """
+    known = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
+    if connection.execute(known).first() is not None:
+        return False
+    insert(connection, resolutions, vars(Resolution(alert_id, who, why, at)))
+    told = sa.select(deliveries.c.hook).where(
+        deliveries.c.alert_id == alert_id,
+        deliveries.c.news == News.RAISED,
+        deliveries.c.state == DeliveryState.DELIVERED,
+    )
+    for hook in connection.scalars(told.order_by(deliveries.c.id)).all():
+        insert(connection, deliveries, _owed(alert_id, hook, News.RESOLVED, at))
+    return True
+
+
+def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
+    """A hook that was told of an alert after its condition ended is owed that news too."""
+    ended = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
+    owed = sa.select(deliveries.c.id).where(
+        deliveries.c.alert_id == alert_id,
+        deliveries.c.hook == hook,
+        deliveries.c.news == News.RESOLVED,
+    )
+    if connection.execute(ended).first() and connection.execute(owed).first() is None:
+        insert(connection, deliveries, _owed(alert_id, hook, News.RESOLVED, at))
+
+
+def _owed(alert_id: int, hook: str, news: News, at: datetime) -> dict[str, Any]:
     return {
         "alert_id": alert_id,
         "hook": hook,
+        "news": news,
         "state": DeliveryState.WAITING,
         "attempts": 0,
         "next_attempt_at": at,
@@ -64,14 +100,16 @@ def _owed(alert_id: int, hook: str, at: datetime) -> dict[str, Any]:
 
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
-    return StoredAlert(row.id, alert_of(row), row.raised_at, acknowledgement_of(row))
+    return StoredAlert(
+        row.id, alert_of(row), row.raised_at, acknowledgement_of(row), resolution_of(row)
+    )
 
 
 def alert_of(row: Row[Any]) -> Alert:
     """An alert that was raised is told even where its document is damaged: as much as is left."""
     try:
         with decoding(alerts, row, row.hanger):
-            return alert_from_document(loads(row.document))
+            return value_of(Alert, loads(row.document))
     except DamagedRow as error:
         note_damage(error)
         message = f"{row.message} (Details are lost: {error.message})"
@@ -83,3 +121,10 @@ def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
     if row.ack_at is None:
         return None
     return Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
+
+
+def resolution_of(row: Row[Any]) -> Resolution | None:
+    """How the condition of an alert ended, of a row of `stored_alerts`; None while it stands."""
+    if row.end_at is None:
+        return None
+    return Resolution(row.id, row.end_who, row.end_why, row.end_at)

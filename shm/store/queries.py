@@ -8,7 +8,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.store.blobs import foreign_from, posterior_from, quality_from, test_from_document
+from shm.documents import value_of
+from shm.store.blobs import posterior_from, test_from_document
 from shm.store.checksums import decoding, loads
 from shm.store.files import counts, in_force
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
@@ -21,7 +22,7 @@ from shm.store.tables import (
     selections,
     tests,
 )
-from shm.values import Posterior, Selection
+from shm.values import ForeignMode, Posterior, QualityCheck, Selection
 
 # All but the frequency response, which may be as large as all else together a hundredfold.
 _columns = (column for column in tests.columns if column is not tests.c.frequency_response)
@@ -81,8 +82,8 @@ def _test(row: Row[Any]) -> StoredTest:
             test=test_from_document(loads(row.document), row.hanger),
             notes=tuple(loads(row.notes)),
             lineage=lineage_from(row),
-            quality=tuple(quality_from(entry) for entry in loads(row.quality) or ()),
-            set_aside=tuple(foreign_from(entry) for entry in loads(row.set_aside) or ()),
+            quality=value_of(tuple[QualityCheck, ...], loads(row.quality) or ()),
+            set_aside=value_of(tuple[ForeignMode, ...], loads(row.set_aside) or ()),
         )
 
 

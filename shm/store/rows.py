@@ -48,6 +48,15 @@ class DeliveryState(StrEnum):
     WAITING = "waiting"
     DELIVERED = "delivered"
     GIVEN_UP = "given up"
+    NOT_NEEDED = "not needed"
+    """Acknowledged or resolved before its time came."""
+
+
+class News(StrEnum):
+    """The change of an alert's state that a delivery tells of."""
+
+    RAISED = "raised"
+    RESOLVED = "resolved"
 
 
 OTHER = "other"
@@ -261,27 +270,79 @@ class Acknowledgement:
 
 
 @dataclass(frozen=True)
+class Resolution:
+    """When the condition that an alert tells of ended, who found that (`shm` or a person), why."""
+
+    alert_id: int
+    who: str
+    why: str
+    at: datetime
+
+
+@dataclass(frozen=True)
 class StoredAlert:
-    """An alert and when it was raised; it is open while nobody has acknowledged it."""
+    """An alert and when it was raised; it is open while nobody has acknowledged it.
+
+    Its condition stands while it has no resolution.
+    """
 
     id: int
     alert: Alert
     raised_at: datetime
     acknowledgement: Acknowledgement | None = None
+    resolution: Resolution | None = None
+
+
+@dataclass(frozen=True)
+class Silence:
+    """From when until when no hook is told of a hanger, or of any where `hanger` is None.
+
+    In a maintenance window tests are taken in but not watched. `ended_at` is when a person ended
+    it before its time.
+    """
+
+    id: int
+    hanger: int | None
+    starts_at: datetime
+    ends_at: datetime
+    is_maintenance: bool
+    who: str
+    why: str
+    made_at: datetime
+    ended_at: datetime | None = None
+    ended_who: str = ""
+
+    @property
+    def until(self) -> datetime:
+        """When it ends, or ended."""
+        return self.ends_at if self.ended_at is None else min(self.ended_at, self.ends_at)
+
+    def covers(self, hanger: int, at: datetime) -> bool:
+        """Whether it is in force for a hanger at a time; its end is not part of it."""
+        return self.hanger in (None, hanger) and self.starts_at <= at < self.until
 
 
 @dataclass(frozen=True)
 class Delivery:
-    """One alert on its way to one hook: the outbox."""
+    """One alert on its way to one hook: the outbox.
+
+    `message_id` is None until it is due; deliveries of one message have the same.
+    """
 
     id: int
-    alert: Alert
+    stored: StoredAlert
     hook: str
+    news: News
     state: DeliveryState
     attempts: int
     next_attempt_at: datetime
     last_error: str = ""
     ended_at: datetime | None = None
+    message_id: int | None = None
+
+    @property
+    def alert(self) -> Alert:
+        return self.stored.alert
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Any
@@ -15,11 +15,43 @@ from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.files import NOTIFIED, write_step
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
-from shm.store.outbox import acknowledgement_of, alert_of, stored_alert, stored_alerts
-from shm.store.rows import Acknowledgement, Delivery, DeliveryState, StoredAlert, counts_by_name
-from shm.store.tables import acknowledgements, adoptions, alerts, baselines, deliveries, tests
+from shm.store.outbox import (
+    acknowledgement_of,
+    owe_resolution,
+    resolution_of,
+    resolve,
+    stored_alert,
+    stored_alerts,
+)
+from shm.store.rows import (
+    Acknowledgement,
+    Delivery,
+    DeliveryState,
+    News,
+    StoredAlert,
+    counts_by_name,
+)
+from shm.store.tables import (
+    acknowledgements,
+    adoptions,
+    alerts,
+    baselines,
+    deliveries,
+    resolutions,
+    tests,
+)
 
-_OWED = ("id", "hook", "state", "attempts", "next_attempt_at", "last_error", "ended_at")
+_OWED = (
+    "id",
+    "hook",
+    "news",
+    "state",
+    "attempts",
+    "next_attempt_at",
+    "last_error",
+    "ended_at",
+    "message_id",
+)
 _outbox = stored_alerts.add_columns(
     *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
 ).join(deliveries, deliveries.c.alert_id == alerts.c.id)
@@ -65,6 +97,42 @@ class Alerts(Repository):
         if not found:
             raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
         return found[0]
+
+    def list_standing(self, hanger: int, baseline_id: int) -> tuple[StoredAlert, ...]:
+        """Alerts of a hanger against a baseline whose condition has not ended, the oldest first."""
+        query = stored_alerts.where(
+            alerts.c.hanger == hanger,
+            alerts.c.baseline_id == baseline_id,
+            resolutions.c.id.is_(None),
+        )
+        with self.reading() as connection:
+            return tuple(
+                stored_alert(row) for row in connection.execute(query.order_by(alerts.c.id))
+            )
+
+    def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
+        """Notes that the condition of an alert ended, and acknowledges it where nobody has.
+
+        Raises NothingThere where there is none of that number, UsageError where it is noted.
+        """
+        found = self._alert(alert_id)
+        with self.writing() as connection:
+            if not resolve(connection, alert_id, who, why, at):
+                raise UsageError(
+                    f"alert {alert_id} is resolved already.", remedy="See `shm alerts`."
+                )
+            if found.acknowledgement is None:
+                noted = Acknowledgement(alert_id, who, why, at)
+                insert(connection, acknowledgements, vars(noted))
+        return self._alert(alert_id)
+
+    def _alert(self, alert_id: int) -> StoredAlert:
+        with self.reading() as connection:
+            by_id = stored_alerts.where(alerts.c.id == alert_id)
+            row = connection.execute(by_id).one_or_none()
+            if row is None:
+                raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
+            return stored_alert(row)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that somebody has seen an alert to its end; the alert with that note.
@@ -122,14 +190,49 @@ class Alerts(Repository):
             query = query.where(deliveries.c.state == state)
         return self._deliveries(query)
 
+    def list_unsent(self) -> tuple[Delivery, ...]:
+        """Deliveries whose first attempt has not begun, in the order in which they were owed."""
+        waiting = deliveries.c.state == DeliveryState.WAITING
+        query = _outbox.where(waiting, deliveries.c.message_id.is_(None))
+        return self._deliveries(query.order_by(deliveries.c.id))
+
+    def list_of_messages(self, message_ids: Collection[int]) -> tuple[Delivery, ...]:
+        """The deliveries of messages, in their order."""
+        query = _outbox.where(deliveries.c.message_id.in_(message_ids))
+        return self._deliveries(query.order_by(deliveries.c.id))
+
+    def begin_messages(
+        self, messages: Sequence[Sequence[int]], not_needed: Mapping[int, str], at: datetime
+    ) -> None:
+        """Makes messages of deliveries for good, and ends those that nobody needs, with the reason.
+
+        From here on a message keeps its deliveries and its number, whatever is killed when.
+        """
+        if not messages and not not_needed:
+            return
+        unsent = (deliveries.c.state == DeliveryState.WAITING) & deliveries.c.message_id.is_(None)
+        with self.writing() as connection:
+            for ids in messages:
+                begun = sa.update(deliveries).where(deliveries.c.id.in_(ids), unsent)
+                connection.execute(begun.values(message_id=min(ids), next_attempt_at=at))
+            for id_, why in not_needed.items():
+                ended = {"state": DeliveryState.NOT_NEEDED, "last_error": why, "ended_at": at}
+                one = sa.update(deliveries).where(deliveries.c.id == id_, unsent)
+                if connection.execute(one.values(**ended)).rowcount:
+                    _note_notified(connection, id_, at)
+
     def list_due_deliveries(
         self,
         now: datetime,
         limit: int,
         excluding: Collection[int] = (),
         waits: Sequence[timedelta] = (),
+        *,
+        begun: bool = False,
     ) -> tuple[Delivery, ...]:
-        """Deliveries whose time has come, the longest due first.
+        """Deliveries whose time has come, the longest due first; of each message the first alone.
+
+        With `begun` only of messages: others, which may wait for months, must not fill the limit.
 
         Also those that would wait longer than `waits` says for so many attempts, its last for more:
         the clock was ahead when they were put off.
@@ -137,18 +240,21 @@ class Alerts(Repository):
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
         counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
         too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
-        due = (deliveries.c.state == DeliveryState.WAITING) & sa.or_(at <= now, *too_far)
+        own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
+        due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
+        if begun:
+            due &= deliveries.c.message_id.is_not(None)
         query = _outbox.where(due, deliveries.c.id.not_in(excluding))
         return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
 
     def save_delivery(self, delivery: Delivery, at: datetime) -> None:
-        """Marks a delivery as done; one that has come to its end stays as it is."""
+        """Marks a delivery, with its whole message, as done; what has ended stays as it is."""
         self._end(delivery, DeliveryState.DELIVERED, "", at)
 
     def save_failure(
         self, delivery: Delivery, error: str, at: datetime, next_attempt_at: datetime | None
     ) -> None:
-        """Puts a delivery off, or gives it up where `next_attempt_at` is None."""
+        """Puts a delivery off, with its message, or gives it up where `next_attempt_at` is None."""
         if next_attempt_at is None:
             self._end(delivery, DeliveryState.GIVEN_UP, error, at)
         else:
@@ -165,8 +271,11 @@ class Alerts(Repository):
     def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
         with self.writing() as connection:
             ended = {"state": state, "last_error": error, "ended_at": at}
-            if _note(connection, delivery, ended):
-                _note_notified(connection, delivery, at)
+            for row in _note(connection, delivery, ended):
+                if row.news == News.RAISED:
+                    _note_notified(connection, row.id, at)
+                    if state is DeliveryState.DELIVERED:
+                        owe_resolution(connection, row.alert_id, row.hook, at)
 
     def _deliveries(self, query: sa.Select[Any]) -> tuple[Delivery, ...]:
         with self.reading() as connection:
@@ -198,7 +307,9 @@ def _deliveries_of(
     query = sa.select(deliveries).where(deliveries.c.alert_id.in_(ids)).order_by(deliveries.c.id)
     found = defaultdict[int, list[DeliveryRow]](list)
     for row in connection.execute(query):
-        one = DeliveryRow(row.hook, DeliveryState(row.state), row.attempts, row.last_error)
+        one = DeliveryRow(
+            row.hook, DeliveryState(row.state), row.attempts, row.last_error, News(row.news)
+        )
         found[row.alert_id].append(one)
     return found
 
@@ -215,23 +326,36 @@ def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
         message=alert.message,
         acknowledgement=acknowledgement_of(row),
         deliveries=owed,
+        resolution=resolution_of(row),
     )
 
 
-def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> bool:
-    """Whether it was still owed: another process may have had an answer of the hook before."""
-    owed = (deliveries.c.id == delivery.id) & (deliveries.c.state == DeliveryState.WAITING)
+def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> Sequence[Row[Any]]:
+    """Those of the message that were still owed: another process may have had an answer before.
+
+    What is tried is a message, if only of one alert.
+    """
+    first = deliveries.c.id if delivery.message_id is None else deliveries.c.message_id
+    owed = (first == (delivery.message_id or delivery.id)) & (
+        deliveries.c.state == DeliveryState.WAITING
+    )
+    columns = (deliveries.c[name] for name in ("id", "alert_id", "hook", "news"))
+    rows = connection.execute(sa.select(*columns).where(owed).order_by(deliveries.c.id)).all()
     changed = sa.update(deliveries).where(owed)
-    noted = connection.execute(changed.values(attempts=deliveries.c.attempts + 1, **values))
-    return noted.rowcount == 1
+    message_id = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id)
+    tried = {"attempts": deliveries.c.attempts + 1, "message_id": message_id}
+    connection.execute(changed.values(**tried, **values))
+    return rows
 
 
-def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> None:
+def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> None:
     """The test of an alert has come to its end once no hook is owed it any more."""
-    siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery.id)
+    siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery_id)
     of_alert = deliveries.c.alert_id == siblings.scalar_subquery()
     waiting = sa.select(deliveries.c.id).where(
-        of_alert, deliveries.c.state == DeliveryState.WAITING
+        of_alert,
+        deliveries.c.state == DeliveryState.WAITING,
+        deliveries.c.news == News.RAISED,
     )
     if connection.execute(waiting).first() is None:
         about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
@@ -241,7 +365,8 @@ def _note_notified(connection: Connection, delivery: Delivery, at: datetime) -> 
 
 def _delivery(row: Row[Any]) -> Delivery:
     owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
-    return Delivery(alert=alert_of(row), **{**owed, "state": DeliveryState(row.owed_state)})
+    as_named = {"state": DeliveryState(row.owed_state), "news": News(row.owed_news)}
+    return Delivery(stored=stored_alert(row), **{**owed, **as_named})
 
 
 def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from datetime import datetime
+from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
@@ -18,11 +19,21 @@ from shm.store.columns import Number
 from shm.store.database import Repository, insert
 from shm.store.files import in_force
 from shm.store.list_rows import BaselineGlance, WatchedName
-from shm.store.outbox import raise_alert
+from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import baseline_in_force, baselines_now, compared_with, read_baseline
 from shm.store.results import all_at, insert_baseline, insert_posterior, move
 from shm.store.rows import Baseline, KeptWatch, Lineage, Stage, StoredAlert, StoredTest, StoredWatch
-from shm.store.tables import baselines, drifts, posterior_tests, tests, watch_states, watches
+from shm.store.tables import (
+    acknowledgements,
+    alerts,
+    baselines,
+    drifts,
+    posterior_tests,
+    resolutions,
+    tests,
+    watch_states,
+    watches,
+)
 from shm.store.trends import baselines_in_numbers
 from shm.values import Alert, Change, Drift, Hanger, Posterior, WatchedTest
 
@@ -41,11 +52,13 @@ class Watch(Repository):
         hooks: Sequence[str],
         at: datetime,
         state: KeptWatch | None = None,
+        ended: Mapping[int, str] = MappingProxyType({}),
     ) -> StoredAlert | None:
         """Keeps what the watch made of a test; the alert where it is a new one, else None.
 
         An alert whose key was raised before is the same standing condition and is not raised again.
-        `state` is what the watch goes on from at the next test.
+        `state` is what the watch goes on from at the next test. `ended` are the numbers of alerts
+        whose condition this test ends, with the reason.
         """
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
@@ -59,8 +72,16 @@ class Watch(Repository):
             insert(connection, watches, values)
             if state is not None:
                 _keep_state(connection, baseline, state)
+            for alert_id, why in ended.items():
+                resolve(connection, alert_id, "shm", why, at)
             move(connection, [test], Stage.WATCHED, at)
             return raised
+
+    def pass_over(self, test: StoredTest, at: datetime) -> None:
+        """A test within a maintenance window is compared with nothing."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.UPDATED):
+                move(connection, [test], Stage.WATCHED, at)
 
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
@@ -116,13 +137,25 @@ class Watch(Repository):
         """Has later tests compared with `posterior`, of the tests `chosen`, from now on.
 
         `record` is who, why, and the time since which those tests were taken. What was compared
-        with the baseline `before` stays. Raises StoreBusy where that one is no longer in force.
+        with the baseline `before` stays, its alerts are resolved. Raises StoreBusy where that one
+        is no longer in force.
         """
         (who, why, since), hanger = record, before.hanger
         with self.writing() as connection:
             _refuse_late(connection, before)
             number = insert_posterior(connection, hanger, posterior, chosen, lineage, at)
             id_ = insert_baseline(connection, hanger, number, who, why, at, since)
+            stands = sa.select(alerts.c.id).where(
+                alerts.c.hanger == hanger,
+                sa.or_(
+                    alerts.c.baseline_id == before.id,
+                    alerts.c.baseline_id.is_not(None)
+                    & alerts.c.id.not_in(sa.select(acknowledgements.c.alert_id)),
+                ),
+                alerts.c.id.not_in(sa.select(resolutions.c.alert_id)),
+            )
+            for alert_id in connection.scalars(stands.order_by(alerts.c.id)).all():
+                resolve(connection, alert_id, who, f"new baseline: {why}", at)
         return Baseline(id_, hanger, posterior, at, who, why, since)
 
     def list_watched(

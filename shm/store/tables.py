@@ -7,57 +7,16 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store.columns import Document, Number, UtcTime
+from shm.store.columns import identity as _id
+from shm.store.columns import index_in_force as _in_force
+from shm.store.columns import lineage as _lineage
+from shm.store.columns import metadata as metadata
+from shm.store.columns import model as _model
+from shm.store.columns import reference as _to
+from shm.store.columns import superseded_at as _superseded_at
+from shm.store.columns import unique_where as _unique_where
 
-SCHEMA = "0008"
-
-metadata = sa.MetaData(
-    naming_convention={
-        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-        "fk": "fk_%(table_name)s_%(column_0_name)s",
-        "pk": "pk_%(table_name)s",
-    }
-)
-
-
-def _id() -> sa.Column[int]:
-    return sa.Column("id", sa.Integer, primary_key=True)
-
-
-def _to(table: str, *, nullable: bool = False) -> sa.Column[int]:
-    return sa.Column(f"{table[:-1]}_id", sa.ForeignKey(f"{table}.id"), nullable=nullable)
-
-
-def _lineage() -> tuple[sa.Column[str], ...]:
-    return (
-        sa.Column("input_sha256", sa.String(64), nullable=False),
-        sa.Column("settings_sha256", sa.String(64), nullable=False),
-        sa.Column("version", sa.String(32), nullable=False),
-    )
-
-
-def _model() -> sa.Column[str]:
-    # An adopted class is named after its effects, where they act and their ranges.
-    return sa.Column("model", sa.String(512), nullable=False)
-
-
-def _superseded_at() -> sa.Column[Any]:
-    # What a later run has replaced stays with its lineage; empty of what is in force.
-    return sa.Column("superseded_at", UtcTime)
-
-
-def _in_force(name: str, *columns: str) -> sa.Index:
-    # `superseded_at` stands behind the samples or the frequency response of a row, which may be a
-    # hundred pages of the file: an index of what is in force spares reading past them.
-    where = sa.text("superseded_at IS NULL")
-    return sa.Index(name, *columns, sqlite_where=where, postgresql_where=where)
-
-
-def _unique_where(condition: str, table: str, *columns: str) -> sa.Index:
-    where = sa.text(f"{condition} IS NULL")
-    name = f"uq_{table}_{'_'.join(columns)}"
-    return sa.Index(name, *columns, unique=True, sqlite_where=where, postgresql_where=where)
-
+SCHEMA = "0009"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -282,19 +241,52 @@ acknowledgements = sa.Table(
     sa.Column("why", sa.Text, nullable=False),
 )
 
-# The outbox: what has yet to be told to which hook, and how that went.
+# When the condition that an alert tells of ended, and who found that: `shm`, or a person.
+resolutions = sa.Table(
+    "resolutions",
+    metadata,
+    _id(),
+    sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+)
+
+# From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
+# window (`is_maintenance`) also keeps tests of then from the watch. `ended_at` is when a person
+# ended it before its time. Never changed otherwise, never taken out.
+silences = sa.Table(
+    "silences",
+    metadata,
+    _id(),
+    sa.Column("hanger", sa.Integer),
+    sa.Column("starts_at", UtcTime, nullable=False),
+    sa.Column("ends_at", UtcTime, nullable=False),
+    sa.Column("is_maintenance", sa.Boolean, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("why", sa.Text, nullable=False),
+    sa.Column("made_at", UtcTime, nullable=False),
+    sa.Column("ended_at", UtcTime),
+    sa.Column("ended_who", sa.Text),
+)
+
+# The outbox: what has yet to be told to which hook, and how that went. `news` is the change of
+# state that it tells of, `raised` or `resolved`. `message_id` is empty until the first attempt is
+# due; from then on it is the number of the first delivery of the same message, and never changes.
 deliveries = sa.Table(
     "deliveries",
     metadata,
     _id(),
     _to("alerts"),
     sa.Column("hook", sa.String(255), nullable=False),
+    sa.Column("news", sa.String(16), nullable=False),
     sa.Column("state", sa.String(16), nullable=False),
     sa.Column("attempts", sa.Integer, nullable=False),
     sa.Column("next_attempt_at", UtcTime, nullable=False),
     sa.Column("last_error", sa.Text, nullable=False),
     sa.Column("ended_at", UtcTime),
-    sa.UniqueConstraint("alert_id", "hook"),
+    sa.Column("message_id", sa.Integer, index=True),
+    sa.UniqueConstraint("alert_id", "hook", "news"),
     sa.Index(None, "state", "next_attempt_at"),
 )
 

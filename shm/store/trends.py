@@ -22,9 +22,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import averaged_document, averaged_from
+from shm.documents import averaged_document, number, value_of
 from shm.errors import UsageError
-from shm.store.blobs import number
 from shm.store.checksums import checksum_of, readable
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
@@ -37,7 +36,7 @@ from shm.store.queries import (
     selection_of,
 )
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
-from shm.values import NAN, Hanger, Posterior, Selection, Summary
+from shm.values import NAN, Averaged, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 
 log = logging.getLogger(__name__)
@@ -274,7 +273,7 @@ def _from_text(text: str) -> Numbers:
     return Numbers(
         tension_n=_summary(document["tension_n"]),
         most_probable_tension_n=number(document["most_probable_tension_n"]),
-        averaged=averaged_from(document["averaged"]),
+        averaged=value_of(Averaged, document["averaged"]),
         **{part: _Summaries(document[part]) for part in _NAMED},
     )
 

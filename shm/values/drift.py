@@ -189,7 +189,17 @@ class TemperatureCoefficient:
         return math.isfinite(self.mean) and not self.sd > _INFORMED * self.prior_sd
 
 
-AlertKind = Literal["sudden change", "slow drift", "beyond threshold", "gap", "held", "test"]
+AlertKind = Literal[
+    "sudden change",
+    "slow drift",
+    "beyond threshold",
+    "repeat the test",
+    "tests disagree",
+    "gap",
+    "held",
+    "test",
+    "resolved",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +224,9 @@ class Alert:
     A `held` one says that a test is held until a person has looked, and what it would mean.
     A `test` alert is no finding: it shows that a hook works. `tension` is that by the test,
     averaged over the model classes; None where the alert does not say.
+
+    A `resolved` one says that the condition of the alert has ended whose key it has, with
+    `:resolved` behind it. Where one message tells of several hangers, `alerts` are theirs.
     """
 
     key: str
@@ -225,3 +238,4 @@ class Alert:
     kinds: tuple[AlertKind, ...] = ()
     change: Change | None = None
     tension: Averaged | None = None
+    alerts: tuple[Alert, ...] = ()

@@ -88,14 +88,24 @@ def _material(subject: Subject, evidence: Evidence, effects: FloatArray) -> floa
     if not len(evidence.beginnings):
         return 0.0
     weights, changes = _leading(evidence, np.ones(len(evidence.directions), bool))
-    least, beyond_it = subject.options.least_frequency_shift, []
+    return float(weights @ _materials(subject, evidence, changes, effects))
+
+
+def _materials(
+    subject: Subject,
+    evidence: Evidence,
+    changes: Sequence[tuple[int, ...]],
+    effects: FloatArray,
+) -> FloatArray:
+    """The same (changes,) of each."""
+    least, found = subject.options.least_frequency_shift, []
     for each in changes:
         mean, factor = evidence.change_at(each)
         middle = effects @ mean
         sd = np.maximum(np.sqrt(np.square(effects @ factor).sum(axis=1)), 1e-12)
         tails = ndtr((-least - middle) / sd) + ndtr((middle - least) / sd)
-        beyond_it.append(float(tails.max()))
-    return float(weights @ np.array(beyond_it))
+        found.append(float(tails.max()))
+    return np.array(found)
 
 
 def _sudden(evidence: Evidence) -> float:
@@ -231,13 +241,18 @@ def _company(
 
 
 def drifted(
-    subject: Subject, evidence: Evidence, causes: Evidence, reading: Reading
+    subject: Subject,
+    evidence: Evidence,
+    causes: Evidence,
+    reading: Reading,
+    effects: FloatArray,
 ) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline, called changes and a possible new one.
 
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
-    threshold is averaged over all.
+    threshold is averaged over all; where springs trade with the tension, and no frequency moves by
+    more than what is to be told (`effects`), nothing is beyond.
     """
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
@@ -251,25 +266,29 @@ def drifted(
         for k, weight in enumerate(np.exp(evidence.log_null))
     ]
     q = len(subject.quantities)
-    weights, means, sds = _shifts(evidence, np.ones(len(evidence.directions), bool), loadings)
+    everything = np.ones(len(evidence.directions), bool)
+    weights, means, sds, changes = _shifts(evidence, everything, loadings)
     none = np.array([each[0] for each in nulls]) * (1 - probability)
     all_weights = np.concatenate([none, probability * weights]) if len(weights) else none
     all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
     sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
     all_sds = np.concatenate([sds_of_null.reshape(-1, q), sds])
+    told = np.ones(len(all_weights))
+    if len(changes) and not evidence.called:
+        told[len(none) :] = _materials(subject, evidence, changes, effects)
     found = []
     for j, quantity in enumerate(subject.quantities):
         chosen = (all_weights, all_means, all_sds)
         if not evidence.called and len(evidence.beginnings):
             part = np.array([j in each.members for each in evidence.directions])
             own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
-            chosen = own if len(own[0]) else chosen
+            chosen = own[:3] if len(own[0]) else chosen
         shift = shift_of_mixture(quantity, chosen[0], chosen[1][:, j], chosen[2][:, j])
         moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
         threshold = threshold_of(quantity, subject.hanger)
         chance = beyond(
             quantity,
-            all_weights[moving],
+            (told * all_weights)[moving],
             all_means[moving, j],
             all_sds[moving, j],
             threshold,
@@ -295,14 +314,14 @@ def _of_called(evidence: Evidence) -> FloatArray:
 
 def _shifts(
     evidence: Evidence, part: FloatArray, loadings: FloatArray, *, alone: bool = True
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[int, ...]]]:
     """Weights (B,), means and sds (B, q) of the quantities' shifts, given one change of `part`.
 
     Unless `alone` may, a change that the last test by itself speaks for does not count.
     """
     layout = evidence.layout
     if not len(evidence.beginnings):
-        return np.zeros(0), np.zeros((0, layout.q)), np.zeros((0, layout.q))
+        return np.zeros(0), np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
     weights, changes = _leading(evidence, part)
     if not alone:
         kept = [n for n, each in enumerate(changes) if each[0] < len(evidence.beginnings) - 1]
@@ -318,7 +337,8 @@ def _shifts(
             own_mean, covariance = own_mean + before, covariance + spread
         means.append(own_mean)
         sds.append(np.sqrt(np.maximum(np.diag(covariance), 0)))
-    return weights, np.array(means).reshape(-1, layout.q), np.array(sds).reshape(-1, layout.q)
+    shape = (-1, layout.q)
+    return weights, np.array(means).reshape(shape), np.array(sds).reshape(shape), changes
 
 
 def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:

@@ -232,13 +232,13 @@ class Watcher:
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         subject = Subject(self.quantities, self.hanger, self.options, state.start)
-        last = state.tests - 1
-        outlier = 0.0 if state.counted[-1] else self._outlier(state, last)
+        last, effects = state.tests - 1, self._effects(state)
+        outlier = self._outlier(state, last)
         found = WatchedTest(
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
-            drifts=drifted(subject, evidence, causes, reading),
+            drifts=drifted(subject, evidence, causes, reading, effects),
             change=changed(
                 subject,
                 evidence,
@@ -246,7 +246,7 @@ class Watcher:
                 reading,
                 1 - state.still_same,
                 outlier,
-                self._effects(state),
+                effects,
             ),
         )
         coefficients = self._coefficients(evidence)

@@ -2,10 +2,11 @@
 
 When an owner is told: from what the watch says after each test to at most one alert a test.
 
-Three rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
+Four rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
 change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
 level which the owner asked for. Two tests that agree are told whatever their clocks say, where
-neither of the former rules has (`agreement`). A condition that stands is told once. It ends when
+neither of the former rules has (`agreement`). A test that agrees with none before it is a notice:
+repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
 its probability falls below half that level, and only then can it be told again, so that a
 probability which hovers about the level does not ring every week. A change that was called and then
 passes the threshold is told again, since the owner must now do something else.
@@ -19,8 +20,8 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
-from typing import Any
 
+from shm.documents import value_of
 from shm.errors import BadInput
 from shm.values import (
     Alert,
@@ -30,13 +31,12 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
-    Moved,
     Posterior,
     Reading,
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import message_of, short_name, suspects
+from shm.watch.alert_text import message_of, message_of_odd, short_name, suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.watcher import Watch, Watcher, WatchState, watched
@@ -45,6 +45,8 @@ DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
 _ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
 _BEYOND: AlertKind = "beyond threshold"
+_ODD = 0.9  # nine to one: a notice that is wrong costs a test
+_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +176,27 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     beyond = {(drift.quantity, way_of(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
+    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
     stands = AlertState({**standing.beyond, **beyond}, call, called)
     return stands, _alert(news, change, test, hanger, is_further=is_further)
+
+
+def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
+    """Of a test that fits nothing: a notice of the first, an alert of the third in a row."""
+    if in_a_row not in (1, _ODD_IN_A_ROW):
+        return None
+    kind: AlertKind = "repeat the test" if in_a_row == 1 else "tests disagree"
+    return Alert(
+        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message_of_odd(test, hanger, in_a_row),
+        drifts=(),
+        kinds=(kind,),
+    )
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
@@ -306,6 +325,7 @@ class AlertState:
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
     call: datetime | None = None
     called: tuple[Change, ...] = ()
+    odd: int = 0
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -314,6 +334,7 @@ class AlertState:
                 "beyond": [[*condition, at] for condition, at in self.beyond.items()],
                 "call": self.call,
                 "called": [asdict(change) for change in self.called],
+                "odd": self.odd,
             },
             default=datetime.isoformat,
         )
@@ -325,26 +346,15 @@ class AlertState:
             return cls()
         try:
             kept = json.loads(text)
+            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
             return cls(
-                {(quantity, way): _time(at) for quantity, way, at in kept["beyond"]},
-                kept["call"] and _time(kept["call"]),
-                tuple(_change(each) for each in kept["called"]),
+                {(quantity, way): at for quantity, way, at in beyond},
+                kept["call"] and value_of(datetime, kept["call"]),
+                value_of(tuple[Change, ...], kept["called"]),
+                int(kept["odd"]),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(
                 f"what was told of a hanger cannot be read: {error!r}.",
                 remedy="Go over the hanger's tests from its baseline on.",
             ) from error
-
-
-def _time(text: str) -> datetime:
-    return datetime.fromisoformat(text)
-
-
-def _change(entry: dict[str, Any]) -> Change:
-    moved = tuple(
-        Moved(**{**each, **{name: tuple(each[name]) for name in ("alike", "together")}})
-        for each in entry["moved"]
-    )
-    times = {name: _time(entry[name]) for name in ("began_after", "began_by")}
-    return Change(**{**entry, **times, "moved": moved})

@@ -9,6 +9,12 @@ does so in one of three ways, each of them from a seed: it says that it is busy;
 and then ends the connection without an answer; it answers too late. The last two have had the
 alert and get it again. With `--hook command` it is a program, which fails by its exit code.
 
+With `--alike 50` there are fifty hangers that move alike instead, one alert each, spread over the
+lives, and a hook `chief` that is told of what nobody has acknowledged after so many seconds
+(`--escalation`): how many pages there are, whether any alert is lost, how late the escalation is.
+
+    python tests/benchmarks/alert_delivery.py --alike 50 --kills 20
+
 `tests/daemon/test_dead_hooks.py` holds what can be tested in seconds.
 """
 
@@ -26,13 +32,14 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.store import DeliveryState, Workspace
 from tests.helpers.daemons import real_daemon, until_serving
 from tests.helpers.listeners import Answer, Told, a_listener
-from tests.helpers.outboxes import make_baseline, raise_alerts
+from tests.helpers.outboxes import make_baseline, make_baselines, raise_alerts, raise_alike
 from tests.helpers.workspaces import make_workspace
 
 SECRET = b"of the benchmark"
@@ -100,7 +107,12 @@ def main() -> None:
     parser.add_argument("--longest", type=float, default=2.0, help="longest life, in s")
     parser.add_argument("--hook", choices=("webhook", "command"), default="webhook")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--alike", type=int, default=0, help="hangers that move alike")
+    parser.add_argument("--escalation", type=float, default=120.0, help="in s")
     options = parser.parse_args()
+    if options.alike:
+        alike(options)
+        return
     with tempfile.TemporaryDirectory() as folder:
         keys = Path(folder) / "keys"
         keys.touch()
@@ -155,6 +167,7 @@ def live_in_peace(workspace: Workspace) -> float:
     """A last life that ends when nothing is owed; how long that takes, in s."""
     began = time.monotonic()
     with real_daemon(workspace.folder) as daemon:
+        until_serving(daemon.pid, workspace.folder)  # before, SIGTERM ends it as any program
         while states(workspace)["waiting"]:
             time.sleep(0.2)
         seconds = time.monotonic() - began
@@ -197,6 +210,88 @@ def judge(
         print(f"| {name} | {value} |")
     if not alerts == delivered == had.keys() or len(alerts) != options.alerts:
         raise SystemExit("an alert was lost, or stands unmarked")
+
+
+GATHERING_S = 20.0
+
+
+def alike(options: argparse.Namespace) -> None:
+    """Fifty hangers that move alike, lives of a daemon that is killed, and an escalation."""
+    rng, pages = random.Random(options.seed), []
+    lock = threading.Lock()
+
+    def note(hook: str, told: Told) -> Answer:
+        with lock:
+            body = json.loads(told.body)
+            lost = rng.random() < 0.5
+            pages.append((hook, time.time(), body, lost))
+        return Answer(200, cut=lost)
+
+    with tempfile.TemporaryDirectory() as folder:
+        with (
+            a_listener(lambda told: note("ops", told)) as ops,
+            a_listener(lambda told: note("chief", told)) as chief,
+        ):
+            hangers = range(1, options.alike + 1)
+            settings = {**SETTINGS, "alert_grouping_seconds": GATHERING_S}
+            workspace = make_workspace(Path(folder) / "bridge", hangers=hangers, settings=settings)
+            (workspace.folder / "secret").write_bytes(SECRET)
+            path, late = Path(workspace.bridge.source), options.escalation
+            path.write_text(
+                f'{path.read_text()}\n[[hook]]\nname = "ops"\nurl = "{ops.url}"\n'
+                f'secret_file = "secret"\n[[hook]]\nname = "chief"\nurl = "{chief.url}"\n'
+                f'secret_file = "secret"\nescalation_after_seconds = {late}\n'
+            )
+            workspace = workspace.reopened()
+            make_baselines(workspace, hangers)
+            began = time.time()
+            raise_alike(workspace, hangers, ["ops", "chief"])
+            for _ in range(options.kills):
+                with real_daemon(workspace.folder) as daemon:
+                    until_serving(daemon.pid, workspace.folder)
+                    time.sleep(rng.uniform(0.0, options.longest))
+            live_in_peace(workspace)
+        judge_alike(workspace, pages, began, options)
+
+
+def judge_alike(
+    workspace: Workspace,
+    pages: list[tuple[str, float, dict[str, Any], bool]],
+    began: float,
+    options: argparse.Namespace,
+) -> None:
+    """Prints the table; ends with an error where an alert was lost or an escalation was late."""
+    with workspace.store() as store:
+        alerts = {each.alert.key: each.raised_at.timestamp() for each in store.alerts.list_all()}
+        ended = {each.state.value for each in store.alerts.list_deliveries()}
+    had: dict[str, set[str]] = {"ops": set(), "chief": set()}
+    keys: dict[str, Counter[str]] = {"ops": Counter(), "chief": Counter()}
+    first: dict[str, float] = {}
+    for hook, at, body, _ in pages:
+        keys[hook][body["key"]] += 1
+        inner = [each["key"] for each in body.get("alerts", [])] or [body["key"]]
+        had[hook].update(inner)
+        if hook == "chief":
+            for key in inner:
+                first.setdefault(key, at)
+    late = [first[key] - alerts[key] - options.escalation for key in first]
+    print(f"\nalike, seed {options.seed}\n\n| | |\n|---|---|")
+    for name, value in (
+        ("hangers that moved alike, kills", f"{len(alerts)}, {options.kills}"),
+        ("different messages to the hook", len(keys["ops"])),
+        ("tries of them, answers lost", f"{sum(keys['ops'].values())}, "
+         f"{sum(lost for hook, *_, lost in pages if hook == 'ops')}"),
+        ("alerts that the hook had", len(had["ops"])),
+        ("different messages of the escalation", len(keys["chief"])),
+        ("alerts that were escalated", len(had["chief"])),
+        ("earliest and latest after the time of the escalation",
+         f"{min(late, default=-1):.1f} s, {max(late, default=-1):.1f} s"),
+        ("until nothing was owed", f"{time.time() - began:.0f} s"),
+    ):  # fmt: skip
+        print(f"| {name} | {value} |")
+    whole = alerts.keys() == had["ops"] == had["chief"] and ended == {"delivered"}
+    if not whole or len(keys["ops"]) != 1 or not (0 <= min(late) <= max(late) <= 60):
+        raise SystemExit("an alert was lost, told apart, or escalated too early or late")
 
 
 if __name__ == "__main__":

@@ -187,7 +187,9 @@ def true_shift(season: Any, number: int) -> float:
     return float(lasting[-1] / lasting[0] - 1)
 
 
-def rivals(tests: Sequence[ModalTest], days: np.ndarray, baseline_tests: int) -> dict[str, list[float]]:
+def rivals(
+    tests: Sequence[ModalTest], days: np.ndarray, baseline_tests: int
+) -> dict[str, list[float]]:
     """CUSUM and EWMA on the first frequency, cleared of its line in the temperature, clipped."""
     first = np.array([
         next((np.log(m.frequency_hz) for m in t.modes if m.plane == "transverse" and m.order == 1), np.nan)
@@ -228,7 +230,7 @@ def rate(hits: int, years: float) -> str:
 
 
 def is_alert(alert: dict[str, Any]) -> bool:
-    return any(kind not in ("notice",) for kind in alert["kinds"])
+    return any(kind != "repeat the test" for kind in alert["kinds"])
 
 
 def report(rows: Sequence[dict[str, Any]]) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -78,6 +79,24 @@ def test_a_fresh_process_has_done_nothing_before_and_does_nothing_after(workers:
     later = {workers.submit(os.getpid).result(60) for _ in range(4)}
     assert len({*fresh}) == 2
     assert not {*fresh} & (known | later)
+
+
+def test_no_process_is_begun_once_all_end_for_nobody_would_end_it(tmp_path: Path) -> None:
+    at_work = tmp_path / "at work"
+    with children_ended():
+        pool = Workers(1)
+        first = pool.submit(_say_and_sleep, at_work)
+        waiting = pool.submit_fresh(os.getpid)
+        while not at_work.exists():
+            time.sleep(0.01)
+        pool.shutdown(wait=False)
+        assert first.result(60) is None
+        assert "not begun" in died(waiting).message
+
+
+def _say_and_sleep(at_work: Path) -> None:
+    at_work.touch()
+    time.sleep(0.5)
 
 
 def test_a_worker_killed_at_rest_costs_nothing(workers: Workers) -> None:

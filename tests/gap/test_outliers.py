@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from shm.gap import GapOptions, diagnose
+from shm.gap import GapOptions, diagnose, outliers
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.outliers import FREEDOM, GROSS_ERROR, SURE, left_out, log_gross, log_ordinary
@@ -141,3 +142,20 @@ def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
         evidence = stats.multivariate_normal(cov=whole).logpdf(away)
         weight = problem.likelihood(fit.hypothesis).log_weight[node]
         assert seen.log_all[node] == pytest.approx(evidence + weight, abs=1e-4)
+
+
+@pytest.mark.parametrize(("frequencies", "aside"), [(4, 0), (5, 1), (6, 1), (30, 3)])
+def test_tension_stiffness_and_two_to_contradict_them_are_left_and_nine_of_ten(
+    monkeypatch: pytest.MonkeyPatch, frequencies: int, aside: int
+) -> None:
+    """Even where the next one always looks like a slip."""
+    monkeypatch.setattr(outliers, "believed", lambda attribution: [])
+    monkeypatch.setattr(outliers, "_open", lambda *_: np.ones(1, bool))
+    monkeypatch.setattr(outliers, "_suspect", lambda *_: 0)
+    monkeypatch.setattr(outliers, "_judged", lambda *_: (1.0, []))
+    problem = SimpleNamespace(
+        design=SimpleNamespace(frequencies=frequencies), part=lambda rows: None
+    )
+    rows, rng = np.arange(frequencies), np.random.default_rng(1)
+    found = outliers.gross_errors(problem, rows, None, rng)  # type: ignore[arg-type]
+    assert [each.row for each in found] == list(range(aside))

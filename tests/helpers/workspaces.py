@@ -17,7 +17,13 @@ from shm.store import Workspace
 from shm.values import PLANES, Hanger, ModalTest, Mode
 
 START = datetime(2026, 5, 1, 10, 0, tzinfo=UTC)
-QUICK = {"models": "beam1", "samples": 100, "spool_scan_seconds": 0.05, "spool_stable_seconds": 0.0}
+QUICK = {
+    "models": "beam1",
+    "samples": 100,
+    "spool_scan_seconds": 0.05,
+    "spool_stable_seconds": 0.0,
+    "alert_grouping_seconds": 0.0,
+}
 
 
 def make_workspace(

@@ -188,9 +188,10 @@ def test_a_sensor_that_sees_both_planes_along_one_axis_is_noted() -> None:
     assert not any("biaxial" in note for note in apart.notes)
 
 
-def test_few_hits_are_noted() -> None:
-    result = identify([recording(hanger_modes(), hits=2, noise=0.01)], OPTIONS, test_id="t")
-    assert any("three hits" in note for note in result.notes)
+@pytest.mark.parametrize(("hits", "noted"), [(2, True), (3, False)])
+def test_fewer_than_three_hits_are_noted(hits: int, noted: bool) -> None:
+    result = identify([recording(hanger_modes(), hits=hits, noise=0.01)], OPTIONS, test_id="t")
+    assert any("fewer than three hits" in note for note in result.notes) is noted
 
 
 def test_a_recording_of_noise_is_not_identifiable_and_says_why() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from shm.models import build
 from shm.models.base import Conditions
-from shm.plausibility.bars import Known, OtherOrigin, doubt_of
+from shm.plausibility.bars import Known, OtherOrigin, _candidates, doubt_of
 from shm.values import PLANES, AddedMass, Hanger, ModalTest, Mode, Supports
 from tests.helpers.hangers import HANGER_3
 
@@ -177,3 +177,13 @@ def test_nothing_is_said_of_two_modes_or_of_a_bar_that_is_no_hanger() -> None:
     assert doubted(few, NINE, 3) is None
     column = replace(NINE, supports=Supports("clamped", "free"))
     assert doubt_of(test, Known(column), [known(ELEVEN, 1)]) is None
+
+
+@pytest.mark.parametrize("tests", [0, 2])
+def test_only_the_hanger_that_is_meant_may_have_had_something_hung_on_it(tests: int) -> None:
+    """What a mass at any place does comes near to any test: no rival may be excused by one."""
+    others = [known(hanger, tests) for hanger in BRIDGE if hanger != NINE]
+    own, rivals = _candidates(a_test(NINE), known(NINE, tests), others)
+    assert own.masses
+    assert {origin.kind for origin in rivals} >= {"hanger", "unknown bar", "time base"}
+    assert not any(evidence.masses for _, evidence in rivals.values())

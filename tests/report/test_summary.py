@@ -10,6 +10,7 @@ import pytest
 from shm.report.contents import HangerReport, Status, status
 from shm.report.hanger_summary import advice, summary, tension_change
 from shm.values import Drift, Hanger, Thresholds
+from tests.report.diagnoses import LED
 
 
 def with_probability(data: HangerReport, probability: float) -> HangerReport:
@@ -171,3 +172,35 @@ def test_tests_that_could_not_show_a_shift_are_said_not_to_speak_against_it(
 def test_a_shift_that_nobody_called_is_told_as_one_that_may_not_be(season: HangerReport) -> None:
     assert "if it has moved at all" in summary(with_probability(season, 0.1))
     assert "if it has moved at all" not in summary(season)
+
+
+def test_the_paragraph_reads_so_from_beginning_to_end(
+    season: HangerReport, bare: HangerReport
+) -> None:
+    """Every sentence and their order; what the other tests hold is the choice between them."""
+    told = summary(replace(season, diagnosis=LED, gap_watch="(What became of it.)"))
+    assert told == (
+        "Hanger 3 of Arch bridge carries 651 kN (90 % interval 636 to 667 kN) by the test t009 "
+        "(2026-09-04 10:00 UTC, 12.0 °C). Against the nominal 711 kN that is -8.4 % (90 % interval "
+        "-10.5 to -6.2 %). Against the baseline, test t000 with 701 kN (90 % interval 687 to 716 "
+        "kN), it is -7.2 % (90 % interval -9.2 to -5.2 %). The tension has fallen; the probability "
+        "of a shift beyond its threshold of 5 % is 0.966. The model class is beam2, the most "
+        "probable of beam2, beam1 (probability 0.982); over 12 measured modes it misses the "
+        "frequencies by 0.4 % (rms), at most transverse 4 by +0.4 % (90 % interval -0.6 to "
+        "+1.4 %). What the plain class beam1 would leave unexplained was diagnosed on 5 tests. "
+        "The gap is explained by a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7), "
+        "probability 0.930. Weighed over all that may be, the tension is 702 kN (90 % interval 690 "
+        "to 715 kN). (What became of it.) Repeat the hammer test within days; if the shift stays, "
+        "inspect both ends of the hanger and test its neighbours. To tell point mass from section "
+        "loss, measure next: known mass of 25 kg at 3.6 m (expected odds of 400 to 1)."
+    )
+    assert summary(bare) == (
+        "Hanger 3 of Arch bridge carries 711 kN (90 % interval 697 to 725 kN) by the test only "
+        "(time not recorded, temperature not recorded). Against the nominal 711 kN that is +0.0 % "
+        "(90 % interval -2.0 to +1.9 %). There is no earlier test to compare with: this one is the "
+        "baseline. The model class is beam1; over one measured mode it misses the frequencies by "
+        "0.34 % (rms), at most transverse 1 by -0.3 % (90 % interval -1.8 to +1.1 %). Each lies "
+        "within its interval: nothing that was measured is clearly left unexplained. Repeat the "
+        "test at another temperature to make the baseline firm. Record the temperature with the "
+        "next test: it moves the tension."
+    )

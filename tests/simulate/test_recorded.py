@@ -14,6 +14,7 @@ from shm.identify import identify
 from shm.identify.options import campaign_options
 from shm.read import read
 from shm.read.registry import write_single
+from shm.settings import Settings
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign_with_truth
 from shm.simulate.reality import Reality
 from shm.simulate.recorded import RecordedCampaign, Recorder, recorded
@@ -132,3 +133,9 @@ def test_errors_of_sensors_are_in_the_recordings(hanger: Hanger) -> None:
 def test_two_planes_need_sensors_of_both(hanger: Hanger) -> None:
     with pytest.raises(UsageError, match="biaxial"):
         made(hanger, CampaignPlan(biaxial=False))
+
+
+def test_a_hit_of_level_one_is_one_of_the_usual_settings() -> None:
+    usual = Settings().reference_force_n
+    options = campaign_options([Recording("made.csv", (), 256.0)])
+    assert Recorder().reference_force_n == options.reference_force_n == usual

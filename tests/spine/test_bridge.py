@@ -179,7 +179,7 @@ def test_thresholds_and_hooks_are_read(tmp_path: Path) -> None:
             ("id = 3", "id = 3\nthresholds = { false_call_years = 0.01 }"),
             r"thresholds: false_call_years = 0.01 is not from 0.1 to 1e\+06",
         ),
-        (("id = 3", "id = 3\nthresholds = { false_call_years = 'long' }"), "is not a number"),
+        (("id = 3", "id = 3\nthresholds = { false_call_years = 'long' }"), "'long' is not a pos"),
         (("id = 3", "id = "), "not a readable TOML file"),
     ],
 )

@@ -71,7 +71,7 @@ def test_a_bar_may_carry_no_tension_but_no_compression(tmp_path: Path) -> None:
     hanger = loaded(tmp_path, "", tension_n="0.0")
     assert hanger.nominal_tension_n == 0
     assert not hanger.as_hanger
-    with pytest.raises(BadInput, match="negative"):
+    with pytest.raises(BadInput, match="from 0 up"):
         loaded(tmp_path, "", tension_n="-1.0")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, fields
+from typing import Any
 
 import pytest
 
@@ -65,3 +66,30 @@ def test_a_document_from_before_outliers_were_told_still_reads() -> None:
     assert found.outliers == ()
     assert math.isnan(found.tension_after_n.q025)
     assert found.tension_after_n.q95 == BLUNDER.tension_after_n.q95
+
+
+@pytest.mark.parametrize(
+    ("path", "wrong", "said"),
+    [
+        (["where", 0, "plane"], "up", r"where\[0\]: plane = 'up' is not one of transverse"),
+        (
+            ["causes", 0, "parameters", "mass_kg", "sd"],
+            "x",
+            r"parameters\[0\]: sd = 'x' is not a num",
+        ),
+        (["places", 0, "profile"], [3], r"places\[0\]: profile\[0\] is not a list"),
+        (["tension_n", "before", "mean"], ..., "tension_before_n: mean is missing"),
+        (["hanger"], True, "hanger = True is not a whole number"),
+        (["shrinkage"], 5, "shrinkage is not an object"),
+    ],
+)
+def test_what_is_no_diagnosis_is_named_by_its_place(path: list[Any], wrong: Any, said: str) -> None:
+    document = json.loads(dump(diagnosis_document(LED)))
+    node: Any = document
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = wrong
+    if wrong is ...:
+        del node[path[-1]]
+    with pytest.raises(ValueError, match=said):
+        diagnosis_of(document)

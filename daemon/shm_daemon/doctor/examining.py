@@ -31,7 +31,8 @@ from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.settings import Settings
 from shm.store import Workspace
-from shm.store.rows import DeliveryState
+from shm.store.rows import Delivery, DeliveryState
+from shm.store.stored_silences import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
@@ -78,7 +79,13 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
-    late = [each for each in waiting if each.attempts or now - each.next_attempt_at > WAITS_LONG]
+    late = [
+        each
+        for each in waiting
+        if each.attempts
+        or (each.message_id and now - each.next_attempt_at > WAITS_LONG)
+        or (_is_unheld(examined, each) and now - each.stored.raised_at > WAITS_LONG)
+    ]
     if late:
         worst = max(late, key=lambda each: each.attempts)
         said = worst.last_error or "not tried yet: is a daemon active?"
@@ -100,6 +107,15 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
         )
     if not late and not lost:
         yield ok("deliveries", f"{len(waiting)} on their way" if waiting else "none owed")
+
+
+def _is_unheld(examined: Examined, delivery: Delivery) -> bool:
+    """Whether nothing that people asked for keeps a delivery: no silence, no escalation."""
+    hooks = {each.name: each for each in examined.workspace.bridge.hooks}
+    hook, silences = hooks.get(delivery.hook), examined.store.silences.list_all()
+    if delivery.message_id is not None or (hook and hook.escalation_after_seconds):
+        return False
+    return silenced_until(silences, delivery.alert.hanger, examined.now) is None
 
 
 def _ready(notifier: HookNotifier, hook: Hook) -> Finding:

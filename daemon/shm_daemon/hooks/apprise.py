@@ -19,6 +19,7 @@ from shm_daemon.hooks.contract import HookFailed, Surroundings, one_line
 
 _SENDER = Path(__file__).with_name("apprise_sender.py")
 _TITLE = "shm: hanger {0.hanger}"
+_GROUP_TITLE = "shm: {} hangers"
 _TEST_TITLE = "shm: test of a hook"
 
 
@@ -79,12 +80,13 @@ def _allowed(address: str) -> str:
 
 
 def _told(alert: Alert, addresses: Sequence[str]) -> bytes:
-    test = "test" in alert.kinds
+    test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
+    title = _GROUP_TITLE.format(len(alert.alerts)) if alert.alerts else _TITLE.format(alert)
     body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
     told = {
         "addresses": list(addresses),
-        "title": one_line(_TEST_TITLE if test else _TITLE.format(alert)),
+        "title": one_line(_TEST_TITLE if test else f"{title}{': resolved' if resolved else ''}"),
         "body": f"{alert.message if test else body}\nKey: {alert.key}",
-        "type": "info" if test else "warning",
+        "type": "info" if test else "success" if resolved else "warning",
     }
     return json.dumps(told).encode()

@@ -8,9 +8,11 @@ from fastapi import APIRouter, Path, Query
 
 from shm.pipeline import utc_now
 from shm.store import AlertRow
+from shm.store.stored_silences import silenced_until
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import answers
 from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, Acknowledge, Alerts, AlertState
+from shm_daemon.web.site import Site
 
 router = APIRouter(prefix="/api/alerts", tags=["alerts"])
 
@@ -44,10 +46,10 @@ def alerts(
     is_open = True if open else None
     if limit is None:
         found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
-        return {"alerts": [alert_document(each) for each in found], "next_before": None}
+        return {"alerts": [alert_document(each, site) for each in found], "next_before": None}
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
     return {
-        "alerts": [alert_document(each) for each in rows[:limit]],
+        "alerts": [alert_document(each, site) for each in rows[:limit]],
         "next_before": rows[limit - 1].id if len(rows) > limit else None,
     }
 
@@ -67,12 +69,15 @@ def acknowledge(
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
     site.store.alerts.acknowledge(alert_id, who, told.why, utc_now())
-    return alert_document(site.store.alerts.row(alert_id))
+    return alert_document(site.store.alerts.row(alert_id), site)
 
 
-def alert_document(alert: AlertRow) -> dict[str, Any]:
-    """An alert with what became of its deliveries."""
-    noted = alert.acknowledgement
+def alert_document(alert: AlertRow, site: Site) -> dict[str, Any]:
+    """An alert with what became of its deliveries, and what holds them back."""
+    noted, ended = alert.acknowledgement, alert.resolution
+    hooks = site.workspace.bridge.hooks
+    escalates = {each.name for each in hooks if each.escalation_after_seconds}
+    stands, silences = ended is None, site.store.silences.list_all()
     return {
         "id": alert.id,
         "hanger": alert.hanger,
@@ -84,5 +89,10 @@ def alert_document(alert: AlertRow) -> dict[str, Any]:
         "acknowledged": None
         if noted is None
         else {"who": noted.who, "why": noted.why, "at": noted.at},
-        "deliveries": [{**vars(each), "state": each.state.value} for each in alert.deliveries],
+        "resolved": ended and {"who": ended.who, "why": ended.why, "at": ended.at},
+        "silenced_until": silenced_until(silences, alert.hanger, utc_now()) if stands else None,
+        "deliveries": [
+            {**vars(each), "state": each.state.value, "escalation": each.hook in escalates}
+            for each in alert.deliveries
+        ],
     }

@@ -136,6 +136,8 @@ class DeliveryState(BaseModel):
     state: str
     attempts: int
     last_error: str = Field(description="Why the latest attempt failed; empty where none did.")
+    news: Literal["raised", "resolved"]
+    escalation: bool = Field(description="Told only of what nobody acknowledged in time.")
 
 
 class Acknowledged(BaseModel):
@@ -157,6 +159,12 @@ class AlertState(BaseModel):
     kinds: list[str] = Field(description="The rules that raised it.")
     message: str
     acknowledged: Acknowledged | None
+    resolved: Acknowledged | None = Field(
+        description="How its condition ended; null while it stands."
+    )
+    silenced_until: datetime | None = Field(
+        description="Hooks are told of this hanger again from then on; null where they are told."
+    )
     deliveries: list[DeliveryState]
 
 

@@ -6,17 +6,18 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 
-from shm.store import AlertRow, Store
+from shm.store import AlertRow
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import test_page
 from shm_daemon.web.alerts import alert_document
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
 
 _SHOWN = 50  # technical: alerts on a page, which links to older ones
-_MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert"}
+_MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert", "not needed": "steady"}
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
 
 
@@ -33,8 +34,8 @@ def alerts_page(
 
     `open_before` goes on among the open ones alone, `noted_before` among those acknowledged.
     """
-    opened, older_open = _some(site.store, hanger, open_before, is_open=True)
-    noted, older_noted = _some(site.store, hanger, noted_before, is_open=False)
+    opened, older_open = _some(site, hanger, open_before, is_open=True)
+    noted, older_noted = _some(site, hanger, noted_before, is_open=False)
     counts = site.store.alerts.open_counts()
     return page(
         request,
@@ -52,18 +53,20 @@ def alerts_page(
 
 
 def _some(
-    store: Store, hanger: int | None, before: int | None, *, is_open: bool
+    site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Alerts as the page shows them, and the number to go on after, if there are more."""
-    rows = store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown = rows[:_SHOWN]
-    return [_with_address(each) for each in shown], shown[-1].id if len(rows) > _SHOWN else None
+    return [_with_address(each, site) for each in shown], shown[-1].id if len(
+        rows
+    ) > _SHOWN else None
 
 
-def _with_address(alert: AlertRow) -> dict[str, Any]:
+def _with_address(alert: AlertRow, site: Site) -> dict[str, Any]:
     """An alert that only tries a hook is of no test."""
     is_trial = "test" in alert.kinds
     address = None if is_trial else test_page(alert.hanger, alert.test)
     if "held" in alert.kinds:  # what is held has no page of its own
         address = "/operation#held"
-    return {**alert_document(alert), "address": address}
+    return {**alert_document(alert, site), "address": address}

@@ -1,0 +1,153 @@
+"""`shm alerts silence`, `silences` and `unsilence`: when no hook is told, on the record."""
+
+from __future__ import annotations
+
+import getpass
+from datetime import datetime
+
+import rich_click as click
+
+from shm.errors import UsageError
+from shm.pipeline import utc_now
+from shm.store import Silence
+from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
+from shm_cli.held import Time
+from shm_cli.parameter_types import Words
+
+_WHO = click.option("--who", show_default="the user's name", help="For the record.")
+
+
+@click.command()
+@hanger_option()
+@click.option("--bridge", "whole", is_flag=True, help="All hangers.")
+@click.option("--from", "since", type=Time(), show_default="now", help="When it begins.")
+@click.option("--until", type=Time(), required=True, help="When it ends, as 2026-12-01.")
+@click.option("--maintenance", is_flag=True, help="Planned works: tests of then are not watched.")
+@click.option("--why", type=Words(), required=True, help="For the record.")
+@_WHO
+@json_option
+@click.pass_context
+def silence(
+    ctx: click.Context,
+    hanger_id: int | None,
+    whole: bool,
+    since: datetime | None,
+    until: datetime,
+    maintenance: bool,
+    why: str,
+    who: str | None,
+    as_json: bool,
+) -> None:
+    """Hold messages to hooks back until a time.
+
+    Alerts are raised and shown all the same; hooks are told of them at the end, unless they have
+    been acknowledged or resolved. Times without a zone are UTC. With --maintenance, tests made in
+    that time are taken in but not watched: record it before they come in.
+
+    \b
+    Example: shm alerts silence --hanger 7 --until 2026-12-01 --why "sensor is replaced"
+    Example: shm alerts silence --bridge --maintenance --until 2027-03-05 --why "new joints"
+    """
+    if whole == (hanger_id is not None):
+        raise UsageError("name one hanger, or all.", remedy="Give --hanger N or --bridge.")
+    now = utc_now()
+    with opened_store(ctx) as (workspace, store):
+        if hanger_id is not None:
+            workspace.bridge.hanger(hanger_id)
+        made = store.silences.make(
+            hanger_id,
+            (since or now, until),
+            who or getpass.getuser(),
+            why,
+            now,
+            is_maintenance=maintenance,
+        )
+    if as_json:
+        show(silence_row(made, now))
+        return
+    kind = "Maintenance window" if maintenance else "Silence"
+    click.echo(
+        f"{kind} {made.id}: hooks are told nothing of {_of(made)} from {_at(made.starts_at)} until "
+        f"{_at(made.until)} UTC. End it early: `shm alerts unsilence {made.id}`."
+    )
+
+
+@click.command()
+@json_option
+@click.pass_context
+def silences(ctx: click.Context, as_json: bool) -> None:
+    """Silences and maintenance windows, with who made them and why.
+
+    \b
+    Example: shm alerts silences --json
+    """
+    now = utc_now()
+    with opened_store(ctx) as (_, store):
+        found = store.silences.list_all()
+    if as_json:
+        show({"silences": [silence_row(each, now) for each in found]})
+        return
+    if not found:
+        click.echo("No silence was ever made.")
+        return
+    made = table("silences", "number", "of", "kind", "state", "from", "until", "by")
+    for each in found:
+        made.add_row(
+            str(each.id),
+            _of(each),
+            "maintenance" if each.is_maintenance else "silence",
+            state_of(each, now),
+            _at(each.starts_at),
+            _at(each.until),
+            f"{each.who}: {each.why}" + (f" (ended by {each.ended_who})" if each.ended_at else ""),
+        )
+    show_table(made)
+
+
+@click.command()
+@click.argument("silence_id", type=int, metavar="ID")
+@_WHO
+@json_option
+@click.pass_context
+def unsilence(ctx: click.Context, silence_id: int, who: str | None, as_json: bool) -> None:
+    """End a silence now, on the record.
+
+    \b
+    Example: shm alerts unsilence 3
+    """
+    now = utc_now()
+    with opened_store(ctx) as (_, store):
+        ended = store.silences.end(silence_id, who or getpass.getuser(), now)
+    if as_json:
+        show(silence_row(ended, now))
+        return
+    click.echo(f"Silence {silence_id} has ended: hooks are told of {_of(ended)} again.")
+
+
+def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
+    """What `--json` says of a silence."""
+    return {**vars(silence), "state": state_of(silence, now), "until": silence.until}
+
+
+def state_of(silence: Silence, now: datetime) -> str:
+    """`in force`, `to come` or `over`."""
+    if silence.until <= max(now, silence.starts_at):
+        return "over"
+    return "to come" if silence.starts_at > now else "in force"
+
+
+def said_of(silence: Silence) -> str:
+    """A silence in force, for the status."""
+    kind = "maintenance window" if silence.is_maintenance else "silence"
+    return (
+        f"{kind} {silence.id}: hooks are told nothing of {_of(silence)} until {_at(silence.until)} "
+        f"UTC ({silence.who}: {silence.why})"
+    )
+
+
+def _of(silence: Silence) -> str:
+    return "all hangers" if silence.hanger is None else f"hanger {silence.hanger}"
+
+
+def _at(time: datetime) -> str:
+    return f"{time:%Y-%m-%d %H:%M}"

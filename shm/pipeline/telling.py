@@ -1,0 +1,259 @@
+"""Which alerts go to which hook now, and what the message says: all decided from rows and a clock.
+
+Nothing is remembered between two looks, so that a kill at any instant changes nothing; what has
+been decided is kept by the store (`begin_messages`) before anything is sent.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+
+from shm.store import Delivery, News, Silence
+from shm.store.stored_silences import silenced_until
+from shm.values import TENSION, Alert, Drift
+
+_MOST_WINDOWS = 5
+"""Judgement: while alike alerts keep coming a message waits for 5 windows, by default the 5 minutes
+that Prometheus' Alertmanager leaves between two messages of a group (`group_interval`)."""
+_LATEST_ESCALATION_S = 40.0
+"""Judgement: an escalation is promised within 60 s; the rest is for the daemon's turn."""
+_LISTED = 60  # technical: hangers that a message names; the bridges we know have fewer
+
+
+@dataclass(frozen=True)
+class Terms:
+    """How hooks are told: the window in which alike alerts are gathered, and the hooks that are
+    told only of what nobody has acknowledged after so many seconds.
+
+    With `hurry` nothing is gathered any longer: who asks is about to end.
+    """
+
+    window_s: float = 0.0
+    escalation_s: Mapping[str, float] = field(default_factory=dict)
+    hurry: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Messages to begin, as the numbers of their deliveries; those that nobody needs, and why."""
+
+    messages: tuple[tuple[int, ...], ...] = ()
+    not_needed: Mapping[int, str] = field(default_factory=dict)
+
+
+def plan(
+    unsent: Sequence[Delivery], silences: tuple[Silence, ...], now: datetime, terms: Terms
+) -> Plan:
+    """What to do now with the deliveries whose first attempt has not begun."""
+    not_needed: dict[int, str] = {}
+    gathered: defaultdict[object, list[tuple[datetime, int]]] = defaultdict(list)
+    seen: Counter[object] = Counter()
+    for each in unsent:
+        if why := _no_need(each, silences, terms):
+            not_needed[each.id] = why
+            continue
+        ready_at = _ready_at(each, silences, now, terms)
+        if ready_at is None:
+            continue
+        alike = (each.hook, each.news, *_condition(each.alert)) if terms.window_s else (each.id,)
+        # One alert a hanger: a second one is news of its own.
+        seen[alike, each.alert.hanger] += 1
+        gathered[alike, seen[alike, each.alert.hanger]].append((ready_at, each.id))
+    escalated = {each.id for each in unsent if each.hook in terms.escalation_s}
+    messages = [
+        tuple(sorted(id_ for at, id_ in found if at <= now))
+        for found in gathered.values()
+        if _is_whole([at for at, _ in found], now, terms, is_late=found[0][1] in escalated)
+    ]
+    return Plan(tuple(sorted(filter(None, messages))), not_needed)
+
+
+def _no_need(delivery: Delivery, silences: tuple[Silence, ...], terms: Terms) -> str:
+    """Why a hook need not be told that something is raised; empty where it must be."""
+    stored = delivery.stored
+    if delivery.news is News.RESOLVED:
+        return ""
+    if stored.resolution is not None:
+        return "resolved before it was sent"
+    noted = stored.acknowledgement
+    if noted is None:
+        return ""
+    if delivery.hook in terms.escalation_s:
+        return f"acknowledged by {noted.who} in time"
+    if _held_back_until(delivery, silences, noted.at) is not None:
+        return f"acknowledged by {noted.who} while it was silenced"
+    return ""
+
+
+def _held_back_until(
+    delivery: Delivery, silences: tuple[Silence, ...], now: datetime
+) -> datetime | None:
+    """The end of the latest silence since an alert was raised; None where there was none."""
+    stored = delivery.stored
+    ends = [
+        each.until
+        for each in silences
+        if each.hanger in (None, stored.alert.hanger)
+        and each.starts_at <= now
+        and each.until > max(stored.raised_at, each.starts_at)
+    ]
+    return max(ends, default=None)
+
+
+def _ready_at(
+    delivery: Delivery, silences: tuple[Silence, ...], now: datetime, terms: Terms
+) -> datetime | None:
+    """From when on a hook may be told; None while it is silenced or the time has not come."""
+    stored, hanger = delivery.stored, delivery.alert.hanger
+    if silenced_until(silences, hanger, now) is not None:
+        return None
+    resolution = stored.resolution
+    since = stored.raised_at
+    if delivery.news is News.RESOLVED and resolution is not None:
+        since = max(since, resolution.at)
+    if since > now:  # the clock was ahead, and is set right: then it is told at once
+        return now - _MOST_WINDOWS * timedelta(seconds=terms.window_s)
+    ready_at = max(since, _held_back_until(delivery, silences, now) or since)
+    if delivery.news is News.RAISED and delivery.hook in terms.escalation_s:
+        ready_at += timedelta(seconds=terms.escalation_s[delivery.hook])
+    return ready_at if ready_at <= now else None
+
+
+def _is_whole(times: Sequence[datetime], now: datetime, terms: Terms, *, is_late: bool) -> bool:
+    """Whether alike alerts wait for no further one; those of an escalation wait for less."""
+    if terms.hurry or not terms.window_s:
+        return True
+    window = timedelta(seconds=terms.window_s)
+    latest = min(times) + _MOST_WINDOWS * window
+    if is_late:
+        latest = min(latest, min(times) + timedelta(seconds=_LATEST_ESCALATION_S))
+    return now >= min(max(times) + window, latest)
+
+
+def _condition(alert: Alert) -> tuple[object, ...]:
+    """What alerts that are alike have in common: rules, and the quantity that leads and its way."""
+    if not alert.drifts:
+        return (alert.kinds,)
+    lead = alert.drifts[0]
+    return (alert.kinds, lead.quantity == TENSION, lead.shift_mean < 0)
+
+
+# ---------------------------------------------------------------- what a message says
+
+
+def message_of(deliveries: Sequence[Delivery]) -> Alert:
+    """What a hook is told by the deliveries of one message, the first of them first.
+
+    Its key is that of the only alert, else of the first with the number of the others: the same at
+    each attempt, since a message keeps its deliveries.
+    """
+    told = tuple(_told(each) for each in deliveries)
+    if len(told) == 1:
+        return told[0]
+    first, suffix = told[0], ":resolved" if deliveries[0].news is News.RESOLVED else ""
+    key = f"{first.key.removesuffix(suffix)}:and-{len(told) - 1}-more{suffix}"
+    return replace(first, key=key, message=_of_several(deliveries), drifts=(), change=None,
+                   tension=None, alerts=told)  # fmt: skip
+
+
+def _told(delivery: Delivery) -> Alert:
+    alert, ended = delivery.alert, delivery.stored.resolution
+    if delivery.news is News.RAISED or ended is None:
+        return alert
+    return replace(
+        alert,
+        key=f"{alert.key}:resolved",
+        kinds=("resolved",),
+        message=f"Hanger {alert.hanger}: alert {delivery.stored.id} is resolved. No action is "
+        f"needed. {_by(ended.who, ended.why)} The alert said: {alert.message}",
+    )
+
+
+def _by(who: str, why: str) -> str:
+    why = why.rstrip(".")
+    return f"{why[:1].upper()}{why[1:]}." if who == "shm" else f"{who}: {why}."
+
+
+def _of_several(deliveries: Sequence[Delivery]) -> str:
+    """State, action, why; all hangers by their numbers, the largest shift with its hanger."""
+    alerts = sorted((each.alert for each in deliveries), key=lambda alert: alert.hanger)
+    named = ", ".join(str(alert.hanger) for alert in alerts[:_LISTED])
+    if len(alerts) > _LISTED:
+        named += f" and {len(alerts) - _LISTED} more"
+    if deliveries[0].news is News.RESOLVED:
+        reasons = Counter(_by(e.who, e.why) for d in deliveries if (e := d.stored.resolution))
+        why = reasons.most_common(1)[0][0]
+        return f"{len(alerts)} hangers: resolved: {named}. No action is needed. {why}"
+    leads = [alert.drifts[0] for alert in alerts if alert.drifts]
+    if not leads:
+        kinds = " and ".join(alerts[0].kinds) or "alert"
+        if "held" in alerts[0].kinds:
+            return (
+                f"{len(alerts)} hangers: tests are held until you decide: {named}. Decide on each "
+                f"today: `shm ingest --held`. One of them: {alerts[0].message}"
+            )
+        return f"{len(alerts)} hangers: {kinds}: {named}. {alerts[0].message}"
+    largest = max(leads, key=lambda drift: abs(drift.shift_mean))
+    name, way = _moved(largest)
+    return (
+        f"{len(alerts)} hangers: {name} {way}: {named}; largest {_amount(largest)} at hanger "
+        f"{largest.hanger}. Repeat the test of that hanger today, and ask what all have in "
+        f"common: load, temperature, works, a sensor. See `shm alerts` for each. "
+        f"{_message_of(alerts, largest.hanger)}"
+    )
+
+
+def _message_of(alerts: Sequence[Alert], hanger: int) -> str:
+    return next(alert.message for alert in alerts if alert.hanger == hanger)
+
+
+def _moved(lead: Drift) -> tuple[str, str]:
+    name = "tension" if lead.quantity == TENSION else "end stiffness"
+    return name, "fell" if lead.shift_mean < 0 else "rose"
+
+
+def _amount(lead: Drift) -> str:
+    if lead.quantity == TENSION:
+        return f"{100 * abs(lead.shift_mean):.1f} %"
+    return f"{10 ** abs(lead.shift_mean):.1f} times"
+
+
+# ---------------------------------------------------------------- after planned works
+
+
+def works_before(
+    alert: Alert, windows: Sequence[Silence], earlier: Sequence[Alert]
+) -> Silence | None:
+    """The maintenance window that an alert is the first to come after; None where there is none.
+
+    Not where the change is known to have begun later, or another alert came in between.
+    """
+    ended = [
+        each
+        for each in windows
+        if each.is_maintenance
+        and each.until > each.starts_at
+        and each.hanger in (None, alert.hanger)
+        and each.until <= alert.time
+    ]
+    if not ended:
+        return None
+    latest = max(ended, key=lambda each: each.until)
+    if alert.change is not None and alert.change.began_after >= latest.until:
+        return None
+    if any(each.time >= latest.until and each.key != alert.key for each in earlier):
+        return None
+    return latest
+
+
+def after_works(alert: Alert, works: Silence) -> Alert:
+    """The same alert, which says that works lie in between and how to accept what they changed."""
+    said = (
+        f"Planned works lie in between ({works.why.rstrip('.')}), until {works.until:%Y-%m-%d}. If "
+        f"they explain it, accept the new state: `shm drift rebaseline --hanger {alert.hanger} "
+        f"--since {works.until:%Y-%m-%d}`."
+    )
+    return replace(alert, message=f"{alert.message} {said}")

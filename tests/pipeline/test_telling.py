@@ -1,0 +1,392 @@
+"""Which hook is told what and when: silences, groups, escalation, resolutions; a clock that stands
+where it is put, and a store that is opened anew as after a kill.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.bridge import Hook
+from shm.errors import NothingThere, UsageError
+from shm.pipeline import Flow
+from shm.pipeline.telling import after_works, works_before
+from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
+from shm.store.stored_silences import silenced_until
+from shm.values import Alert, Selection
+from tests.helpers.flows import Clock, a_flow
+from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, a_watched_test
+from tests.helpers.workspaces import make_workspace
+
+LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+HANGERS = tuple(range(1, 51))
+HOUR = 3600.0
+
+
+class Inbox:
+    """A hook's other end; fails as often as it is told to."""
+
+    def __init__(self) -> None:
+        self.had: list[tuple[str, Alert]] = []
+        self.failures = 0
+
+    def __call__(self, hook: Hook, alert: Alert) -> None:
+        self.had.append((hook.name, alert))
+        if self.failures:
+            self.failures -= 1
+            raise RuntimeError("no answer")
+
+    def of(self, hook: str) -> list[Alert]:
+        return [alert for name, alert in self.had if name == hook]
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock(NOW)
+
+
+@pytest.fixture
+def inbox() -> Inbox:
+    return Inbox()
+
+
+@pytest.fixture
+def bridge(tmp_path: Path) -> Workspace:
+    """Fifty hangers alike, a hook `mail`, and a hook `boss` that hears after an hour."""
+    settings = {"alert_grouping_seconds": 60.0, "hook_backoff_seconds": 5.0}
+    hooks = {"mail": ["true"], "boss": ["true"]}
+    made = make_workspace(tmp_path / "bridge", hangers=HANGERS, settings=settings, hooks=hooks)
+    described = Path(made.bridge.source)
+    text = described.read_text().replace(
+        'name = "boss"', 'name = "boss"\nescalation_after_seconds = 3600'
+    )
+    described.write_text(text)
+    return made.reopened()
+
+
+def raise_on(
+    workspace: Workspace, clock: Clock, hangers: Sequence[int], shift: float = -0.08, day: int = 1
+) -> None:
+    """An alert on each hanger, as the watch raises it; their first tests make the baselines."""
+    hooks = [hook.name for hook in workspace.bridge.hooks]
+    with workspace.store() as store:
+        for hanger in hangers:
+            baseline = store.watch.baseline(hanger)
+            if baseline is None:
+                (first,) = _entered(store, hanger, 0, clock())
+                found = replace(a_posterior(tests=(first.test.id,)), hanger=hanger)
+                store.posteriors.save_selection(
+                    hanger, [first], Selection((found,), (1.0,)), LINEAGE, clock()
+                )
+                baseline = store.watch.baseline(hanger)
+            assert baseline is not None
+            (test,) = _entered(store, hanger, day, clock())
+            name = test.test.id
+            posterior = replace(a_posterior(tests=(name,)), hanger=hanger)
+            store.posteriors.save(test, posterior, LINEAGE, clock())
+            drift = replace(a_drift(name), hanger=hanger, shift_mean=shift - hanger / 1e4)
+            message = f"Hanger {hanger}: tension fell."
+            key = f"hanger-{hanger}:{name}"
+            kinds = ("beyond threshold",)
+            alert = Alert(key, hanger, name, test.time, message, (drift,), kinds)
+            assert store.watch.save(
+                test, baseline, a_watched_test(name), alert, hooks, clock()
+            ) is not None  # fmt: skip
+
+
+def _entered(store: Store, hanger: int, day: int, at: datetime) -> list[StoredTest]:
+    name = f"h{hanger}-{day}"
+    received = store.recordings.receive(a_file(100 * hanger + day), at).recording
+    store.tests.save(
+        received.id, [IdentifiedTest(a_test(name, days=day, hanger=hanger))], LINEAGE, at
+    )
+    return [test for test in store.tests.list_all(hanger) if test.test.id == name]
+
+
+def look(workspace: Workspace, clock: Clock, inbox: Inbox) -> None:
+    """One life of a daemon that looks once and is begun anew the next time."""
+    with a_flow(workspace, clock=clock, notifier=inbox) as flow:
+        _work(flow)
+
+
+def _work(flow: Flow) -> None:
+    while flow.advance():
+        for running in flow._running.values():
+            running.future.exception(10)
+
+
+def live(workspace: Workspace, clock: Clock, inbox: Inbox, seconds: float, step: float) -> None:
+    end = clock() + timedelta(seconds=seconds)
+    while clock() < end:
+        clock.pass_by(step)
+        look(workspace, clock, inbox)
+
+
+def states(workspace: Workspace, hook: str) -> set[str]:
+    with workspace.store() as store:
+        found = store.alerts.list_deliveries()
+        return {each.state.value for each in found if each.hook == hook}
+
+
+# ---------------------------------------------------------------- groups
+
+
+def test_fifty_hangers_that_move_alike_are_one_message_that_lists_all(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    for hanger in HANGERS:
+        raise_on(bridge, clock, [hanger])
+        clock.pass_by(2.0)
+    live(bridge, clock, inbox, 300.0, 20.0)
+    (told,) = inbox.of("mail")
+    assert [each.hanger for each in told.alerts] == list(HANGERS)
+    assert len({each.key for each in told.alerts}) == 50
+    assert told.message.startswith("50 hangers: tension fell: 1, 2, 3,")
+    assert "largest 8.5 % at hanger 50" in told.message
+    assert states(bridge, "mail") == {"delivered"}
+
+
+def test_a_single_alert_goes_as_it_is_once_no_other_came(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, 50.0, 10.0)
+    assert inbox.had == []
+    live(bridge, clock, inbox, 20.0, 10.0)
+    (told,) = inbox.of("mail")
+    assert (told.key, told.message, told.alerts) == ("hanger-7:h7-1", "Hanger 7: tension fell.", ())
+
+
+def test_what_moves_the_other_way_and_a_second_alert_of_a_hanger_are_other_messages(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [1, 2])
+    raise_on(bridge, clock, [3, 4], shift=0.08)
+    raise_on(bridge, clock, [1], day=2)
+    live(bridge, clock, inbox, 90.0, 30.0)
+    told = sorted(sorted(one.hanger for one in each.alerts) for each in inbox.of("mail"))
+    assert told == [[], [1, 2], [3, 4]]
+
+
+def test_alike_alerts_that_keep_coming_wait_for_five_windows_at_most(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    for hanger in HANGERS[:12]:
+        raise_on(bridge, clock, [hanger])
+        clock.pass_by(30.0)
+        look(bridge, clock, inbox)
+    assert len(inbox.of("mail")[0].alerts) >= 10
+
+
+def test_a_message_keeps_its_alerts_and_key_through_failures_and_lives(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [1, 2, 3])
+    inbox.failures = 2
+    clock.pass_by(61.0)
+    look(bridge, clock, inbox)
+    raise_on(bridge, clock, [4])
+    live(bridge, clock, inbox, 40.0, 10.0)
+    keys = {each.key for each in inbox.of("mail")}
+    assert keys == {"hanger-1:h1-1:and-2-more"}
+    assert len(inbox.of("mail")) == 3
+    assert states(bridge, "mail") == {"delivered", "waiting"}
+
+
+# ---------------------------------------------------------------- escalation
+
+
+def test_what_nobody_acknowledged_is_escalated_once_within_a_minute_of_its_time(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, HOUR - 10.0, 10.0)
+    assert inbox.of("boss") == []
+    live(bridge, clock, inbox, 70.0, 10.0)
+    assert [each.key for each in inbox.of("boss")] == ["hanger-7:h7-1"]
+    live(bridge, clock, inbox, 2 * HOUR, 60.0)
+    assert len(inbox.of("boss")) == len(inbox.of("mail")) == 1
+
+
+def test_what_was_acknowledged_in_time_is_never_escalated(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, 600.0, 60.0)
+    with bridge.store() as store:
+        store.alerts.acknowledge(1, "Ann", "on my way", clock())
+    live(bridge, clock, inbox, 2 * HOUR, 120.0)
+    assert inbox.of("boss") == []
+    assert states(bridge, "boss") == {"not needed"}
+
+
+def test_escalation_counts_from_the_end_of_a_silence(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    _silence(bridge, clock, 7, 0.0, 2 * HOUR)
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, 3 * HOUR - 60.0, 60.0)
+    assert len(inbox.of("mail")) == 1
+    assert inbox.of("boss") == []
+    live(bridge, clock, inbox, 120.0, 30.0)
+    assert len(inbox.of("boss")) == 1
+
+
+# ---------------------------------------------------------------- silences
+
+
+def _silence(
+    workspace: Workspace, clock: Clock, hanger: int | None, begins: float, ends: float,
+    *, works: bool = False,
+) -> Silence:  # fmt: skip
+    at = clock()
+    period = (at + timedelta(seconds=begins), at + timedelta(seconds=ends))
+    with workspace.store() as store:
+        return store.silences.make(hanger, period, "Ann", "new pin", at, is_maintenance=works)
+
+
+@pytest.mark.parametrize("hanger", [7, None])
+def test_a_silence_made_ahead_holds_the_message_back_until_its_end(
+    bridge: Workspace, clock: Clock, inbox: Inbox, hanger: int | None
+) -> None:
+    _silence(bridge, clock, hanger, 100.0, 1000.0)
+    clock.pass_by(200.0)
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, 780.0, 60.0)
+    assert inbox.had == []
+    live(bridge, clock, inbox, 120.0, 30.0)
+    assert [each.hanger for each in inbox.of("mail")] == [7]
+
+
+def test_a_silence_of_one_hanger_leaves_the_others_alone(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    _silence(bridge, clock, 7, 0.0, 1000.0)
+    raise_on(bridge, clock, [7, 8])
+    live(bridge, clock, inbox, 90.0, 30.0)
+    assert [each.hanger for each in inbox.of("mail")] == [8]
+
+
+def test_what_is_acknowledged_or_resolved_in_a_silence_is_told_to_nobody(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    _silence(bridge, clock, None, 0.0, 1000.0)
+    raise_on(bridge, clock, [7, 8])
+    clock.pass_by(100.0)
+    with bridge.store() as store:
+        store.alerts.acknowledge(1, "Ann", "seen", clock())
+        store.alerts.resolve(2, "Ann", "pin replaced", clock())
+    live(bridge, clock, inbox, 2 * HOUR, 300.0)
+    assert inbox.had == []
+    assert states(bridge, "mail") == states(bridge, "boss") == {"not needed"}
+
+
+def test_a_silence_that_is_ended_early_lets_its_messages_go(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    made = _silence(bridge, clock, 7, 0.0, 9 * HOUR)
+    raise_on(bridge, clock, [7])
+    clock.pass_by(300.0)
+    with bridge.store() as store:
+        ended = store.silences.end(made.id, "Bob", clock())
+        assert (ended.until, ended.ended_who, ended.who) == (clock(), "Bob", "Ann")
+        assert store.silences.list_all() == (ended,)
+        with pytest.raises(UsageError, match="is over"):
+            store.silences.end(made.id, "Bob", clock())
+        with pytest.raises(NothingThere):
+            store.silences.end(99, "Bob", clock())
+    live(bridge, clock, inbox, 90.0, 30.0)
+    assert len(inbox.of("mail")) == 1
+
+
+def test_silences_one_after_the_other_are_one(bridge: Workspace, clock: Clock) -> None:
+    _silence(bridge, clock, 7, 0.0, 100.0)
+    _silence(bridge, clock, None, 50.0, 300.0)
+    with bridge.store() as store:
+        found = store.silences.list_all()
+    assert silenced_until(found, 7, clock()) == clock() + timedelta(seconds=300)
+    assert silenced_until(found, 8, clock()) is None
+
+
+def test_a_silence_needs_an_end_that_is_yet_to_come(bridge: Workspace, clock: Clock) -> None:
+    for begins, ends in ((0.0, 0.0), (50.0, 40.0), (-50.0, -40.0)):
+        with pytest.raises(UsageError, match="must end"):
+            _silence(bridge, clock, 7, begins, ends)
+
+
+# ---------------------------------------------------------------- resolutions
+
+
+def test_who_was_told_of_an_alert_is_told_once_that_it_is_resolved(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [7])
+    live(bridge, clock, inbox, 90.0, 30.0)
+    with bridge.store() as store:
+        found = store.alerts.resolve(1, "Ann", "pin replaced", clock())
+        assert found.acknowledgement is not None
+        with pytest.raises(UsageError, match="resolved already"):
+            store.alerts.resolve(1, "Ann", "again", clock())
+    live(bridge, clock, inbox, 2 * HOUR, 120.0)
+    raised, resolved = inbox.of("mail")
+    assert (resolved.key, resolved.kinds) == (f"{raised.key}:resolved", ("resolved",))
+    assert resolved.message.startswith("Hanger 7: alert 1 is resolved. No action is needed.")
+    assert inbox.of("boss") == []
+
+
+def test_a_hook_that_had_the_alert_late_hears_of_its_end_all_the_same(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    raise_on(bridge, clock, [7])
+    inbox.failures = 1
+    clock.pass_by(61.0)
+    look(bridge, clock, inbox)
+    with bridge.store() as store:
+        store.alerts.resolve(1, "Ann", "pin replaced", clock())
+    live(bridge, clock, inbox, 180.0, 20.0)
+    keys = [each.key for each in inbox.of("mail")]
+    assert keys == ["hanger-7:h7-1", "hanger-7:h7-1", "hanger-7:h7-1:resolved"]
+
+
+def test_fifty_resolutions_are_one_message(bridge: Workspace, clock: Clock, inbox: Inbox) -> None:
+    raise_on(bridge, clock, HANGERS)
+    live(bridge, clock, inbox, 90.0, 30.0)
+    with bridge.store() as store:
+        for alert in store.alerts.list_all():
+            store.alerts.resolve(alert.id, "Ann", "the scaffold is gone", clock())
+    live(bridge, clock, inbox, 90.0, 30.0)
+    raised, resolved = inbox.of("mail")
+    assert resolved.key == f"{raised.key}:resolved"
+    assert {each.kinds for each in resolved.alerts} == {("resolved",)}
+
+
+# ---------------------------------------------------------------- planned works
+
+
+def test_the_first_alert_after_works_says_so_and_how_to_accept(clock: Clock) -> None:
+    period = clock() - timedelta(days=3), clock() - timedelta(days=1)
+    works = Silence(1, None, *period, True, "Ann", "new pins", clock())
+    alert = Alert("k", 7, "t", clock(), "Hanger 7: tension fell.", (a_drift("t"),))
+    assert works_before(alert, [works], []) == works
+    told = after_works(alert, works).message
+    assert told.startswith("Hanger 7: tension fell. Planned works lie in between (new pins)")
+    assert f"shm drift rebaseline --hanger 7 --since {period[1]:%Y-%m-%d}" in told
+    assert works_before(alert, [replace(works, is_maintenance=False)], []) is None
+    assert works_before(alert, [works], [replace(alert, key="another")]) is None
+    before = [replace(alert, key="another", time=period[0])]
+    assert works_before(alert, [works], before) == works
+
+
+def test_a_clock_that_was_ahead_delays_no_message(
+    bridge: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    clock.pass_by(50 * HOUR)
+    raise_on(bridge, clock, [7])
+    clock.pass_by(-50 * HOUR)
+    look(bridge, clock, inbox)
+    live(bridge, clock, inbox, 120.0, 30.0)
+    assert len(inbox.of("mail")) == 1
