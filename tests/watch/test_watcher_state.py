@@ -28,7 +28,7 @@ WATCHER = watcher(PLANES_ALONE, OPTIONS)
 
 def readings(tests: int = 12) -> list[Reading]:
     """With a change that is called on the way, and tests without a temperature."""
-    step = [-0.04, -SPRING_STEP, 0.0]
+    step = [-0.08, -SPRING_STEP, 0.0]
     history = History(PLANES_ALONE, tests, change_at=7, step=step, temperatures_missing=0.3)
     return [
         each if np.isfinite(each.temperature_c) else softened(each) for each in history.readings(3)
