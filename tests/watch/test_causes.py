@@ -69,7 +69,9 @@ def test_a_hundredth_of_the_mass_at_a_place_lowers_each_mode_as_by_rayleigh(
     row: int, place: float
 ) -> None:
     def laden(units: float):  # type: ignore[no-untyped-def]
-        mass = PointMass(place * HANGER_3.length_m * np.ones(1), units * 0.01 * MASS_KG * np.ones(1))
+        mass = PointMass(
+            place * HANGER_3.length_m * np.ones(1), units * 0.01 * MASS_KG * np.ones(1)
+        )
         return replace(bar(), masses=(*bar().masses, mass))
 
     found = columns().by_cause[POINT_MASS][row]
