@@ -399,7 +399,7 @@ def test_modes_that_a_test_lacks_and_an_unknown_amplitude_are_no_change() -> Non
     rng = np.random.default_rng(6)
     history = History(PLANES_ALONE, tests=18, change_at=13, step=lost(0.06, q=3), outliers=0)
     readings = [
-        without_modes(each, rng.choice(len(MODES), rng.integers(0, 7), replace=False))
+        without_modes(each, rng.choice(len(MODES), rng.integers(0, 7), replace=False).tolist())
         for each in history.readings(4)
     ]
     loud = [
