@@ -119,7 +119,7 @@ def test_an_outlier_of_any_size_calls_no_change_and_hardly_moves_the_drift(size:
     for index in (9, 13):
         drift = found.tests[index].drifts[0]
         assert drift.probability < 0.5
-        assert abs(drift.shift_mean) < min(2 * drift.shift_sd, 0.005)
+        assert abs(drift.shift_mean) < min(2 * drift.shift_sd, 0.01)
 
 
 def test_an_outlier_along_one_spring_of_many_calls_no_change() -> None:
@@ -222,8 +222,17 @@ def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_togethe
     other = by_name[pair[first.quantity]]
     assert other.probability == pytest.approx(first.probability, abs=0.05)
     # Which end it is no test tells here.
-    assert {*first.together, *first.alike} == set(by_name) - {"tension", first.quantity}
+    springs = {each.name for each in BOTH_ENDS} - {"tension"}
+    assert springs - {first.quantity} <= {*first.together, *first.alike}
     assert by_name["tension"].probability < 0.05
+
+
+def test_nothing_is_said_to_move_together_with_itself() -> None:
+    step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
+    history = History(BOTH_ENDS, CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0, step=step)
+
+    for each in watch(history).calls[0].change.moved:
+        assert each.quantity not in {*each.together, *each.alike}
 
 
 def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_at_once() -> None:
@@ -381,18 +390,21 @@ def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
 
 
 def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:
-    def clock(by: float) -> History:
-        return History(
-            tests=CHANGE_AT + 5, change_at=CHANGE_AT, outliers=0, scatter=5e-4, mode_step=[by]
-        )
+    steady = WatchOptions(tension_scatter=3e-4, bending_scatter=3e-4, mode_scatter=2e-4)
 
-    off, trifle = watch(clock(0.008)), watch(clock(0.0035))
+    def clock(by: float) -> Watch:
+        history = History(
+            tests=CHANGE_AT + 5, change_at=CHANGE_AT, outliers=0, scatter=2e-4, mode_step=[by]
+        )
+        return watch_of(history.readings(0), TENSION_ALONE, steady)
+
+    off, trifle = clock(0.008), clock(0.003)
 
     assert off.calls[0].change.moved[0].quantity == TIMEBASE
     assert not trifle.calls
-    assert max(test.change.material_probability for test in trifle.tests) < 0.5
-    # It is no want of evidence: only what it does is less than what is to be told.
-    assert trifle.tests[-1].change.evidence_years > WatchOptions().limit_years
+    # It is no want of evidence: what it does is less than what is to be told.
+    assert trifle.tests[-1].change.evidence_years > steady.limit_years
+    assert trifle.tests[-1].change.material_probability < 0.5
 
 
 def test_modes_that_a_test_lacks_and_an_unknown_amplitude_are_no_change() -> None:
