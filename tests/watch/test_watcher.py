@@ -391,19 +391,20 @@ def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
 
 def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:
     steady = WatchOptions(tension_scatter=3e-4, bending_scatter=3e-4, mode_scatter=2e-4)
+    impatient = replace(steady, limit_years=2.0)
+    history = History(
+        tests=18, change_at=CHANGE_AT, outliers=0, scatter=2e-4, seasons_k=0, days_k=1
+    )
 
-    def clock(by: float) -> Watch:
-        history = History(
-            tests=CHANGE_AT + 5, change_at=CHANGE_AT, outliers=0, scatter=2e-4, mode_step=[by]
-        )
-        return watch_of(history.readings(0), TENSION_ALONE, steady)
+    def clock(by: float, options: WatchOptions) -> Watch:
+        return watch_of(replace(history, mode_step=[by]).readings(0), TENSION_ALONE, options)
 
-    off, trifle = clock(0.008), clock(0.003)
+    off, trifle = clock(0.008, steady), clock(0.003, impatient)
 
     assert off.calls[0].change.moved[0].quantity == TIMEBASE
     assert not trifle.calls
     # It is no want of evidence: what it does is less than what is to be told.
-    assert trifle.tests[-1].change.evidence_years > steady.limit_years
+    assert trifle.tests[-1].change.evidence_years > impatient.limit_years
     assert trifle.tests[-1].change.material_probability < 0.5
 
 
