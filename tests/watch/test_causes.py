@@ -113,7 +113,7 @@ def test_a_clock_moves_all_modes_alike_and_sensors_lower_them() -> None:
 @pytest.mark.parametrize("quantities", [TENSION_ALONE, PLANES_ALONE, BOTH_ENDS])
 def test_the_prior_of_all_causes_together_is_one(quantities: tuple) -> None:  # type: ignore[type-arg]
     structure = structure_of(quantities, columns(), WatchOptions())
-    chances = {}
+    chances: dict[str, float] = {}
     for each in structure.directions:
         chances[each.name] = chances.get(each.name, 0.0) + np.exp(each.log_prior)
 
