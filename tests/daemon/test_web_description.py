@@ -20,7 +20,12 @@ from tests.store.make_released_database import fill
 FAULTS = {
     "syntax": ("length_m = 12.0", "length_m = = 12.0", 7, "not a readable TOML file"),
     "unknown key": ("length_m = 12.0", "lenght_m = 12.0", 7, "unknown key lenght_m"),
-    "no number": ("length_m = 12.0", 'length_m = "12 m"', 7, "length_m = '12 m' is not a positive number"),
+    "no number": (
+        "length_m = 12.0",
+        'length_m = "12 m"',
+        7,
+        "length_m = '12 m' is not a positive number",
+    ),
     "missing key": ("length_m = 12.0\n", "", 4, "length_m is missing"),
     "unknown setting": ("samples = 100", "sampels = 100", None, "unknown setting 'sampels'"),
 }
