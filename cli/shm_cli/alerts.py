@@ -71,10 +71,7 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
     `resolved` while its condition stands.
     """
     noted, ended = stored.acknowledgement, stored.resolution
-    return {
-        "acknowledged": noted and {"who": noted.who, "why": noted.why, "at": noted.at},
-        "resolved": ended and {"who": ended.who, "why": ended.why, "at": ended.at},
-    }
+    return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}
 
 
 def acknowledgement_words(stored: StoredAlert) -> str:
@@ -179,7 +176,7 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         alerts = store.alerts.list_all(hanger_id)
         deliveries = store.alerts.list_deliveries()
         made = store.silences.list_all()
-    escalates = {each.name for each in workspace.bridge.hooks if each.escalation_after_seconds}
+    escalates = workspace.bridge.escalation_s
     now = utc_now()
     rows = [
         {

@@ -131,7 +131,7 @@ def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
 
 def state_of(silence: Silence, now: datetime) -> str:
     """`in force`, `to come` or `over`."""
-    if silence.until <= max(now, silence.starts_at):
+    if silence.is_over(now):
         return "over"
     return "to come" if silence.starts_at > now else "in force"
 

@@ -38,6 +38,15 @@ class Bridge:
     disturbances: tuple[Disturbance, ...] = ()
     built: date | None = None
 
+    @property
+    def escalation_s(self) -> dict[str, float]:
+        """The hooks that are told only of what nobody has acknowledged after so many seconds."""
+        return {
+            hook.name: hook.escalation_after_seconds
+            for hook in self.hooks
+            if hook.escalation_after_seconds is not None
+        }
+
     def hanger(self, hanger_id: int) -> Hanger:
         """The hanger of that number; raises BadInput when the bridge has none such."""
         for hanger in self.hangers:

@@ -9,8 +9,7 @@ import math
 
 from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
 
-_HALF = 0.5
-"""Judgement: below half the probability that an alert asks for, as the watch itself has it."""
+_HALF = 0.5  # judgement: of a shift below the threshold, so much must be left of it
 
 
 def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: bool) -> str:
@@ -27,7 +26,7 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
     if "gap" not in alert.kinds and not alert.drifts:
         return ""
     now = {drift.quantity: drift for drift in test.drifts}
-    level = _HALF * hanger.thresholds.alert_probability
+    level = hanger.thresholds.end_probability
     for told in alert.drifts:
         later = now.get(told.quantity)
         if later is None or not _left(told, later) < level:

@@ -13,8 +13,7 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
-from shm.pipeline.ending import gap_stands as watch_gap_stands
-from shm.pipeline.ending import why_over
+from shm.pipeline.ending import gap_stands, why_over
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
@@ -33,6 +32,7 @@ from shm.store import (
     WaitingTest,
     Workspace,
 )
+from shm.store.archive import nothing
 from shm.values import Alert, Hanger, Posterior, Selection, WatchedTest
 from shm.values.stated_tension import averaged_now
 
@@ -117,13 +117,8 @@ class Jobs:
         unsent = self.store.alerts.list_unsent()
         if not unsent:
             return
-        hooks = self.workspace.bridge.hooks
-        escalation_s = {
-            hook.name: hook.escalation_after_seconds
-            for hook in hooks
-            if hook.escalation_after_seconds is not None
-        }
-        terms = Terms(self.workspace.settings.alert_grouping_seconds, escalation_s, hurry)
+        window_s = self.workspace.settings.alert_grouping_seconds
+        terms = Terms(window_s, self.workspace.bridge.escalation_s, hurry)
         now = self.clock()
         made = plan(unsent, self.store.silences.list_all(), now, terms)
         self.store.alerts.begin_messages(made.messages, made.not_needed, now)
@@ -265,7 +260,7 @@ class Jobs:
         test = self.store.tests.get(waiting.id)
         silences = self.store.silences.list_all()
         if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
-            return Step(partial(int), lambda _: self.store.watch.pass_over(test, self.clock()))
+            return Step(nothing, lambda _: self.store.watch.pass_over(test, self.clock()))
         current = self.store.posteriors.of_test(test)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
         baseline = self.store.watch.baseline(hanger.id, current.model, test.time)
@@ -282,7 +277,8 @@ class Jobs:
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
         standing = self.store.alerts.list_standing(hanger.id, baseline.id)
-        gap_stands = watch_gap_stands(baseline.posterior, current)
+        is_of_gap = any("gap" in each.alert.kinds for each in standing)
+        stands = is_of_gap and gap_stands(baseline.posterior, current)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -297,7 +293,7 @@ class Jobs:
             ended = {
                 each.id: why
                 for each in standing
-                if (why := why_over(each.alert, watched, hanger, gap_stands=gap_stands))
+                if (why := why_over(each.alert, watched, hanger, gap_stands=stands))
             }
             now = self.clock()
             return self.store.watch.save(test, baseline, watched, alert, hooks, now, state, ended)

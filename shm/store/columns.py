@@ -100,6 +100,16 @@ def lineage() -> tuple[sa.Column[str], ...]:
     )
 
 
+def note_on_alert() -> tuple[sa.Column[Any], ...]:
+    """What is noted on an alert once: when, by whom and why."""
+    return (
+        sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
+        sa.Column("at", UtcTime, nullable=False),
+        sa.Column("who", sa.Text, nullable=False),
+        sa.Column("why", sa.Text, nullable=False),
+    )
+
+
 def model() -> sa.Column[str]:
     """The name of a model class."""
     # An adopted class is named after its effects, where they act and their ranges.

@@ -260,23 +260,26 @@ class KeptWatch:
 
 
 @dataclass(frozen=True)
-class Acknowledgement:
+class Note:
+    """What somebody notes on an alert, once."""
+
+    alert_id: int
+    who: str
+    why: str
+    at: datetime
+
+    @property
+    def said(self) -> dict[str, object]:
+        """Who, why and when, as documents tell it."""
+        return {"who": self.who, "why": self.why, "at": self.at}
+
+
+class Acknowledgement(Note):
     """Who has taken note of an alert, when, and what they say to it."""
 
-    alert_id: int
-    who: str
-    why: str
-    at: datetime
 
-
-@dataclass(frozen=True)
-class Resolution:
+class Resolution(Note):
     """When the condition that an alert tells of ended, who found that (`shm` or a person), why."""
-
-    alert_id: int
-    who: str
-    why: str
-    at: datetime
 
 
 @dataclass(frozen=True)
@@ -316,6 +319,10 @@ class Silence:
     def until(self) -> datetime:
         """When it ends, or ended."""
         return self.ends_at if self.ended_at is None else min(self.ended_at, self.ends_at)
+
+    def is_over(self, at: datetime) -> bool:
+        """Whether it is not in force and will not be: one may end before it begins."""
+        return self.until <= max(at, self.starts_at)
 
     def covers(self, hanger: int, at: datetime) -> bool:
         """Whether it is in force for a hanger at a time; its end is not part of it."""

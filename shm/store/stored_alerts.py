@@ -115,8 +115,8 @@ class Alerts(Repository):
 
         Raises NothingThere where there is none of that number, UsageError where it is noted.
         """
-        found = self._alert(alert_id)
         with self.writing() as connection:
+            found = _alert(connection, alert_id)
             if not resolve(connection, alert_id, who, why, at):
                 raise UsageError(
                     f"alert {alert_id} is resolved already.", remedy="See `shm alerts`."
@@ -124,15 +124,7 @@ class Alerts(Repository):
             if found.acknowledgement is None:
                 noted = Acknowledgement(alert_id, who, why, at)
                 insert(connection, acknowledgements, vars(noted))
-        return self._alert(alert_id)
-
-    def _alert(self, alert_id: int) -> StoredAlert:
-        with self.reading() as connection:
-            by_id = stored_alerts.where(alerts.c.id == alert_id)
-            row = connection.execute(by_id).one_or_none()
-            if row is None:
-                raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
-            return stored_alert(row)
+            return _alert(connection, alert_id)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that somebody has seen an alert to its end; the alert with that note.
@@ -140,11 +132,7 @@ class Alerts(Repository):
         Raises NothingThere where there is none of that number, UsageError where it is noted.
         """
         with self.writing() as connection:
-            by_id = stored_alerts.where(alerts.c.id == alert_id)
-            row = connection.execute(by_id).one_or_none()
-            if row is None:
-                raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
-            alert = stored_alert(row)
+            alert = _alert(connection, alert_id)
             if alert.acknowledgement is not None:
                 raise UsageError(
                     f"alert {alert_id} was acknowledged by {alert.acknowledgement.who} on "
@@ -297,6 +285,14 @@ def _place(alert_id: int, is_open: bool | None) -> Any:
         return alert_id
     noted = sa.select(acknowledgements.c.id).where(acknowledgements.c.alert_id == alert_id)
     return noted.scalar_subquery()
+
+
+def _alert(connection: Connection, alert_id: int) -> StoredAlert:
+    """The alert of a number; raises NothingThere."""
+    row = connection.execute(stored_alerts.where(alerts.c.id == alert_id)).one_or_none()
+    if row is None:
+        raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
+    return stored_alert(row)
 
 
 def _deliveries_of(

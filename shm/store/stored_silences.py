@@ -69,7 +69,7 @@ class Silences(Repository):
 
     def list_current(self, at: datetime) -> tuple[Silence, ...]:
         """Those in force at a time or yet to come."""
-        return tuple(each for each in self.list_all() if each.until > max(at, each.starts_at))
+        return tuple(each for each in self.list_all() if not each.is_over(at))
 
     @staticmethod
     def _one(

@@ -6,15 +6,20 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from shm.store.columns import Document, Number, UtcTime
-from shm.store.columns import identity as _id
-from shm.store.columns import index_in_force as _in_force
-from shm.store.columns import lineage as _lineage
+from shm.store.columns import (
+    Document,
+    Number,
+    UtcTime,
+    identity,
+    index_in_force,
+    lineage,
+    model,
+    note_on_alert,
+    reference,
+    superseded_at,
+    unique_where,
+)
 from shm.store.columns import metadata as metadata
-from shm.store.columns import model as _model
-from shm.store.columns import reference as _to
-from shm.store.columns import superseded_at as _superseded_at
-from shm.store.columns import unique_where as _unique_where
 
 SCHEMA = "0009"
 
@@ -26,7 +31,7 @@ _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 recordings = sa.Table(
     "recordings",
     metadata,
-    _id(),
+    identity(),
     sa.Column("sha256", sa.String(64), nullable=False, unique=True),
     sa.Column("file_name", sa.Text, nullable=False),
     sa.Column("size_bytes", sa.BigInteger, nullable=False),
@@ -54,8 +59,8 @@ fingerprints = sa.Table(
 holds = sa.Table(
     "holds",
     metadata,
-    _id(),
-    _to("recordings"),
+    identity(),
+    reference("recordings"),
     sa.Column("held_at", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
     sa.Column("decision", sa.String(16)),
@@ -72,8 +77,8 @@ holds = sa.Table(
 tests = sa.Table(
     "tests",
     metadata,
-    _id(),
-    _to("recordings"),
+    identity(),
+    reference("recordings"),
     sa.Column("position", sa.Integer, nullable=False),
     sa.Column("name", sa.Text, nullable=False),
     sa.Column("hanger", sa.Integer, nullable=False),
@@ -85,13 +90,13 @@ tests = sa.Table(
     sa.Column("notes", Document, nullable=False),
     sa.Column("quality", Document),
     sa.Column("set_aside", Document),
-    *_lineage(),
+    *lineage(),
     sa.Column("identified_at", UtcTime, nullable=False),
-    _superseded_at(),
+    superseded_at(),
     sa.Column("taken_at", UtcTime),
     sa.Column("temperature_c", Number),
-    _unique_where("superseded_at", "tests", "hanger", "name"),
-    _in_force("ix_tests_in_force", *_OF_TESTS),
+    unique_where("superseded_at", "tests", "hanger", "name"),
+    index_in_force("ix_tests_in_force", *_OF_TESTS),
     sa.Index(None, "recording_id"),
 )
 
@@ -99,19 +104,19 @@ tests = sa.Table(
 posteriors = sa.Table(
     "posteriors",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    _model(),
+    model(),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
     sa.Column("samples", sa.LargeBinary, nullable=False),
     sa.Column("log_evidence", Number),
     sa.Column("log_evidence_sd", Number),
     sa.Column("seed", sa.BigInteger, nullable=False),
-    *_lineage(),
+    *lineage(),
     sa.Column("updated_at", UtcTime, nullable=False),
-    _superseded_at(),
-    _in_force("ix_posteriors_in_force", "hanger", "time", "model"),
+    superseded_at(),
+    index_in_force("ix_posteriors_in_force", "hanger", "time", "model"),
 )
 
 # A posterior in numbers, so that years of tests are shown without their samples. `key` tells which
@@ -137,9 +142,9 @@ posterior_tests = sa.Table(
 selections = sa.Table(
     "selections",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    _model(),
+    model(),
     sa.Column("selected_at", UtcTime, nullable=False),
 )
 
@@ -158,9 +163,9 @@ selection_entries = sa.Table(
 baselines = sa.Table(
     "baselines",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    _to("posteriors"),
+    reference("posteriors"),
     sa.Column("set_at", UtcTime, nullable=False),
     sa.Column("who", sa.Text, nullable=False),
     sa.Column("why", sa.Text, nullable=False),
@@ -171,9 +176,9 @@ baselines = sa.Table(
 drifts = sa.Table(
     "drifts",
     metadata,
-    _id(),
-    _to("tests"),
-    _to("baselines"),
+    identity(),
+    reference("tests"),
+    reference("baselines"),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("quantity", sa.String(64), nullable=False),
@@ -181,8 +186,8 @@ drifts = sa.Table(
         sa.Column(name, Number)
         for name in ("baseline", "value", "shift_mean", "shift_sd", "threshold", "probability")
     ),
-    _superseded_at(),
-    _unique_where("superseded_at", "drifts", "test_id", "baseline_id", "quantity"),
+    superseded_at(),
+    unique_where("superseded_at", "drifts", "test_id", "baseline_id", "quantity"),
 )
 
 # What the sequential test says after one test, and whether it has called a change; the shifts of
@@ -190,16 +195,16 @@ drifts = sa.Table(
 watches = sa.Table(
     "watches",
     metadata,
-    _id(),
-    _to("tests"),
-    _to("baselines"),
+    identity(),
+    reference("tests"),
+    reference("baselines"),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("document", Document, nullable=False),
     sa.Column("called", sa.Boolean, nullable=False, server_default=sa.false()),
-    _superseded_at(),
-    _unique_where("superseded_at", "watches", "test_id", "baseline_id"),
-    _in_force("ix_watches_in_force", "hanger", "baseline_id", "time", "called"),
+    superseded_at(),
+    unique_where("superseded_at", "watches", "test_id", "baseline_id"),
+    index_in_force("ix_watches_in_force", "hanger", "baseline_id", "time", "called"),
 )
 
 # What the watch has made of all tests up to `last_test_time`, so that the next one is not compared
@@ -207,7 +212,7 @@ watches = sa.Table(
 watch_states = sa.Table(
     "watch_states",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("baseline_id", sa.ForeignKey("baselines.id"), nullable=False, unique=True),
     sa.Column("key", sa.Text, nullable=False),
@@ -219,11 +224,11 @@ watch_states = sa.Table(
 alerts = sa.Table(
     "alerts",
     metadata,
-    _id(),
+    identity(),
     sa.Column("key", sa.String(255), nullable=False, unique=True),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    _to("tests"),
-    _to("baselines", nullable=True),
+    reference("tests"),
+    reference("baselines", nullable=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("raised_at", UtcTime, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
@@ -234,22 +239,16 @@ alerts = sa.Table(
 acknowledgements = sa.Table(
     "acknowledgements",
     metadata,
-    _id(),
-    sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
-    sa.Column("at", UtcTime, nullable=False),
-    sa.Column("who", sa.Text, nullable=False),
-    sa.Column("why", sa.Text, nullable=False),
+    identity(),
+    *note_on_alert(),
 )
 
 # When the condition that an alert tells of ended, and who found that: `shm`, or a person.
 resolutions = sa.Table(
     "resolutions",
     metadata,
-    _id(),
-    sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
-    sa.Column("at", UtcTime, nullable=False),
-    sa.Column("who", sa.Text, nullable=False),
-    sa.Column("why", sa.Text, nullable=False),
+    identity(),
+    *note_on_alert(),
 )
 
 # From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
@@ -258,7 +257,7 @@ resolutions = sa.Table(
 silences = sa.Table(
     "silences",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer),
     sa.Column("starts_at", UtcTime, nullable=False),
     sa.Column("ends_at", UtcTime, nullable=False),
@@ -276,8 +275,8 @@ silences = sa.Table(
 deliveries = sa.Table(
     "deliveries",
     metadata,
-    _id(),
-    _to("alerts"),
+    identity(),
+    reference("alerts"),
     sa.Column("hook", sa.String(255), nullable=False),
     sa.Column("news", sa.String(16), nullable=False),
     sa.Column("state", sa.String(16), nullable=False),
@@ -294,12 +293,12 @@ deliveries = sa.Table(
 diagnoses = sa.Table(
     "diagnoses",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
     sa.Column("diagnosed_at", UtcTime, nullable=False),
     sa.Column("tests", Document, nullable=False),
     sa.Column("document", Document, nullable=False),
-    *_lineage(),
+    *lineage(),
 )
 
 # A baseline with effects, made a model class of a hanger: who, when, why, and its undoing. The gaps
@@ -307,9 +306,9 @@ diagnoses = sa.Table(
 adoptions = sa.Table(
     "adoptions",
     metadata,
-    _id(),
+    identity(),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    _model(),
+    model(),
     sa.Column("baseline_model", sa.String(64), nullable=False),
     sa.Column("effect", sa.Text, nullable=False),
     sa.Column("at", sa.Text, nullable=False),
@@ -319,8 +318,8 @@ adoptions = sa.Table(
     sa.Column("gap_percent", Number),
     sa.Column("adopted_at", UtcTime, nullable=False),
     sa.Column("diagnosis_id", sa.ForeignKey("diagnoses.id")),
-    _to("selections"),
-    _to("baselines"),
+    reference("selections"),
+    reference("baselines"),
     sa.Column("undone_at", UtcTime),
     sa.Column("undone_why", sa.Text),
     sa.Column("undone_who", sa.Text),
@@ -330,10 +329,10 @@ adoptions = sa.Table(
 events = sa.Table(
     "events",
     metadata,
-    _id(),
+    identity(),
     sa.Column("at", UtcTime, nullable=False),
     sa.Column("kind", sa.String(32), nullable=False),
-    _to("recordings", nullable=True),
+    reference("recordings", nullable=True),
     sa.Column("file_name", sa.Text, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
 )
@@ -343,9 +342,9 @@ events = sa.Table(
 steps = sa.Table(
     "steps",
     metadata,
-    _id(),
-    _to("recordings"),
-    _to("tests", nullable=True),
+    identity(),
+    reference("recordings"),
+    reference("tests", nullable=True),
     sa.Column("stage", sa.String(16), nullable=False),
     sa.Column("at", UtcTime, nullable=False, index=True),
     sa.Column("version", sa.String(32)),
@@ -357,8 +356,8 @@ steps = sa.Table(
 archive_copies = sa.Table(
     "archive_copies",
     metadata,
-    _id(),
-    _to("recordings"),
+    identity(),
+    reference("recordings"),
     sa.Column("folder", sa.Text, nullable=False),
     sa.Column("at", UtcTime, nullable=False),
     sa.UniqueConstraint("recording_id", "folder"),
@@ -368,14 +367,14 @@ archive_copies = sa.Table(
 tokens = sa.Table(
     "tokens",
     metadata,
-    _id(),
+    identity(),
     sa.Column("name", sa.String(255), nullable=False),
     sa.Column("token_sha256", sa.String(64), nullable=False, unique=True),
     sa.Column("scopes", sa.String(64), nullable=False),
     sa.Column("created_at", UtcTime, nullable=False),
     sa.Column("revoked_at", UtcTime),
     sa.Column("last_used_at", UtcTime),
-    _unique_where("revoked_at", "tokens", "name"),
+    unique_where("revoked_at", "tokens", "name"),
 )
 
 # Columns that are kept under a checksum of their own, NAME_checksum, by table: see `checksums`.

@@ -8,6 +8,8 @@ from typing import Literal, TypeAlias
 
 from shm.values.kinds import NAN
 
+_ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
+
 
 @dataclass(frozen=True)
 class Thresholds:
@@ -21,6 +23,11 @@ class Thresholds:
     stiffness_shift_decades: float = 0.5
     alert_probability: float = 0.95
     false_call_years: float | None = None
+
+    @property
+    def end_probability(self) -> float:
+        """Below this a condition that an alert told of has ended."""
+        return _ENDS_BELOW * self.alert_probability
 
 
 @dataclass(frozen=True)

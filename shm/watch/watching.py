@@ -42,7 +42,6 @@ from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
-_ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
 _BEYOND: AlertKind = "beyond threshold"
 
 
@@ -167,7 +166,7 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
     """What stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
-    standing = _still(told, test, level)
+    standing = _still(told, test, hanger.thresholds.end_probability)
     news = _news(standing, test, level)
     beyond = {(drift.quantity, way_of(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
@@ -187,16 +186,16 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
     return tuple(alerts)
 
 
-def _still(told: AlertState, test: WatchedTest, level: float) -> AlertState:
-    """What still stands at a test: unknown probabilities end nothing."""
+def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
+    """What still stands at a test, its probability not below `end`; unknown ones end nothing."""
     ended = {
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
-        if _probability(drift, way) < _ENDS_BELOW * level
+        if _probability(drift, way) < end
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
-    if test.change.probability < _ENDS_BELOW * level:
+    if test.change.probability < end:
         return AlertState(beyond)
     return replace(told, beyond=beyond)
 

@@ -16,7 +16,7 @@ import shutil
 import sqlite3
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -31,7 +31,7 @@ from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.settings import Settings
 from shm.store import Workspace
-from shm.store.rows import Delivery, DeliveryState
+from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_silences import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon.doctor.checks import (
@@ -79,12 +79,13 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
+    silences, escalates = store.silences.list_all(), examined.workspace.bridge.escalation_s
     late = [
         each
         for each in waiting
         if each.attempts
         or (each.message_id and now - each.next_attempt_at > WAITS_LONG)
-        or (_is_unheld(examined, each) and now - each.stored.raised_at > WAITS_LONG)
+        or (_is_unheld(each, silences, escalates, now) and now - each.stored.raised_at > WAITS_LONG)
     ]
     if late:
         worst = max(late, key=lambda each: each.attempts)
@@ -109,13 +110,13 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
         yield ok("deliveries", f"{len(waiting)} on their way" if waiting else "none owed")
 
 
-def _is_unheld(examined: Examined, delivery: Delivery) -> bool:
+def _is_unheld(
+    delivery: Delivery, silences: tuple[Silence, ...], escalates: Container[str], now: datetime
+) -> bool:
     """Whether nothing that people asked for keeps a delivery: no silence, no escalation."""
-    hooks = {each.name: each for each in examined.workspace.bridge.hooks}
-    hook, silences = hooks.get(delivery.hook), examined.store.silences.list_all()
-    if delivery.message_id is not None or (hook and hook.escalation_after_seconds):
+    if delivery.message_id is not None or delivery.hook in escalates:
         return False
-    return silenced_until(silences, delivery.alert.hanger, examined.now) is None
+    return silenced_until(silences, delivery.alert.hanger, now) is None
 
 
 def _ready(notifier: HookNotifier, hook: Hook) -> Finding:

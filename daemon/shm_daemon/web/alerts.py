@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Container, Sequence
+from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
 
 from shm.pipeline import utc_now
-from shm.store import AlertRow
+from shm.store import AlertRow, Silence
 from shm.store.stored_silences import silenced_until
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.faults import answers
@@ -46,10 +48,10 @@ def alerts(
     is_open = True if open else None
     if limit is None:
         found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
-        return {"alerts": [alert_document(each, site) for each in found], "next_before": None}
+        return {"alerts": alert_documents(found, site), "next_before": None}
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
     return {
-        "alerts": [alert_document(each, site) for each in rows[:limit]],
+        "alerts": alert_documents(rows[:limit], site),
         "next_before": rows[limit - 1].id if len(rows) > limit else None,
     }
 
@@ -69,15 +71,20 @@ def acknowledge(
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
     site.store.alerts.acknowledge(alert_id, who, told.why, utc_now())
-    return alert_document(site.store.alerts.row(alert_id), site)
+    return alert_documents([site.store.alerts.row(alert_id)], site)[0]
 
 
-def alert_document(alert: AlertRow, site: Site) -> dict[str, Any]:
-    """An alert with what became of its deliveries, and what holds them back."""
+def alert_documents(found: Sequence[AlertRow], site: Site) -> list[dict[str, Any]]:
+    """Alerts with what became of their deliveries, and what holds them back."""
+    silences, now = site.store.silences.list_all(), utc_now()
+    escalates = site.workspace.bridge.escalation_s
+    return [_document(each, escalates, silences, now) for each in found]
+
+
+def _document(
+    alert: AlertRow, escalates: Container[str], silences: tuple[Silence, ...], now: datetime
+) -> dict[str, Any]:
     noted, ended = alert.acknowledgement, alert.resolution
-    hooks = site.workspace.bridge.hooks
-    escalates = {each.name for each in hooks if each.escalation_after_seconds}
-    stands, silences = ended is None, site.store.silences.list_all()
     return {
         "id": alert.id,
         "hanger": alert.hanger,
@@ -86,11 +93,9 @@ def alert_document(alert: AlertRow, site: Site) -> dict[str, Any]:
         "test_at": alert.test_time,
         "kinds": list(alert.kinds),
         "message": alert.message,
-        "acknowledged": None
-        if noted is None
-        else {"who": noted.who, "why": noted.why, "at": noted.at},
-        "resolved": ended and {"who": ended.who, "why": ended.why, "at": ended.at},
-        "silenced_until": silenced_until(silences, alert.hanger, utc_now()) if stands else None,
+        "acknowledged": noted and noted.said,
+        "resolved": ended and ended.said,
+        "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),
         "deliveries": [
             {**vars(each), "state": each.state.value, "escalation": each.hook in escalates}
             for each in alert.deliveries

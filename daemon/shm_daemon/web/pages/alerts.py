@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from shm.store import AlertRow
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import test_page
-from shm_daemon.web.alerts import alert_document
+from shm_daemon.web.alerts import alert_documents
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import LARGEST_NUMBER
 from shm_daemon.web.site import Site
@@ -58,15 +58,16 @@ def _some(
     """Alerts as the page shows them, and the number to go on after, if there are more."""
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown = rows[:_SHOWN]
-    return [_with_address(each, site) for each in shown], shown[-1].id if len(
-        rows
-    ) > _SHOWN else None
+    documents = alert_documents(shown, site)
+    older = shown[-1].id if len(rows) > _SHOWN else None
+    return [
+        {**document, "address": _address(each)}
+        for each, document in zip(shown, documents, strict=True)
+    ], older
 
 
-def _with_address(alert: AlertRow, site: Site) -> dict[str, Any]:
+def _address(alert: AlertRow) -> str | None:
     """An alert that only tries a hook is of no test."""
-    is_trial = "test" in alert.kinds
-    address = None if is_trial else test_page(alert.hanger, alert.test)
     if "held" in alert.kinds:  # what is held has no page of its own
-        address = "/operation#held"
-    return {**alert_document(alert, site), "address": address}
+        return "/operation#held"
+    return None if "test" in alert.kinds else test_page(alert.hanger, alert.test)
