@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,6 +26,19 @@ def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
         del os.environ["SHM_CACHE"]
     else:
         os.environ["SHM_CACHE"] = before
+
+
+@pytest.fixture(autouse=True)
+def logging_ends_with_its_test() -> Iterator[None]:
+    """What a test lets begin to log writes to that test's standard error, which is closed then."""
+    root, level = logging.getLogger(), logging.getLogger().level
+    before = set(root.handlers)
+    yield
+    root.setLevel(level)
+    for handler in set(root.handlers) - before:
+        if type(handler).__module__ != "_pytest.logging":  # pytest's own are another each phase
+            root.removeHandler(handler)
+            handler.close()
 
 
 @pytest.fixture(scope="session")
