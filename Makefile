@@ -40,8 +40,8 @@ SLOW := $(SAMPLED) $(patsubst %,tests/models/test_%.py,models solid solid_basis)
 	$(patsubst %,tests/gap/test_%.py,attribution diagnose discrepancy fit importance_sampling \
 		law_allowances law_error minor_cause numbering outliers places readings) \
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
-	$(patsubst %,tests/watch/test_%.py,bridge_drifts neighbours sequential sequential_rate \
-		state watching)
+	$(patsubst %,tests/watch/test_%.py,bridge_drifts false_call_rate neighbours state \
+		watcher watching)
 NUMERICS := $(BIN)/python -m pytest --quiet \
 	tests/models tests/gap tests/inference tests/watch $(SLOW:%=--ignore=%)
 

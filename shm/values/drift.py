@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Literal
 
-from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
 from shm.values.posterior import Averaged
 
 if TYPE_CHECKING:
@@ -47,6 +47,23 @@ class WatchedQuantity:
 
 
 @dataclass(frozen=True, eq=False)
+class ModeReading:
+    """One test mode by mode: log frequencies (modes,) of the baseline's modes beside the model's.
+
+    `values` are about `slopes` (modes, q) times the coordinates: linearised where the test lies.
+    `variances` are infinite of a mode that the test lacks, or that is taken for a mistaken one
+    (`mistaken`). `per_kelvin` (modes,) is what a kelvin does to each as steel softens, taken off
+    where the temperature is known.
+    """
+
+    values: FloatArray
+    variances: FloatArray
+    slopes: FloatArray
+    per_kelvin: FloatArray
+    mistaken: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
 class Reading:
     """What one test by itself says of the watched quantities of a hanger, without any prior.
 
@@ -55,7 +72,8 @@ class Reading:
     in every comparison and is left out. `information` (q, q) is singular where a test cannot tell
     quantities apart; `mean` (q,) is then 0 along what it does not see. `per_kelvin` (q,) is
     what a kelvin of warmth has moved `mean` by, as steel softens, where that was not taken off for
-    want of a temperature; else None.
+    want of a temperature; else None. `modes` is the same mode by mode, `amplitude` the excitation
+    over the reference (NaN: not known).
     """
 
     test: str
@@ -64,6 +82,8 @@ class Reading:
     mean: FloatArray
     information: FloatArray
     per_kelvin: FloatArray | None = None
+    modes: ModeReading | None = None
+    amplitude: float = NAN
 
 
 @dataclass(frozen=True)
@@ -119,7 +139,8 @@ class Change:
     `probability` is that of any change since the baseline, `sudden` that it was a step and no
     ramp, given a change. `began_after` and `began_by` hold the beginning with 90 % probability.
     `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
-    of this test's reading being a blunder.
+    of this test's reading being a blunder. `material_probability` is that the change moves a first
+    frequency, or the mean of all, by more than the watch is asked to tell; less is not called.
     """
 
     evidence_years: float
@@ -130,11 +151,12 @@ class Change:
     began_by: datetime
     moved: tuple[Moved, ...]
     outlier_probability: float = NAN
+    material_probability: float = 1.0
 
     @property
     def called(self) -> bool:
-        """Whether the evidence is beyond its limit."""
-        return self.evidence_years > self.limit_years
+        """Whether the evidence is beyond its limit, and what changed is no trifle."""
+        return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +190,15 @@ class TemperatureCoefficient:
 
 
 AlertKind = Literal[
-    "sudden change", "slow drift", "beyond threshold", "gap", "held", "test", "resolved"
+    "sudden change",
+    "slow drift",
+    "beyond threshold",
+    "repeat the test",
+    "tests disagree",
+    "gap",
+    "held",
+    "test",
+    "resolved",
 ]
 
 

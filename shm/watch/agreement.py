@@ -22,9 +22,9 @@ import numpy as np
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
+from shm.watch.posterior_summary import beyond, shift_of_mixture, threshold_of
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
-from shm.watch.sequential.posterior_summary import beyond, shift_of_mixture, threshold_of
 
 _CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -32,6 +32,9 @@ lies that far to one side, fewer than are blunders."""
 
 _PULL_STEPS = 10.0
 """Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
+
+_SCATTER, _SCATTER_OF_STEP = 0.01, 0.2
+"""Of a test beyond its errors, of the tension and of a spring's step: the most that is usual."""
 
 _TOLD = 2
 """Tests that agree: as many as that were told when the second of them came."""
@@ -125,9 +128,9 @@ def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown
     found = []
     for j, quantity in enumerate(reader.quantities):
         if quantity.name == TENSION:
-            scatter, per_kelvin = max(options.tension_scatter), options.tension_per_kelvin_sd
+            scatter, per_kelvin = _SCATTER, options.tension_per_kelvin_sd
         else:
-            scatter = max(options.spring_scatter_of_step) * quantity.step_sd
+            scatter = _SCATTER_OF_STEP * quantity.step_sd
             per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
         of_both = 2 * scatter**2  # a baseline of one test scatters as much
         variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
@@ -146,8 +149,8 @@ def _drift(
     x = float(np.average([each.mean for each in both], weights=weights))
     sd = math.sqrt(max(each.variance for each in both))
     alone = np.ones(1)
-    steps = alone * x / quantity.step_sd, alone * sd / quantity.step_sd
-    shift, threshold = shift_of_mixture(quantity, alone, *steps), threshold_of(quantity, hanger)
+    at = alone * x, alone * sd
+    shift, threshold = shift_of_mixture(quantity, alone, *at), threshold_of(quantity, hanger)
     return Drift(
         hanger=hanger.id,
         test=newest[0].id,
@@ -158,7 +161,7 @@ def _drift(
         shift_mean=shift.mean,
         shift_sd=shift.sd,
         threshold=threshold,
-        probability=beyond(quantity, alone, *steps, threshold),
+        probability=beyond(quantity, alone, *at, threshold),
     )
 
 

@@ -17,6 +17,25 @@ _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 _EITHER_LIKELY = 0.8
 _WHICH_END = "which end is not known"
 
+_CAUSES = {
+    "point_mass": "a mass put on or taken off",
+    "section_loss": "section lost over a stretch",
+    "bending_stiffness": "another bending stiffness",
+    "timebase": "the logger's clock",
+    "sensor_mass": "sensors of other mass or place",
+    "unexplained": "something that no cause we know explains",
+}
+"""What may have moved the frequencies beside tension and end stiffness."""
+
+_LOOK_AT = {
+    "point_mass": "look for a lamp, a clamp, a cable or ice on the hanger, or what was taken off.",
+    "section_loss": "look along the rod for corrosion, wear or a crack.",
+    "bending_stiffness": "look for broken wires, a loose sleeve or new grout.",
+    "timebase": "check the logger's clock and the sampling rate in the file.",
+    "sensor_mass": "ask who put the sensors where, and with what.",
+    "unexplained": "check the test's files first: hanger, sensors, axes and orders of the modes.",
+}
+
 
 def message_of(
     test: WatchedTest,
@@ -67,6 +86,21 @@ def message_of_agreeing(
     return " ".join(part for part in parts if part)
 
 
+def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """Of a test that agrees with none before it, or of so many in a row."""
+    if in_a_row == 1:
+        return (
+            f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
+            "a week: it counts in nothing until another agrees with it. Another hanger may have "
+            "been hit, a sensor put elsewhere or an order mistaken; else the hanger has changed."
+        )
+    return (
+        f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
+        "each other. Repeat the test today, by the same people and with the same sensors. What the "
+        "watch says of this hanger rests on older tests until then."
+    )
+
+
 def short_name(test: str) -> str:
     """A test's name as far as a key has room for it; names that begin alike stay apart."""
     if len(test) <= _LONGEST_TEST:
@@ -93,6 +127,8 @@ def quantity_words(name: str, end: End | None = None, plane: Plane | None = None
     """`tension`, or `end stiffness k1 (deck end, transverse)`."""
     if name == TENSION:
         return "tension"
+    if name in _CAUSES:
+        return _CAUSES[name]
     if not name.startswith("log10_k"):
         return name.replace("_", " ")
     at = f"{end} end" if end else _WHICH_END if plane else ""
@@ -106,6 +142,8 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
     `mean` and `sd` are a fraction of the tension, or decades of a stiffness.
     """
     low, high = mean - NINETY_PERCENT * sd, mean + NINETY_PERCENT * sd
+    if quantity in _CAUSES:
+        return f"moved the frequencies by {100 * mean:+.2f} % in the mean"
     if quantity != TENSION:
         verb = "fell" if high < 0 else "rose" if low > 0 else "moved"
         return (
@@ -347,12 +385,19 @@ def _blunder(change: Change) -> str:
 
 
 def _advice(change: Change | None, beyond: Sequence[Drift]) -> str:
-    return f"What to do: {_urgency(change, bool(beyond))} {_look(change, beyond)}"
+    return f"What to do: {_urgency(change, beyond)} {_look(change, beyond)}"
 
 
-def _urgency(change: Change | None, is_beyond: bool) -> str:
-    if is_beyond:
+def _is_dangerous(beyond: Sequence[Drift]) -> bool:
+    """Lost tension or loosened ends, for which alone traffic is named."""
+    return any(drift.shift_mean < 0 for drift in beyond)
+
+
+def _urgency(change: Change | None, beyond: Sequence[Drift]) -> str:
+    if _is_dangerous(beyond):
         return "have the engineer in charge decide on traffic now, and hit it again today."
+    if beyond:
+        return "hit it again today."
     if change is not None and change.sudden < 0.5:
         return "hit it again within weeks."
     return "hit it again within days."
@@ -367,6 +412,8 @@ def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
             "(shm drift bridge), and look at its anchorages."
         )
     quantity, shift = _leading(first, beyond)
+    if quantity in _LOOK_AT:
+        return f"If it holds, {_LOOK_AT[quantity]}"
     if quantity == TENSION:
         return _look_at_tension(shift > 0)
     ends = {each.end for each in groups[0]} if first and first.quantity == quantity else {None}

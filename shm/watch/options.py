@@ -22,17 +22,28 @@ class WatchOptions:
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     outlier_probability: float = 0.01
-    tension_scatter: tuple[float, ...] = (0.001, 0.0018, 0.0032, 0.0056, 0.01)
-    spring_scatter_of_step: tuple[float, ...] = (0.01, 0.06, 0.2)
+    tension_scatter: float = 0.005
+    spring_scatter_of_step: float = 0.1
+    bending_scatter: float = 0.003
+    clock_scatter: float = 1e-4
+    mode_scatter: float = 5e-4
+    scatter_scales: tuple[float, ...] = (0.6, 1.0, 1.6, 2.6)
     tension_per_kelvin_sd: float = 0.001
     spring_per_kelvin_sd_of_step: float = 0.1
+    tension_per_amplitude_sd: float = 0.002
+    spring_per_amplitude_sd_of_step: float = 0.1
+    creep_per_year_sd: float = 0.002
     unknown_temperature_sd_k: float = 10.0
+    thermometer_sd_k: float = 1.5
+    unknown_log_amplitude_sd: float = 0.5
+    least_frequency_shift: float = 0.004
+    most_of_one_test_nats: float = 6.0
     baseline_tests: int = 1
-    beginnings: int = 40
+    beginnings: int = 60
 
     def __post_init__(self) -> None:
-        if not self.tension_scatter or not self.spring_scatter_of_step:
-            raise UsageError("The watch needs one scatter of the tension and of springs at least.")
+        if not self.scatter_scales:
+            raise UsageError("The watch needs one scale of the scatter at least.")
         if self.baseline_tests < 1:
             raise UsageError("The watch needs one baseline test at least.")
         if not 0 < self.outlier_probability < 1:

@@ -36,15 +36,18 @@ from shm.models.base import Conditions
 from shm.values import (
     PLANES,
     TENSION,
+    BoolArray,
     FloatArray,
     Hanger,
     IntArray,
     ModalTest,
     Mode,
+    ModeReading,
     Posterior,
     Reading,
     WatchedQuantity,
 )
+from shm.watch.causes import columns_of
 from shm.watch.quantities import (
     MeasuredMode,
     base_point,
@@ -76,6 +79,18 @@ _SELDOM = 1e-3
 # How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
 _BEYOND = 0.05
 
+# Of routine modes so many are mistaken: another order, the other plane's, a machine's tone.
+_MISTAKEN = 0.04
+# What a mistaken one may be off by, in log frequency: two neighbouring orders of a low mode.
+_MISTAKEN_RANGE = 0.7
+# Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
+# joint that gives. Judgement, the better end of what repeated tests of real hangers show.
+_MODE_SCATTER = 1e-3
+_SENSOR_KG = 0.3  # judgement: two accelerometers with magnets and cable
+_MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the test that does not
+_ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
+_PRIOR_FREEDOM = 4.0  # judgement: stated sds are off by a factor of up to two
+
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
@@ -91,6 +106,11 @@ class _Seen:
     own: IntArray
     log_frequency: FloatArray
     variance: FloatArray
+
+    def taken(self, rows: BoolArray) -> _Seen:
+        """Some of the modes."""
+        arrays = ("plane", "order", "own", "log_frequency", "variance")
+        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +172,7 @@ class Reader:
             )
         self.modes: tuple[MeasuredMode, ...] = tuple(sorted(keys))
         self.quantities = watched_quantities(baseline, hanger, self.modes)
+        self.columns = columns_of(self._model, self._base, hanger, self.modes)
         self._columns = [_columns(each, self._model) for each in self.quantities]
         self._scale: FloatArray = np.array([each.step_sd for each in self.quantities])
         self._pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
@@ -159,39 +180,127 @@ class Reader:
         self._highest = np.array([each.coordinates[-1] for each in self.quantities])
         self.reference_temperature_c = mean_temperature_c(usable)
         self._per_kelvin = self._softening(hanger)
+        mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
+        self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
     def reading(self, test: ModalTest, time: datetime) -> Reading:
         """What `test`, made at `time`, says by itself.
 
-        Modes that the baseline does not have are left out; where those that it has fit no state of
-        the hanger, as when one is taken for another, they count for less than their errors say. A
-        test without any that it has, or of conditions that the model class cannot describe, says
-        nothing: information 0.
+        Modes that the baseline does not have are left out, and so are those that fit no state of
+        the hanger which the others fit: mistaken ones. Where too many are, none is, and all count
+        for less than their errors say. A test without any mode that the baseline has, or of
+        conditions that the model class cannot describe, says nothing: information 0.
         """
         count = len(self.quantities)
         blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
         if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
             return blind
+        sound = self._sound(seen)
+        mistaken, seen = seen.own[~sound], seen.taken(sound)
         linear = self._settled(seen)
         misfit = linear.residual + linear.slopes @ linear.x
         softening = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
         (mean, per_kelvin), information = self._read(linear, np.array([misfit, softening]))
         left = None if self._is_warmth_known(test) else per_kelvin
-        return replace(blind, mean=mean, information=information, per_kelvin=left)
+        modes = self._by_mode(seen, linear, mistaken, is_warmth_known=left is None)
+        return replace(
+            blind,
+            mean=mean,
+            information=information,
+            per_kelvin=left,
+            modes=modes,
+            amplitude=test.amplitude,
+        )
+
+    def _by_mode(
+        self, seen: _Seen, linear: _Linear, mistaken: IntArray, *, is_warmth_known: bool
+    ) -> ModeReading:
+        """The same for each of the baseline's modes.
+
+        Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
+        """
+        sd, n = np.sqrt(seen.variance), len(self.modes)
+        free = max(len(seen.own) - len(linear.x), 0)
+        misfit = float(linear.residual @ linear.residual)
+        larger = max(1.0, (_PRIOR_FREEDOM + misfit) / (_PRIOR_FREEDOM + free))
+        values, variances = np.zeros(n), np.full(n, np.inf)
+        slopes = np.zeros((n, len(linear.x)))
+        values[seen.own] = sd * (linear.residual + linear.slopes @ linear.x)
+        variances[seen.own] = larger * seen.variance
+        slopes[seen.own] = sd[:, None] * linear.slopes
+        wrong = np.zeros(n, bool)
+        wrong[mistaken] = True
+        softening = np.zeros(n) if is_warmth_known else self._per_kelvin
+        return ModeReading(values, variances, slopes, softening, wrong)
+
+    def _sound(self, seen: _Seen) -> BoolArray:
+        """Which modes (n,) are not mistaken: likelier good than off by anything.
+
+        Each is good with its error and scatter or, seldom, anywhere; the state that makes all
+        together likeliest is looked for from what each mode alone says of the tension.
+        """
+        every = np.ones(len(seen.own), bool)
+        if len(seen.own) < len(self.quantities) + 2:
+            return every
+        variance = seen.variance + self._scatter**2
+        wide = replace(seen, variance=variance)
+        x = self._likeliest_start(wide)
+        good = np.ones(len(seen.own))
+        for _ in range(_ROUNDS):
+            linear = self._linear(x, wide)
+            for _ in range(_ROUNDS):
+                off = linear.residual + linear.slopes @ (linear.x - x)
+                good = _good(off, variance)
+                x = self._weighed(linear, good)
+            x = np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
+        sound = good > 0.5
+        return sound if (~sound).sum() <= _MOST_MISTAKEN * len(sound) else every
+
+    def _likeliest_start(self, seen: _Seen) -> FloatArray:
+        """Of no shift and the tensions that the modes give one by one, the likeliest start."""
+        base = self._linear(np.zeros(len(self.quantities)), seen)
+        alone = base.residual / np.where(base.slopes[:, 0] == 0, np.inf, base.slopes[:, 0])
+        starts = np.zeros((len(alone) + 1, len(base.x)))
+        starts[1:, 0] = np.clip(alone, self._lowest[0], self._highest[0])
+        off = base.residual - starts @ base.slopes.T
+        density = _log_mixture(off, seen.variance).sum(axis=1) - starts**2 @ base.pull / 2
+        return np.asarray(starts[int(density.argmax())])
+
+    def _weighed(self, linear: _Linear, weight: FloatArray) -> FloatArray:
+        """Where the cost is least, were it all linear, each mode counting for its `weight`."""
+        slopes = linear.slopes * weight[:, None]
+        pull = np.maximum(linear.pull, 1e-9)
+        target = linear.residual + linear.slopes @ linear.x
+        return np.asarray(
+            np.linalg.solve(slopes.T @ linear.slopes + np.diag(pull), slopes.T @ target)
+        )
 
     def _is_warmth_known(self, test: ModalTest) -> bool:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
 
     def _own_residual(self, tests: Sequence[_Seen]) -> FloatArray:
-        """Measured less predicted log frequency (modes,), the weighted mean over the tests."""
+        """Measured less predicted log frequency (modes,), over the tests.
+
+        The weighted mean; of three tests or more the median of what is left of each once its own
+        state is taken off, so that a mistaken mode of one of them moves nothing.
+        """
         own = np.concatenate([seen.own for seen in tests])
-        weight = 1 / np.concatenate([seen.variance for seen in tests])
         base = np.zeros((1, len(self.quantities)))
         off = [seen.log_frequency - self._predicted(base, seen)[0] for seen in tests]
-        total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
-        return np.asarray(total / np.bincount(own, weight, len(self.modes)))
+        if len(tests) < _ROUNDS:
+            weight = 1 / np.concatenate([seen.variance for seen in tests])
+            total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
+            return np.asarray(total / np.bincount(own, weight, len(self.modes)))
+        table = np.full((len(tests), len(self.modes)), np.nan)
+        for row, seen, each in zip(table, tests, off, strict=True):
+            row[seen.own] = each
+        residual = np.nanmedian(table, axis=0)
+        for _ in range(_ROUNDS):
+            common = np.nanmedian(table - residual, axis=1)
+            residual = np.nanmedian(table - common[:, None], axis=0)
+        return np.asarray(residual)
 
     def _softening(self, hanger: Hanger) -> FloatArray:
         """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
@@ -296,6 +405,18 @@ class Reader:
         highest = max(order for _, order in self.modes)
         found = self._model.frequencies_at(theta, highest, seen.conditions)
         return np.asarray(np.log(found[:, seen.plane, seen.order]))
+
+
+def _log_mixture(off: FloatArray, variance: FloatArray) -> FloatArray:
+    """Log density of modes `off` (..., n), over sd, of which a few are mistaken."""
+    good = math.log(1 - _MISTAKEN) - off**2 / 2 - np.log(2 * np.pi * variance) / 2
+    return np.asarray(np.logaddexp(good, math.log(_MISTAKEN / _MISTAKEN_RANGE)))
+
+
+def _good(off: FloatArray, variance: FloatArray) -> FloatArray:
+    """Probability (n,) of each mode `off` (n,), over sd, being no mistaken one."""
+    good = math.log(1 - _MISTAKEN) - off**2 / 2 - np.log(2 * np.pi * variance) / 2
+    return np.exp(good - np.logaddexp(good, math.log(_MISTAKEN / _MISTAKEN_RANGE)))
 
 
 def _credible_share(misfit: FloatArray, fitted: int) -> float:

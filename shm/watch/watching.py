@@ -2,10 +2,11 @@
 
 When an owner is told: from what the watch says after each test to at most one alert a test.
 
-Three rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
+Four rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
 change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
 level which the owner asked for. Two tests that agree are told whatever their clocks say, where
-neither of the former rules has (`agreement`). A condition that stands is told once. It ends when
+neither of the former rules has (`agreement`). A test that agrees with none before it is a notice:
+repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
 its probability falls below half that level, and only then can it be told again, so that a
 probability which hovers about the level does not ring every week. A change that was called and then
 passes the threshold is told again, since the owner must now do something else.
@@ -35,14 +36,16 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import message_of, short_name, suspects
+from shm.watch.alert_text import message_of, message_of_odd, short_name, suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.sequential import Watch, Watcher, WatchState, watch_over
+from shm.watch.watcher import Watch, Watcher, WatchState, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
 _BEYOND: AlertKind = "beyond threshold"
+_ODD = 0.9  # nine to one: a notice that is wrong costs a test
+_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,8 @@ def watch_hanger(
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = _options_of(hanger, len(baseline_tests), options)
-    return Watched(reader, readings, watch_over(readings, reader.quantities, hanger, options))
+    watch = watched(readings, reader.quantities, reader.columns, hanger, options)
+    return Watched(reader, readings, watch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +119,7 @@ def watch_newest(
     """
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = _options_of(hanger, len(baseline_tests), options)
-    watcher = Watcher(reader.quantities, hanger, options)
+    watcher = Watcher(reader.quantities, reader.columns, hanger, options)
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
         state, watch = watcher.begin(readings)
@@ -171,10 +175,28 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     beyond = {(drift.quantity, way_of(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
+    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    stands = AlertState({**standing.beyond, **beyond}, call, called)
-    return stands, _alert(news, change, test, hanger, is_further=is_further)
+    stands = AlertState({**standing.beyond, **beyond}, call, called, odd)
+    alert = _alert(news, change, test, hanger, is_further=is_further)
+    return stands, alert or _of_odd(test, hanger, odd)
+
+
+def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
+    """Of a test that fits nothing: a notice of the first, an alert of the third in a row."""
+    if in_a_row not in (1, _ODD_IN_A_ROW):
+        return None
+    kind: AlertKind = "repeat the test" if in_a_row == 1 else "tests disagree"
+    return Alert(
+        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message_of_odd(test, hanger, in_a_row),
+        drifts=(),
+        kinds=(kind,),
+    )
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
@@ -196,7 +218,7 @@ def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
-        return AlertState(beyond)
+        return AlertState(beyond, odd=told.odd)
     return replace(told, beyond=beyond)
 
 
@@ -303,6 +325,7 @@ class AlertState:
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
     call: datetime | None = None
     called: tuple[Change, ...] = ()
+    odd: int = 0
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -311,6 +334,7 @@ class AlertState:
                 "beyond": [[*condition, at] for condition, at in self.beyond.items()],
                 "call": self.call,
                 "called": [asdict(change) for change in self.called],
+                "odd": self.odd,
             },
             default=datetime.isoformat,
         )
@@ -327,6 +351,7 @@ class AlertState:
                 {(quantity, way): at for quantity, way, at in beyond},
                 kept["call"] and value_of(datetime, kept["call"]),
                 value_of(tuple[Change, ...], kept["called"]),
+                int(kept["odd"]),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(

@@ -1,14 +1,20 @@
-"""Readings of a hanger straight from a linear normal model, without any frequencies."""
+"""Readings of a hanger straight from a linear normal model of its log frequencies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from functools import cache
 
 import numpy as np
 
-from shm.values import End, FloatArray, Plane, Reading, WatchedQuantity
+from shm.models import described
+from shm.values import PLANES, End, FloatArray, ModeReading, Plane, Reading, WatchedQuantity
+from shm.watch.causes import Columns, columns_of
+from shm.watch.options import WatchOptions
+from shm.watch.watcher import Watch, Watcher, watched
+from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 DAYS_PER_YEAR = 365.25
@@ -46,32 +52,58 @@ BOTH_ENDS = (
 )
 
 
-def information(q: int, frequency_sd: float = 3e-4, modes: int = 6) -> FloatArray:
-    """Of `modes` log frequencies a plane (q, q): 1, 3, or 5 quantities, the last of rank 3.
+FREQUENCY_SD = 3e-4
+_MODES_A_PLANE = 6
+MODES = tuple((plane, order) for plane in PLANES for order in range(1, _MODES_A_PLANE + 1))
+
+
+def slopes(q: int) -> FloatArray:
+    """Of the log frequencies (12, q) of `MODES`: 1, 3, or 5 quantities, the last of rank 3.
 
     Tension moves the lower modes a little more, springs the higher ones; the two ends of a plane
     move all frequencies alike.
     """
     rows = [
-        [0.5 * (1 - 0.03 * mode), *(2 * mode / modes * (plane == own) for own in (0, 1))]
-        for plane in (0, 1)
-        for mode in range(1, modes + 1)
+        [0.5 * (1 - 0.03 * order), *(2 * order / _MODES_A_PLANE * (plane == own) for own in PLANES)]
+        for plane, order in MODES
     ]
-    sensitivity = np.array(rows)[:, [0, 1, 2, 1, 2][:q]]
-    return np.asarray(sensitivity.T @ sensitivity / frequency_sd**2)
+    return np.array(rows)[:, [0, 1, 2, 1, 2][:q]]
+
+
+@cache
+def columns() -> Columns:
+    """What other causes do to the frequencies of a thick rod on springs of 10^7 N m/rad."""
+    base = np.array([1.0, 1.0, 7.0, 7.0, 7.0, 7.0])
+    return columns_of(described("beam2", HANGER_3), base, HANGER_3, MODES)
+
+
+def watcher(
+    quantities: tuple[WatchedQuantity, ...], options: WatchOptions | None = None
+) -> Watcher:
+    return Watcher(quantities, columns(), HANGER_3, options or WatchOptions())
+
+
+def watch_of(
+    readings: Sequence[Reading],
+    quantities: tuple[WatchedQuantity, ...],
+    options: WatchOptions | None = None,
+) -> Watch:
+    return watched(readings, quantities, columns(), HANGER_3, options)
 
 
 @dataclass(frozen=True, eq=False)
 class History:
     """What happens to a hanger. `scatter` is of the tension, of springs in proportion to it.
 
-    From the test `change_at` on, `step` (q,) is added, and `ramp` (q,) for each year since.
+    From the test `change_at` on, `step` (q,) is added, and `ramp` (q,) for each year since, and
+    `mode_step` (12,) to the log frequencies by themselves. `mode_scatter` is theirs, a mode each.
     """
 
     quantities: tuple[WatchedQuantity, ...] = TENSION_ALONE
     tests: int = 60
     days_between: float = 20.0
     scatter: float = 0.003
+    mode_scatter: float = 3e-4
     per_kelvin: float = 0.001
     seasons_k: float = 15.0
     days_k: float = 5.0
@@ -80,6 +112,7 @@ class History:
     change_at: int = 10**6
     step: Sequence[float] = (0.0,)
     ramp: Sequence[float] = (0.0,)
+    mode_step: Sequence[float] = (0.0,)
 
     def readings(self, seed: int) -> list[Reading]:
         """One a test, at irregular times."""
@@ -98,33 +131,64 @@ class History:
         blunders = (rng.random(self.tests) < self.outliers) & (np.arange(self.tests) >= SOUND_TESTS)
         x[blunders] += 10 * scatter * rng.standard_normal((int(blunders.sum()), q))
         known = rng.random(self.tests) >= self.temperatures_missing
+        own = self.mode_scatter * rng.standard_normal((self.tests, len(MODES)))
+        own[after] += np.array(self.mode_step)
         return [
-            reading(f"t{i}", years[i], x[i], 10 + kelvin[i] if known[i] else np.nan, rng)
+            reading(f"t{i}", years[i], x[i], 10 + kelvin[i] if known[i] else np.nan, rng, own[i])
             for i in range(self.tests)
         ]
 
 
 def reading(
-    test: str, years: float, x: FloatArray, temperature_c: float, rng: np.random.Generator
+    test: str,
+    years: float,
+    x: FloatArray,
+    temperature_c: float,
+    rng: np.random.Generator,
+    own: FloatArray | float = 0.0,
 ) -> Reading:
-    """What a test at `years` from the start says, identification errors included."""
-    sizes, vectors = np.linalg.eigh(information(len(x)))
-    seen = sizes > 1e-9 * sizes[-1]
-    errors = rng.standard_normal(len(x)) / np.sqrt(np.where(seen, sizes, 1.0))
-    mean = vectors @ (seen * (vectors.T @ x + errors))
-    return Reading(
-        test,
-        START + timedelta(days=float(years) * DAYS_PER_YEAR),
-        float(temperature_c),
-        mean,
-        information(len(x)),
+    """What a test at `years` from the start says, identification errors included.
+
+    `own` (12,) is what the log frequencies do beside the quantities `x` (q,).
+    """
+    n = len(MODES)
+    values = slopes(len(x)) @ x + own + FREQUENCY_SD * rng.standard_normal(n)
+    modes = ModeReading(
+        values=values,
+        variances=np.full(n, FREQUENCY_SD**2),
+        slopes=slopes(len(x)),
+        per_kelvin=np.zeros(n),
+        mistaken=np.zeros(n, bool),
     )
+    when = START + timedelta(days=float(years) * DAYS_PER_YEAR)
+    blank = Reading(test, when, float(temperature_c), np.zeros(len(x)), np.zeros((len(x),) * 2))
+    return with_modes(blank, modes)
+
+
+def with_modes(given: Reading, modes: ModeReading) -> Reading:
+    """The same of other modes: mean and information are what these say together."""
+    weighted = modes.slopes / modes.variances[:, None]
+    information = weighted.T @ modes.slopes
+    mean = np.linalg.pinv(information, rcond=1e-9) @ (weighted.T @ modes.values)
+    return replace(given, modes=modes, mean=mean, information=information)
+
+
+def off_by(given: Reading, by: FloatArray | float) -> Reading:
+    """The same with `by` (12,) added to its log frequencies."""
+    assert given.modes is not None
+    return with_modes(given, replace(given.modes, values=given.modes.values + by))
+
+
+def without_modes(given: Reading, lacking: Sequence[int]) -> Reading:
+    """The same where some modes were not measured."""
+    assert given.modes is not None
+    variances, values = given.modes.variances.copy(), given.modes.values.copy()
+    variances[list(lacking)], values[list(lacking)] = np.inf, 0.0
+    return with_modes(given, replace(given.modes, variances=variances, values=values))
 
 
 def shifted(readings: Sequence[Reading], index: int, x: Sequence[float]) -> list[Reading]:
     """The readings, `x` (q,) added to that at `index` alone."""
     found = list(readings)
-    sizes, vectors = np.linalg.eigh(found[index].information)
-    seen = vectors[:, sizes > 1e-9 * sizes[-1]]
-    found[index] = replace(found[index], mean=found[index].mean + seen @ (seen.T @ np.array(x)))
+    found[index] = off_by(found[index], slopes(len(x)) @ np.array(x))
     return found

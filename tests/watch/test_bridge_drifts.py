@@ -10,9 +10,9 @@ import pytest
 from shm.values import Drift
 from shm.watch.neighbours import BridgePattern, bridge_pattern, shifts_of
 from shm.watch.options import WatchOptions
-from shm.watch.sequential import watched
+from shm.watch.watcher import watched
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.synthetic_readings import TENSION_ALONE, History
+from tests.helpers.synthetic_readings import TENSION_ALONE, History, columns
 
 HANGERS = range(1, 9)
 LOSER, NEIGHBOURS = 5, (3, 4, 6, 7)
@@ -32,7 +32,8 @@ def drifts(hanger: int, seed: int, shift: float) -> tuple[Drift, ...]:
         step=[math.log1p(shift)],
     )
     own = replace(HANGER_3, id=hanger)
-    return watched(history.readings(100 * seed + hanger), TENSION_ALONE, own, OPTIONS)[-1].drifts
+    readings = history.readings(100 * seed + hanger)
+    return watched(readings, TENSION_ALONE, columns(), own, OPTIONS).tests[-1].drifts
 
 
 def bridge(seed: int, shifts: dict[int, float]) -> BridgePattern:

@@ -16,6 +16,7 @@ from shm.models import described
 from shm.models.base import Conditions
 from shm.values import (
     NAN,
+    PLANES,
     AddedMass,
     FloatArray,
     ModalTest,
@@ -281,13 +282,50 @@ def test_frequencies_of_no_such_hanger_say_next_to_nothing(reader: Reader, facto
     assert np.diag(reading.information) @ steps**2 < 1
 
 
-def test_a_mode_taken_for_another_does_not_pass_for_a_change(reader: Reader) -> None:
-    frequency_hz = frequencies(SPRUNG)
+@pytest.mark.parametrize("theta", [SPRUNG, changed(tension=0.9), changed(tension=1.05)])
+def test_a_mode_taken_for_another_is_left_out_and_moves_nothing(
+    reader: Reader, theta: tuple[float, ...]
+) -> None:
+    frequency_hz, truth = frequencies(theta), coordinates(reader, theta)
+    good = reader.reading(measured(frequency_hz), WHEN)
     frequency_hz[0, 2] = frequency_hz[0, 3]
     misled = reader.reading(measured(frequency_hz), WHEN)
-    good = reader.reading(measured(frequencies(SPRUNG)), WHEN)
-    assert distance(misled, np.zeros(3)) < 50
+    without = [each for each in EVERYTHING if each != (PLANES[0], 3)]
+    lacking = reader.reading(measured(frequency_hz, modes=without), WHEN)
+
+    assert good.modes is not None
+    assert misled.modes is not None
+    assert lacking.modes is not None
+    assert not good.modes.mistaken.any()
+    assert [reader.modes[n] for n in np.flatnonzero(misled.modes.mistaken)] == [(PLANES[0], 3)]
+    assert distance(misled, truth) < 0.01
+    assert misled.mean == pytest.approx(lacking.mean)
+    assert misled.information == pytest.approx(lacking.information)
+    assert misled.modes.variances == pytest.approx(lacking.modes.variances)
+
+
+def test_where_most_modes_fit_no_state_the_test_says_little(reader: Reader) -> None:
+    frequency_hz = frequencies(SPRUNG)
+    wild = frequency_hz * np.exp(np.random.default_rng(3).normal(0, 0.1, frequency_hz.shape))
+    misled = reader.reading(measured(wild), WHEN)
+    good = reader.reading(measured(frequency_hz), WHEN)
     assert misled.information[0, 0] < good.information[0, 0] / 1000
+
+
+def test_mode_by_mode_a_reading_says_what_it_says_as_a_whole(reader: Reader) -> None:
+    theta = changed(tension=0.95, longitudinal=-0.2)
+    modes = [each for each in EVERYTHING if each != (PLANES[1], 4)]
+    reading = reader.reading(measured(frequencies(theta), modes=modes, amplitude=1.5), WHEN)
+
+    assert reading.modes is not None
+    missing = [each == (PLANES[1], 4) for each in reader.modes]
+    assert np.isinf(reading.modes.variances).tolist() == missing
+    expected = reading.modes.slopes @ coordinates(reader, theta)
+    assert reading.modes.values == pytest.approx(expected, abs=1e-5)
+    weighted = reading.modes.slopes / reading.modes.variances[:, None]
+    information = weighted.T @ reading.modes.slopes
+    assert information == pytest.approx(reading.information, rel=1e-6, abs=1e-3)
+    assert reading.amplitude == 1.5
 
 
 def test_a_reading_carries_the_test_its_time_and_its_temperature(reader: Reader) -> None:

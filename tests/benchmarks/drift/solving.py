@@ -13,7 +13,7 @@ from shm.models import build
 from shm.values import TENSION, ModalTest, Reading, WatchedQuantity, WatchedTest
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.sequential import watched
+from shm.watch.watcher import watched
 from tests.benchmarks.drift.climate import days_since
 from tests.benchmarks.drift.outcomes import BEYOND, OURS, Outcome
 from tests.benchmarks.drift.rivals import statistics
@@ -76,7 +76,7 @@ def _outcome(simulated: SimulatedHanger, scenario: Scenario, made: Years, desk: 
     # A limit beyond reach keeps the evidence one statistic that any limit can be put to later.
     options = WatchOptions(limit_years=_NEVER_YEARS, baseline_tests=desk.baseline_tests)
     started = time.process_time()
-    told = watched(readings, quantities, simulated.hanger, options)
+    told = watched(readings, quantities, desk.reader.columns, simulated.hanger, options).tests
     seconds = time.process_time() - started
     days = np.array([days_since(reading.time) for reading in readings])
     after = np.flatnonzero(days > simulated.began_day)

@@ -11,23 +11,35 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.values import Reading, WatchedTest
 from shm.watch.options import WatchOptions
-from shm.watch.sequential import Watcher, WatchState, watch_over
+from shm.watch.watcher import Watcher, WatchState
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.synthetic_readings import PLANES_ALONE, SPRING_STEP, History
+from tests.helpers.synthetic_readings import (
+    PLANES_ALONE,
+    SPRING_STEP,
+    History,
+    columns,
+    watch_of,
+    watcher,
+)
 
 OPTIONS = WatchOptions(baseline_tests=4)
-WATCHER = Watcher(PLANES_ALONE, HANGER_3, OPTIONS)
+WATCHER = watcher(PLANES_ALONE, OPTIONS)
 
 
-def readings(tests: int = 26) -> list[Reading]:
+def readings(tests: int = 12) -> list[Reading]:
     """With a change that is called on the way, and tests without a temperature."""
-    step = [-0.04, -SPRING_STEP, 0.0]
-    history = History(PLANES_ALONE, tests, change_at=14, step=step, temperatures_missing=0.3)
-    softened = np.array([-1e-4, 1e-4, 1e-4])
+    step = [-0.08, -SPRING_STEP, 0.0]
+    history = History(PLANES_ALONE, tests, change_at=7, step=step, temperatures_missing=0.3)
     return [
-        each if np.isfinite(each.temperature_c) else replace(each, per_kelvin=softened)
-        for each in history.readings(3)
+        each if np.isfinite(each.temperature_c) else softened(each) for each in history.readings(3)
     ]
+
+
+def softened(given: Reading) -> Reading:
+    """What a kelvin does is left in it, for want of a temperature."""
+    assert given.modes is not None
+    per_kelvin = np.full(len(given.modes.values), -1.5e-4)
+    return replace(given, modes=replace(given.modes, per_kelvin=per_kelvin))
 
 
 def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]:
@@ -36,7 +48,7 @@ def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]
     tests = list(begun.tests)
     for reading in given[OPTIONS.baseline_tests :]:
         kept = WatchState.from_bytes(state.to_bytes())
-        again = Watcher(PLANES_ALONE, HANGER_3, OPTIONS)
+        again = watcher(PLANES_ALONE, OPTIONS)
         state, found = again.after(kept, reading)
         tests.append(found)
     return state, tests
@@ -45,7 +57,7 @@ def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]
 def test_a_watch_from_kept_states_is_bit_for_bit_that_of_one_pass() -> None:
     given = readings()
 
-    once = watch_over(given, PLANES_ALONE, HANGER_3, OPTIONS)
+    once = watch_of(given, PLANES_ALONE, OPTIONS)
     _, tests = by_kept_states(given)
 
     assert once.calls
@@ -68,14 +80,14 @@ def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> N
     limits = replace(HANGER_3.thresholds, tension_shift_fraction=0.1)
     watchers = [
         WATCHER,
-        Watcher(PLANES_ALONE, HANGER_3, replace(OPTIONS, limit_years=20)),
-        Watcher((tension,), HANGER_3, OPTIONS),
-        Watcher((replace(tension, values=tension.values * 2), *others), HANGER_3, OPTIONS),
+        watcher(PLANES_ALONE, replace(OPTIONS, limit_years=20)),
+        watcher((tension,), OPTIONS),
+        watcher((replace(tension, values=tension.values * 2), *others), OPTIONS),
     ]
 
     for one, other in itertools.combinations(watchers, 2):
         assert one.key != other.key
-    stricter = Watcher(PLANES_ALONE, replace(HANGER_3, thresholds=limits), OPTIONS)
+    stricter = Watcher(PLANES_ALONE, columns(), replace(HANGER_3, thresholds=limits), OPTIONS)
     assert stricter.key == WATCHER.key
 
 
@@ -83,7 +95,7 @@ def test_a_state_of_another_watch_or_an_older_test_is_refused() -> None:
     given = readings(8)
     state, _ = by_kept_states(given)
     early, _ = WATCHER.begin(given[:2])
-    other = Watcher(PLANES_ALONE, HANGER_3, replace(OPTIONS, limit_years=20))
+    other = watcher(PLANES_ALONE, replace(OPTIONS, limit_years=20))
 
     with pytest.raises(BadInput, match="later"):
         WATCHER.after(state, given[3])

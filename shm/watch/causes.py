@@ -1,0 +1,249 @@
+"""What may have moved a hanger's frequencies: the hypotheses of the diagnosis, over time.
+
+Tension and end stiffness move the frequencies as the model class says, where the hanger is now.
+Beside them stand what the catalogue of effects knows and a comparison with the baseline can show: a
+mass put on or taken off, section lost over a stretch, another bending stiffness, a clock that is
+off, sensors of other mass or in another place. Each as one column a place, by the general bar on
+the ends of the baseline. What none of these does is "unexplained": every mode by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from shm.models import Model
+from shm.models.hanger import PointMass, solve
+from shm.models.hanger.physical import Zone
+from shm.models.turnbuckles import coupled_bar
+from shm.values import PLANES, TENSION, End, FloatArray, Hanger, WatchedQuantity
+from shm.watch.change_point import Direction, Layout
+from shm.watch.options import WatchOptions
+from shm.watch.quantities import MeasuredMode
+
+POINT_MASS, SECTION_LOSS, TIMEBASE = "point_mass", "section_loss", "timebase"
+SENSOR_MASS, BENDING_STIFFNESS, UNEXPLAINED = "sensor_mass", "bending_stiffness", "unexplained"
+
+# Judgement, from what owners of bridges report: most of what lasts are tension and joints; lamps,
+# cables and sensors follow; what nobody thought of is as likely as any one of these.
+_SHARES = {
+    TENSION: 0.4,
+    "springs": 0.28,
+    POINT_MASS: 0.07,
+    SENSOR_MASS: 0.06,
+    SECTION_LOSS: 0.04,
+    BENDING_STIFFNESS: 0.03,
+    TIMEBASE: 0.05,
+    UNEXPLAINED: 0.07,
+}
+# Places along the hanger, a share of the length: a uniform bar is the same from either end.
+_PLACES = (0.06, 0.13, 0.2, 0.28, 0.36, 0.43, 0.5)
+_STRETCHES = ((0.08, 0.15), (0.25, 0.15), (0.5, 0.15), (0.3, 0.4))
+# One unit of each cause: what there is as a rule; six times as much is looked for, too.
+_MASS_SHARE = 0.01
+_SENSOR_KG = 0.3
+_SENSOR_PLACES = np.linspace(0.1, 0.9, 17)
+_LOSS = 0.05
+_STIFFER = 0.03
+_CLOCK = 1e-3
+_UNEXPLAINED = 3e-3
+_SEEN_OF_SENSORS = 1e-2  # technical: of the largest; the rest is within a mode's own scatter
+_STEP_TO = 0.1  # technical: causes are linear to a tenth of a unit and beyond
+_NOWHERE = np.empty(0)
+_ENDS: tuple[End, ...] = ("deck", "arch")
+# Shifts of springs that one cause loosens, in steps, before any data (judgement): a pin that wears
+# takes stiffness from its end in both planes about alike.
+_CORRELATION = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What causes do to the log frequencies of the baseline's `modes` (n,), per unit (n,).
+
+    `sensors` (n, n) is the covariance that sensors of 0.3 kg, put elsewhere each time, give.
+    """
+
+    modes: tuple[MeasuredMode, ...]
+    by_cause: dict[str, FloatArray]
+    sensors: FloatArray
+
+
+def columns_of(
+    model: Model, base: FloatArray, hanger: Hanger, modes: Sequence[MeasuredMode]
+) -> Columns:
+    """Of the hanger at `base` (parameters,): its tension, on its end springs."""
+    values = dict(zip(model.parameter_names, base.tolist(), strict=True))
+    one = np.ones(1)
+    length_m = values.get("theta_L", 1.0) * hanger.length_m * one
+    tension_n = values["theta_F"] * model.hanger.nominal_tension_n * one
+    bar = coupled_bar(hanger, length_m, tension_n).on_springs(model.springs_n_m_rad(base[None]))
+    planes, orders = np.array([(PLANES.index(plane), order - 1) for plane, order in modes]).T
+
+    def log_hz(physical: object) -> FloatArray:
+        found = solve(physical, int(orders.max()) + 1, _NOWHERE, shapes=False)  # type: ignore[arg-type]
+        return np.asarray(np.log(found.frequency_hz[0, planes, orders]))
+
+    still = log_hz(bar)
+    mass_kg = float(hanger.mass_per_length_kg_m * length_m[0])
+
+    def by_mass(place: float) -> FloatArray:
+        small = _STEP_TO * _MASS_SHARE * mass_kg
+        laden = replace(bar, masses=(*bar.masses, PointMass(place * length_m, small * one)))
+        return (log_hz(laden) - still) / _STEP_TO
+
+    def by_loss(place: float, extent: float) -> FloatArray:
+        left = 1 - _STEP_TO * _LOSS
+        zone = Zone(
+            start_m=(place - extent / 2) * length_m,
+            end_m=(place + extent / 2) * length_m,
+            stiffness_factor=left**2 * one,
+            mass_factor=left * one,
+        )
+        return (log_hz(replace(bar, zones=(*bar.zones, zone))) - still) / _STEP_TO
+
+    stiffer = replace(bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + _STIFFER))
+    sensors = np.array([by_mass(place) for place in _SENSOR_PLACES])
+    sensors = sensors * _SENSOR_KG / (_MASS_SHARE * mass_kg)
+    spread = sensors - sensors.mean(axis=0)
+    return Columns(
+        tuple(modes),
+        {
+            POINT_MASS: np.array([by_mass(place) for place in _PLACES]),
+            SECTION_LOSS: np.array([by_loss(*each) for each in _STRETCHES]),
+            BENDING_STIFFNESS: (log_hz(stiffer) - still)[None],
+            TIMEBASE: np.full((1, len(modes)), _CLOCK),
+            SENSOR_MASS: sensors,
+        },
+        spread.T @ spread / len(spread),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What is watched: the layout of columns, directions of change, and scatters.
+
+    Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
+    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that.
+    """
+
+    layout: Layout
+    directions: tuple[Direction, ...]
+    quantities: tuple[WatchedQuantity, ...]
+    scattering: FloatArray
+    scatter_variance: FloatArray
+    scales: FloatArray
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All that may be told to have moved: the quantities, then the causes."""
+        causes = dict.fromkeys(each.name for each in self.directions if not each.members)
+        return (*(each.name for each in self.quantities), *causes)
+
+
+def structure_of(
+    quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
+) -> Structure:
+    """The hypotheses of a hanger."""
+    n, q = len(columns.modes), len(quantities)
+    steps = np.array([each.step_sd for each in quantities])
+    is_tension = np.array([each.name == TENSION for each in quantities])
+    per_kelvin = np.where(
+        is_tension, options.tension_per_kelvin_sd, options.spring_per_kelvin_sd_of_step * steps
+    )
+    per_amplitude = np.where(
+        is_tension,
+        options.tension_per_amplitude_sd,
+        options.spring_per_amplitude_sd_of_step * steps,
+    )
+    prior_sd = np.concatenate(
+        [np.ones(n), steps, per_kelvin, per_amplitude, [options.creep_per_year_sd]]
+    )
+    strength, axes = np.linalg.eigh(columns.sensors)
+    kept = strength > _SEEN_OF_SENSORS * strength[-1]
+    scattering = np.hstack(
+        [
+            axes[:, kept] * np.sqrt(strength[kept]),
+            columns.by_cause[BENDING_STIFFNESS].T,
+            np.ones((n, 1)),
+            np.eye(n),
+        ]
+    )
+    sds = np.concatenate(
+        [
+            np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
+            np.ones(int(kept.sum())),
+            [options.bending_scatter / _STIFFER, options.clock_scatter],
+            np.full(n, options.mode_scatter),
+        ]
+    )
+    return Structure(
+        layout=Layout(n, q, prior_sd),
+        directions=tuple(_directions(quantities, columns)),
+        quantities=tuple(quantities),
+        scattering=scattering,
+        scatter_variance=sds**2,
+        scales=np.array(options.scatter_scales),
+    )
+
+
+def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list[Direction]:
+    n, q = len(columns.modes), len(quantities)
+    steps = np.array([each.step_sd for each in quantities])
+    own = _joint_moves(quantities)
+    found = []
+    for members, root in own:
+        factor = np.zeros((n + q, len(members)))
+        factor[n:] = steps[:, None] * root
+        alone = members == (0,) and quantities[0].name == TENSION
+        share = _SHARES[TENSION] if alone else _SHARES["springs"] / max(len(own) - 1, 1)
+        name = TENSION if alone else "springs"
+        found.append(Direction(name, factor, members, float(np.log(share))))
+    if len(own) == 1:
+        found[0] = replace(found[0], log_prior=float(np.log(_SHARES[TENSION] + _SHARES["springs"])))
+    for cause in (POINT_MASS, SECTION_LOSS, BENDING_STIFFNESS, TIMEBASE):
+        places = columns.by_cause[cause]
+        for place in places:
+            factor = np.zeros((n + q, 1))
+            factor[:n, 0] = place
+            log_prior = float(np.log(_SHARES[cause] / len(places)))
+            may_ramp = cause != TIMEBASE
+            found.append(Direction(cause, factor, (), log_prior, may_ramp))
+    strength, axes = np.linalg.eigh(2 * columns.sensors)
+    kept = strength > _SEEN_OF_SENSORS * strength[-1]
+    moved = np.zeros((n + q, int(kept.sum())))
+    moved[:n] = axes[:, kept] * np.sqrt(strength[kept])
+    sensor = Direction(SENSOR_MASS, moved, (), float(np.log(_SHARES[SENSOR_MASS])), False)
+    free = np.zeros((n + q, n))
+    free[:n] = _UNEXPLAINED * np.eye(n)
+    unknown = Direction(UNEXPLAINED, free, (), float(np.log(_SHARES[UNEXPLAINED])), False)
+    return [*found, sensor, unknown]
+
+
+def _joint_moves(quantities: Sequence[WatchedQuantity]) -> list[tuple[tuple[int, ...], FloatArray]]:
+    """Members and their factor: each quantity alone; springs of one end, of both, with tension.
+
+    A spring of which the data do not tell the end may belong to either. What is one spring alone,
+    or the same springs again, is left out.
+    """
+    everything = range(len(quantities))
+    springs = [j for j in everything if quantities[j].name != TENSION]
+    of_ends = [[j for j in springs if quantities[j].end in (end, None)] for end in _ENDS]
+    joint = dict.fromkeys(tuple(each) for each in (*of_ends, springs) if len(each) > 1)
+    is_read_as_tension = any(len(quantities[j].parameters) > 1 for j in springs)
+    mixed = [tuple(everything)] if joint and is_read_as_tension else []
+    chosen = dict.fromkeys([*((j,) for j in everything), *joint, *mixed])
+    return [(each, _root(each, springs, len(quantities))) for each in chosen]
+
+
+def _root(members: tuple[int, ...], springs: Sequence[int], q: int) -> FloatArray:
+    """A factor (q, members) of the covariance of shifts, in steps, of which `springs` are alike."""
+    n = len(members)
+    among = np.eye(n)
+    alike = np.isin(members, springs)
+    among[np.ix_(alike, alike)] += _CORRELATION * (1 - np.eye(int(alike.sum())))
+    root = np.zeros((q, n))
+    root[list(members)] = np.linalg.cholesky(among)
+    return root

@@ -1,0 +1,393 @@
+"""Has anything changed? Shiryaev-Roberts over all beginnings and causes, in closed form.
+
+Each test is y = A a + H d + errors: `a` are the modes' own levels, how they go with temperature,
+excitation and slow creep, all unknown; `d` is a change, from some test on at once (a step) or ever
+further (a ramp). Given what tests scatter by, all is normal, and what every change has for it
+follows from sums over the tests: with V the covariance of `a` if nothing changes, J = sum H'WH -
+U'VU and v = sum H'Wy - U'V sum A'Wy, where U = sum A'WH over the tests since (the generalised
+likelihood ratio of Willsky and Jones 1976, here averaged over a prior). So hypotheses cost next to
+nothing, and late tests take their place.
+
+Each change has a mass in years: the time in which it may have begun times its Bayes factor to no
+change. Their sum is the Shiryaev-Roberts statistic. Under no change each mass stays the same on
+average, and all masses together are the time watched: a statistic of which that is true exceeds L
+years not before L years on average (Shiryaev 1963, Roberts 1966, Pollak 1985).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from shm.values import FloatArray, IntArray
+
+STEP, RAMP = 0, 1
+SIZES = np.array([1.0, 6.0])
+"""Of a change, in units of its prior: what may not be missed, and what nobody can miss."""
+
+LOG_SHARES = np.log([0.9, 0.1])
+_ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
+_NEGLIGIBLE = 1e-6  # of all masses: what it adds is not told
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """One way to change: `factor` (columns, r) maps r independent unit normals to the change.
+
+    `columns` are the modes (n), then the watched quantities (q). `name` is the cause's, `members`
+    the quantities that move. `log_prior` is that of this cause given a change, `may_ramp` whether
+    it may come slowly.
+    """
+
+    name: str
+    factor: FloatArray
+    members: tuple[int, ...]
+    log_prior: float
+    may_ramp: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A called change: the test at which it began, its time, and whether it goes on.
+
+    `precision` (n + q, n + q) is that of its size before the tests after the call: which causes
+    called it.
+    """
+
+    first: int
+    years: float
+    is_ramp: bool
+    precision: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What stands where in the columns of a test: `n` modes, `q` quantities, then covariates.
+
+    `prior_sd` (columns,) are those of the null's parameters; the quantities' own columns are no
+    part of it, since the modes' levels hold them.
+    """
+
+    n: int
+    q: int
+    prior_sd: FloatArray
+
+    @property
+    def null(self) -> IntArray:
+        """The columns of the null."""
+        covariates = np.arange(self.n + self.q, len(self.prior_sd))
+        return np.concatenate([np.arange(self.n), covariates])
+
+    @property
+    def change(self) -> slice:
+        """The columns of which a change is made."""
+        return slice(0, self.n + self.q)
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Z'WZ (tests, K, z, z), Z'Wy (tests, K, z) and the log density's constant (tests, K)."""
+
+    square: FloatArray
+    cross: FloatArray
+    constant: FloatArray
+
+
+def sums_of(
+    columns: FloatArray, values: FloatArray, variances: FloatArray, covariance: FloatArray
+) -> Sums:
+    """Of tests with `columns` (T, n, z), `values` and `variances` (T, n), infinite where a mode was
+    not measured, and the `covariance` (T, K, n, n) of their scatter beside that."""
+    own = np.where(np.isfinite(variances), variances, _ABSENT)
+    n = values.shape[1]
+    joint = covariance + own[:, None, :, None] * np.eye(n)
+    weight = np.linalg.inv(joint)
+    weighted = weight @ columns[:, None]
+    of_values = np.einsum("tkij,tj->tki", weight, values)
+    constant = -(np.einsum("tki,ti->tk", of_values, values) + np.linalg.slogdet(joint)[1]) / 2
+    return Sums(
+        np.swapaxes(columns, 1, 2)[:, None] @ weighted,
+        np.einsum("tki,tiz->tkz", of_values, columns),
+        constant,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What all tests say: of each change (beginnings, K, kinds, D, sizes) its log mass in years.
+
+    `log_null` (K,) is the log probability of each scatter without change. `beginnings` are numbers
+    of tests: the change came before it. `years` are the tests' times.
+    """
+
+    layout: Layout
+    directions: tuple[Direction, ...]
+    years: FloatArray
+    beginnings: IntArray
+    called: tuple[Told, ...]
+    log_null: FloatArray
+    log_mass: FloatArray
+    null_mean: FloatArray
+    null_covariance: FloatArray
+    seen: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+
+    @property
+    def log_statistic(self) -> float:
+        """Log of the Shiryaev-Roberts statistic in years."""
+        return _total(self.log_mass)
+
+    @property
+    def log_evidence(self) -> float:
+        """The same without the changes that one test alone speaks for, and by the scatter without
+        change that is likeliest, so that the rate of false calls holds for each scatter."""
+        if not len(self.beginnings):
+            return -math.inf
+        choices = math.log(len(self.log_null))
+        worst = float(self.log_null.max()) + choices
+        return _total(self.log_mass[self.beginnings < len(self.years) - 1]) - max(worst, 0.0)
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """Probability of each change, given that there is one."""
+        if not self.log_mass.size:
+            return self.log_mass
+        return np.exp(self.log_mass - self.log_statistic)
+
+    @property
+    def log_of_last(self) -> float:
+        """By how much the last test alone speaks for any change: the largest log Bayes factor."""
+        if not len(self.beginnings) or self.beginnings[-1] != len(self.years) - 1:
+            return 0.0
+        waited = math.log(max(float(_waited(self.years, self.beginnings)[-1]), 1e-12))
+        prior = np.array([each.log_prior for each in self.directions])[:, None] + LOG_SHARES
+        own = self.log_mass[-1, :, STEP] - waited - prior - self.log_null[:, None, None]
+        kinds = np.log([1 + each.may_ramp for each in self.directions])[:, None]
+        by_scatter = (own + kinds).max(axis=(1, 2))
+        return float(np.exp(self.log_null) @ by_scatter)
+
+    def by_direction(self) -> FloatArray:
+        """Probability (D,) of each direction, given a change."""
+        return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
+
+    def leading(self, shares: FloatArray) -> list[tuple[int, ...]]:
+        """The changes that make up nearly all of `shares`, as indices."""
+        kept = shares > _NEGLIGIBLE * max(float(shares.max(initial=0.0)), 1e-300)
+        return [tuple(each) for each in np.argwhere(kept).tolist()]
+
+    def change_at(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Mean (n + q,) and factor (n + q, r) of the covariance of one change, as of the last test.
+
+        A ramp's is what has come of it by then.
+        """
+        at, k, kind, d, size = index
+        information, pull, _ = self.seen
+        factor = SIZES[size] * self.directions[d].factor
+        inner = np.eye(factor.shape[1]) + factor.T @ information[kind, at, k] @ factor
+        root = np.linalg.cholesky(np.linalg.inv((inner + inner.T) / 2))
+        mean = factor @ (root @ (root.T @ (factor.T @ pull[kind, at, k])))
+        done = self.progress(at) if kind == RAMP else 1.0
+        return done * mean, done * factor @ root
+
+    def progress(self, at: int) -> float:
+        """Years since a ramp began: half way between the two tests."""
+        return float(self.years[-1] - _ramp_from(self.years, self.beginnings)[at])
+
+    def of_null(
+        self, index: tuple[int, ...], loadings: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """What `loadings` (rows, null) of the null's parameters are, given one change.
+
+        Mean (rows,) and covariance (rows, rows).
+        """
+        at, k, kind, d, size = index
+        information, pull, response = self.seen
+        factor = SIZES[size] * self.directions[d].factor
+        inner = np.linalg.inv(
+            np.eye(factor.shape[1]) + factor.T @ information[kind, at, k] @ factor
+        )
+        mean = factor @ inner @ (factor.T @ pull[kind, at, k])
+        covariance, moved = self.null_covariance[k], response[kind, at, k]
+        reach = loadings @ covariance
+        of_change = reach @ moved @ factor
+        return (
+            np.asarray(loadings @ self.null_mean[k] - reach @ (moved @ mean)),
+            np.asarray(reach @ loadings.T + of_change @ inner @ of_change.T),
+        )
+
+
+def evidence_of(
+    sums: Sums,
+    years: FloatArray,
+    baseline_tests: int,
+    layout: Layout,
+    directions: Sequence[Direction],
+    called: Sequence[Told] = (),
+    most_beginnings: int = 60,
+) -> Evidence:
+    """The evidence of `sums` of tests (T,) at `years`, ascending; no change before the baseline's.
+
+    Changes that were `called` are part of the null, each with a level of its own from there on; a
+    new one is looked for after the last of them.
+    """
+    tests = len(years)
+    suffix = [_suffix(_times(sums.square, years**k)) for k in range(3)]
+    pulls = [_suffix(_times(sums.cross, years**k)) for k in range(2)]
+    null = layout.null
+    mean, covariance, log_null = _null(sums, years, layout, called, suffix, pulls)
+    log_null = log_null - _total(log_null)
+    first = max([baseline_tests, *(each.first + 1 for each in called)])
+    beginnings = _chosen(np.arange(first, tests), most_beginnings)
+    part = layout.change
+    if not len(beginnings):
+        nothing = np.zeros((0, len(log_null), 2, len(directions), len(SIZES)))
+        empty = np.zeros((2, 0))
+        return Evidence(
+            layout, tuple(directions), years, beginnings, tuple(called),
+            log_null, nothing, mean, covariance, (empty, empty, empty),
+        )  # fmt: skip
+    from_years = _ramp_from(years, beginnings)
+    at = [each[beginnings] for each in suffix]
+    crossed = [each[beginnings] for each in pulls]
+    since = from_years[:, None, None, None]
+    informations, cross, responses = [], [], []
+    for kind in (STEP, RAMP):
+        if kind == STEP:
+            own = at[0][:, :, part, part]
+            pull = crossed[0][:, :, part]
+            blocks = [at[0][:, :, null, part]]
+            for each in called:
+                blocks.append(at[0][:, :, part, part])
+                if each.is_ramp:
+                    blocks.append((at[1] - each.years * at[0])[:, :, part, part])
+        else:
+            own = (at[2] - 2 * since * at[1] + since**2 * at[0])[:, :, part, part]
+            pull = (crossed[1] - since[..., 0] * crossed[0])[:, :, part]
+            ramp = at[1] - since * at[0]
+            blocks = [ramp[:, :, null, part]]
+            for each in called:
+                blocks.append(ramp[:, :, part, part])
+                if each.is_ramp:
+                    both = at[2] - (since + each.years) * at[1] + since * each.years * at[0]
+                    blocks.append(both[:, :, part, part])
+        response = np.concatenate(blocks, axis=2)
+        moved = covariance @ response
+        informations.append(own - np.swapaxes(response, 2, 3) @ moved)
+        cross.append(pull - np.einsum("bkzc,kz->bkc", response, mean))
+        responses.append(response)
+    seen = (np.array(informations), np.array(cross), np.array(responses))
+    waited = np.log(np.maximum(_waited(years, beginnings), 1e-12))
+    log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
+    log_mass = log_mass + waited[:, None, None, None, None]
+    return Evidence(
+        layout, tuple(directions), years, beginnings, tuple(called),
+        log_null, log_mass, mean, covariance, seen,
+    )  # fmt: skip
+
+
+def _null(
+    sums: Sums,
+    years: FloatArray,
+    layout: Layout,
+    called: Sequence[Told],
+    suffix: Sequence[FloatArray],
+    pulls: Sequence[FloatArray],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean (K, p), covariance (K, p, p) and log evidence (K,) of no (further) change."""
+    null, part = layout.null, layout.change
+    total, pull = suffix[0][0], pulls[0][0]
+    pieces = [(each, power) for each in called for power in ((0, 1) if each.is_ramp else (0,))]
+    size = part.stop
+    count = len(null) + size * len(pieces)
+    joint, vector = np.zeros((len(total), count, count)), np.zeros((len(total), count))
+    prior = np.zeros((count, count))
+    joint[:, : len(null), : len(null)] = total[:, null][:, :, null]
+    vector[:, : len(null)] = pull[:, null]
+    prior[range(len(null)), range(len(null))] = layout.prior_sd[null] ** -2.0
+    for a, (told, power) in enumerate(pieces):
+        columns = slice(len(null) + a * size, len(null) + (a + 1) * size)
+        prior[columns, columns] = told.precision
+        lifted = _lifted([each[told.first] for each in suffix], told.years, power)
+        joint[:, : len(null), columns] = lifted[:, null][:, :, part]
+        joint[:, columns, : len(null)] = np.swapaxes(lifted[:, null][:, :, part], 1, 2)
+        vector[:, columns] = _lifted([each[told.first] for each in pulls], told.years, power)[
+            :, part
+        ]
+        for b, (other, other_power) in enumerate(pieces):
+            late = max(told.first, other.first)
+            moments = [each[late] for each in suffix]
+            shifted = _lifted(moments, told.years, power)
+            if other_power:
+                further = _lifted(moments[1:], told.years, power)
+                shifted = further - other.years * shifted
+            others = slice(len(null) + b * size, len(null) + (b + 1) * size)
+            joint[:, columns, others] = shifted[:, part, part]
+    joint += prior
+    covariance = np.linalg.inv(joint)
+    mean = np.einsum("kij,kj->ki", covariance, vector)
+    log_evidence = sums.constant.sum(axis=0) + (vector * mean).sum(axis=1) / 2
+    log_evidence += (np.linalg.slogdet(prior)[1] - np.linalg.slogdet(joint)[1]) / 2
+    return mean, covariance, np.asarray(log_evidence)
+
+
+def _lifted(moments: Sequence[FloatArray], since: float, power: int) -> FloatArray:
+    """Sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
+    return moments[1] - since * moments[0] if power else moments[0]
+
+
+def _log_factors(
+    directions: Sequence[Direction], seen: tuple[FloatArray, FloatArray, FloatArray]
+) -> FloatArray:
+    """Log prior times Bayes factor (beginnings, K, kinds, D, sizes) of each change."""
+    information, pull, _ = seen
+    shape = (*information.shape[1:3], 2, len(directions), len(SIZES))
+    found = np.full(shape, -np.inf)
+    for d, direction in enumerate(directions):
+        kinds = (STEP, RAMP) if direction.may_ramp else (STEP,)
+        for kind in kinds:
+            inner = direction.factor.T @ information[kind] @ direction.factor
+            strength, axes = np.linalg.eigh((inner + np.swapaxes(inner, 2, 3)) / 2)
+            strength = np.maximum(strength, 0)[..., None]
+            along = np.einsum("bkr,bkrs->bks", pull[kind] @ direction.factor, axes)[..., None]
+            grown = 1 + SIZES**2 * strength
+            factor = ((SIZES * along) ** 2 / grown - np.log(grown)).sum(axis=2) / 2
+            found[:, :, kind, d] = factor + LOG_SHARES + direction.log_prior - math.log(len(kinds))
+    return found
+
+
+def _ramp_from(years: FloatArray, beginnings: IntArray) -> FloatArray:
+    """When a ramp began (beginnings,): at the test before the first that shows it."""
+    return np.asarray(years[beginnings - 1])
+
+
+def _waited(years: FloatArray, beginnings: IntArray) -> FloatArray:
+    """Years (beginnings,) in which each may have begun: since the one before, thinned or not."""
+    before = np.concatenate([beginnings[:1] - 1, beginnings[:-1]])
+    return np.asarray(years[beginnings] - years[before])
+
+
+def _chosen(beginnings: IntArray, most: int) -> IntArray:
+    """Of beginnings all of the last `most` / 2, of older ones evenly as many."""
+    if len(beginnings) <= most:
+        return beginnings
+    recent = most // 2
+    old = beginnings[:-recent]
+    picked = np.unique(np.linspace(0, len(old) - 1, most - recent).round().astype(int))
+    return np.concatenate([old[picked], beginnings[-recent:]])
+
+
+def _suffix(values: FloatArray) -> FloatArray:
+    """Sums over all tests from each on, along the first axis."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
+
+
+def _times(values: FloatArray, weight: FloatArray) -> FloatArray:
+    return np.asarray(values * weight.reshape(-1, *([1] * (values.ndim - 1))))
+
+
+def _total(log_mass: FloatArray) -> float:
+    """Log of the sum; -inf of nothing."""
+    return float(np.logaddexp.reduce(log_mass.ravel())) if log_mass.size else -math.inf

@@ -1,0 +1,109 @@
+"""Tests that agree with none beside them: another hanger was hit, a clock was off, a bad day.
+
+A test counts where it agrees with what was before it or with a test next to it, before or after.
+So a blunder counts in nothing as long as it stands alone, and what lasts counts from its second
+test on, however large it is. Nothing here asks which cause it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from shm.values import BoolArray, FloatArray
+
+_SELDOM = 1e-3  # of tests that agree so many are taken for such that do not
+_NEAR = 2  # tests to each side: a blunder may lie between two that agree
+_BEFORE = 5  # counted tests that say where the hanger was
+_AGREEING = 0.4  # judgement: of those before; two of five
+_WIDER, _TAIL = 10.0, 2.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Tests (T,) mode by mode: `values` and `variances` (T, n), infinite where not measured.
+
+    `factors` (n, c) with `sds` (c,) are what tests of one state scatter along, and by; `doubt`
+    (T, n) is what an unknown temperature does.
+    """
+
+    values: FloatArray
+    variances: FloatArray
+    doubt: FloatArray
+    factors: FloatArray
+    sds: FloatArray
+
+    def distance(self, one: int, other: int) -> tuple[float, int, float]:
+        """Squared length of the difference, its modes, log determinant of its covariance."""
+        both = np.isfinite(self.variances[one]) & np.isfinite(self.variances[other])
+        if not both.any():
+            return 0.0, 0, 0.0
+        scatter = self.factors[both] * self.sds
+        covariance = 2 * scatter @ scatter.T
+        apart = (self.doubt[one] - self.doubt[other])[both]
+        for doubt in (self.doubt[one][both], self.doubt[other][both], apart):
+            covariance += np.outer(doubt, doubt) / 2
+        covariance += np.diag((self.variances[one] + self.variances[other])[both])
+        off = (self.values[one] - self.values[other])[both]
+        return (
+            float(off @ np.linalg.solve(covariance, off)),
+            int(both.sum()),
+            float(np.linalg.slogdet(covariance)[1]),
+        )
+
+    def agree(self, one: int, other: int) -> bool:
+        """Whether two tests may be of one state."""
+        square, modes, _ = self.distance(one, other)
+        return modes > 0 and square < float(scipy.special.chdtri(modes, _SELDOM))
+
+
+def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
+    """Which of the tests (T,) count; `known` is what was found when there were fewer of them.
+
+    Of a baseline of three tests or more those count that agree with half of the others. What was
+    found of a test stays once two tests have followed it.
+    """
+    tests = len(seen.values)
+    found = np.zeros(tests, bool)
+    settled = max(len(known) - _NEAR, 0)
+    found[:settled] = known[:settled]
+    first = min(baseline_tests, tests)
+    if settled < first:
+        found[:first] = _of_baseline(seen, first)
+        settled = first
+    for test in range(settled, tests):
+        before = np.flatnonzero(found[:test])[-_BEFORE:]
+        agreeing = sum(seen.agree(test, int(each)) for each in before)
+        near = [
+            test + step for step in range(-_NEAR, _NEAR + 1) if step and 0 <= test + step < tests
+        ]
+        found[test] = agreeing >= _AGREEING * len(before) or any(
+            seen.agree(test, each) for each in near if each >= first
+        )
+    return found
+
+
+def _of_baseline(seen: Seen, first: int) -> BoolArray:
+    measured = np.isfinite(seen.variances[:first]).any(axis=1)
+    if measured.sum() < 3:
+        return np.asarray(measured)
+    agreeing = np.array(
+        [
+            [one != other and seen.agree(one, other) for other in range(first)]
+            for one in range(first)
+        ]
+    )
+    found = measured & (agreeing.sum(axis=1) >= (measured.sum() - 1) / 2)
+    return np.asarray(found if found.any() else measured)
+
+
+def outlier_probability(seen: Seen, test: int, before: int, prior: float) -> float:
+    """That `test` is a blunder, by how it lies to the test `before` it that counts."""
+    square, d, _ = seen.distance(test, before)
+    if not d:
+        return prior
+    wide = -(_TAIL + d) / 2 * np.log1p(square / _TAIL / _WIDER**2) - d * np.log(_WIDER)
+    odds = np.log(prior / (1 - prior)) + wide + square / 2
+    return float(1 / (1 + np.exp(-np.clip(odds, -700, 700))))

@@ -1,0 +1,440 @@
+"""What the evidence says after a test: what changed, since when, and how far each quantity is.
+
+Shifts in the units that people read, of mixtures of normal distributions in the coordinate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+import scipy
+
+from shm.values import (
+    NAN,
+    TENSION,
+    Change,
+    Drift,
+    FloatArray,
+    Hanger,
+    Moved,
+    Reading,
+    WatchedQuantity,
+)
+from shm.watch.change_point import STEP, Evidence
+from shm.watch.conditions import DAYS_PER_YEAR
+from shm.watch.options import WatchOptions
+from shm.watch.quantities import coordinate_of, shift_of, value_at
+
+_ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
+_TAIL = 0.05  # 90 % lie between
+_DIGITS = 3  # probabilities that read alike are ordered by tension first
+_MOST = 120  # technical: changes that a mixture is made of, the likeliest
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What all tests of one hanger share; `start` is the time of the first reading."""
+
+    quantities: tuple[WatchedQuantity, ...]
+    hanger: Hanger
+    options: WatchOptions
+    start: datetime
+
+    def at(self, years: float) -> datetime:
+        """The time so many years from the start."""
+        return self.start + timedelta(days=years * DAYS_PER_YEAR)
+
+
+def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
+    """That something has changed since the last call, if changes come at the rate assumed."""
+    odds = evidence.log_statistic + math.log(options.change_rate_per_year)
+    return 1 / (1 + math.exp(min(-odds, 700.0)))
+
+
+def changed(
+    subject: Subject,
+    evidence: Evidence,
+    causes: Evidence,
+    reading: Reading,
+    before: float,
+    outlier: float,
+    effects: FloatArray,
+) -> Change:
+    """The change since the last call; `before` is the probability that there was one earlier, and
+    `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is
+    that of this test being a blunder. `effects` (r, n + q) are what a change does to the
+    frequencies that owners look at."""
+    now = probability_of_change(evidence, subject.options)
+    began_after, began_by = _began(subject, causes, reading)
+    return Change(
+        evidence_years=math.exp(min(evidence.log_evidence, 700.0)),
+        limit_years=subject.options.limit_years,
+        probability=1 - (1 - before) * (1 - now),
+        sudden=_sudden(causes),
+        began_after=began_after,
+        began_by=began_by,
+        moved=_moved(subject.quantities, causes),
+        outlier_probability=outlier,
+        material_probability=_material(subject, causes, effects),
+    )
+
+
+def _material(subject: Subject, evidence: Evidence, effects: FloatArray) -> float:
+    """The probability that a change, if there is one, moves one of the frequencies of `effects` by
+    more than what is to be told."""
+    if not len(evidence.beginnings):
+        return 0.0
+    weights, changes = _leading(evidence, np.ones(len(evidence.directions), bool))
+    return float(weights @ _materials(subject, evidence, changes, effects))
+
+
+def _materials(
+    subject: Subject,
+    evidence: Evidence,
+    changes: Sequence[tuple[int, ...]],
+    effects: FloatArray,
+) -> FloatArray:
+    """The same (changes,) of each."""
+    least, found = subject.options.least_frequency_shift, []
+    for each in changes:
+        mean, factor = evidence.change_at(each)
+        middle = effects @ mean
+        sd = np.maximum(np.sqrt(np.square(effects @ factor).sum(axis=1)), 1e-12)
+        tails = scipy.special.ndtr((-least - middle) / sd) + scipy.special.ndtr(
+            (middle - least) / sd
+        )
+        found.append(float(tails.max()))
+    return np.array(found)
+
+
+def _sudden(evidence: Evidence) -> float:
+    if not len(evidence.beginnings):
+        return NAN
+    return float(evidence.shares[:, :, STEP].sum())
+
+
+def _began(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[datetime, datetime]:
+    """Between which times the change began, with 90 % probability; the test's own if none can."""
+    beginnings, years = evidence.beginnings, evidence.years
+    if not len(beginnings):
+        return reading.time, reading.time
+    reached = np.cumsum(evidence.shares.sum(axis=(1, 2, 3, 4)))
+    last = len(beginnings) - 1
+    first, final = (min(int(np.searchsorted(reached, p)), last) for p in (_TAIL, 1 - _TAIL))
+    return (
+        subject.at(float(years[beginnings[first] - 1])),
+        subject.at(float(years[beginnings[final]])),
+    )
+
+
+def _moved(quantities: Sequence[WatchedQuantity], evidence: Evidence) -> tuple[Moved, ...]:
+    """Each quantity as one that changed, and each other cause, the likeliest first.
+
+    A spring precedes the tension that is as likely: a part of its loss may be read as tension.
+    """
+    if not len(evidence.beginnings):
+        return ()
+    by_direction = evidence.by_direction()
+    causes = dict.fromkeys(each.name for each in evidence.directions if not each.members)
+    parts = [
+        *(
+            np.array([j in each.members for each in evidence.directions])
+            for j in _numbers(quantities)
+        ),
+        *(np.array([each.name == cause for each in evidence.directions]) for cause in causes),
+    ]
+    names = [*(each.name for each in quantities), *causes]
+    probability = np.array([min(float(by_direction[part].sum()), 1.0) for part in parts])
+    is_tension = [name == TENSION for name in names]
+    order = np.lexsort([np.array(is_tension), -probability.round(_DIGITS)]).tolist()
+    return tuple(
+        _as_changed(quantities, evidence, names, j, parts[j], float(probability[j])) for j in order
+    )
+
+
+def _numbers(quantities: Sequence[WatchedQuantity]) -> range:
+    return range(len(quantities))
+
+
+def _as_changed(
+    quantities: Sequence[WatchedQuantity],
+    evidence: Evidence,
+    names: Sequence[str],
+    j: int,
+    part: FloatArray,
+    probability: float,
+) -> Moved:
+    """What is at `j` of the names, given that it changed: by the directions of its `part`.
+
+    Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
+    """
+    weights, changes = _leading(evidence, part)
+    found = [evidence.change_at(each) for each in changes]
+    n = evidence.layout.n
+    together, alike = _company(evidence, part, names)
+    if j < len(quantities):
+        mean = np.array([each[0][n + j] for each in found])
+        sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
+        shift = shift_of_mixture(quantities[j], weights, mean, sd)
+        end, plane = quantities[j].end, quantities[j].plane
+    else:
+        means = np.array([each[0][:n].mean() for each in found])
+        square = np.array([float((each[1][:n].mean(axis=0) ** 2).sum()) for each in found])
+        mean_all = float(weights @ means)
+        spread = float(weights @ (square + (means - mean_all) ** 2))
+        shift, end, plane = Shift(mean_all, math.sqrt(max(spread, 0.0))), None, None
+    return Moved(
+        quantity=names[j],
+        probability=probability,
+        shift_mean=shift.mean,
+        shift_sd=shift.sd,
+        end=end,
+        plane=plane,
+        alike=alike,
+        together=together,
+    )
+
+
+def _leading(evidence: Evidence, part: FloatArray) -> tuple[FloatArray, list[tuple[int, ...]]]:
+    """The likeliest changes in the directions of `part` (D,) with their weights, which add to 1."""
+    log_mass = np.where(part[:, None], evidence.log_mass, -np.inf)
+    flat = log_mass.ravel()
+    most = min(_MOST, len(flat))
+    best = np.argpartition(flat, len(flat) - most)[-most:]
+    best = best[np.isfinite(flat[best])]
+    weights = np.exp(flat[best] - np.logaddexp.reduce(flat[best])) if len(best) else flat[best]
+    places = np.array(np.unravel_index(best, log_mass.shape)).T
+    return np.asarray(weights), [tuple(each) for each in places.tolist()]
+
+
+def _company(
+    evidence: Evidence, part: FloatArray, names: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What moves with it in the likeliest direction of `part`; what does as well without.
+
+    The latter are what directions without it have whose evidence is as good, those aside that only
+    add to another such.
+    """
+    mass = np.logaddexp.reduce(np.moveaxis(evidence.log_mass, 3, 0).reshape(len(part), -1), axis=1)
+    sets = [
+        frozenset(names[j] for j in each.members) or frozenset([each.name])
+        for each in evidence.directions
+    ]
+    joined: dict[frozenset[str], float] = {}
+    for each, log_mass in zip(sets, mass.tolist(), strict=True):
+        joined[each] = float(np.logaddexp(joined.get(each, -math.inf), log_mass))
+    likeliest = sets[int(np.argmax(np.where(part, mass, -np.inf)))]
+    close = [
+        each
+        for each, log_mass in joined.items()
+        if joined[likeliest] - log_mass < _ALIKE_NATS and not each & likeliest
+    ]
+    fewest = [each for each in close if not any(other < each for other in close)]
+    own = {n for j, n in enumerate(names) if n in likeliest}
+    chosen = set().union(*fewest) - own
+    # What it is, is not among what moves with it.
+    first = next((n for n in names if n in likeliest), "")
+    return tuple(n for n in names if n in own and n != first), tuple(
+        n for n in names if n in chosen
+    )
+
+
+def drifted(
+    subject: Subject,
+    evidence: Evidence,
+    causes: Evidence,
+    reading: Reading,
+    effects: FloatArray,
+) -> tuple[Drift, ...]:
+    """The shift of each quantity since the baseline, called changes and a possible new one.
+
+    Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
+    would pass for none, and be surer the smaller it is. The probability of a shift beyond the
+    threshold is averaged over all; where springs trade with the tension, and no frequency moves by
+    more than what is to be told (`effects`), nothing is beyond.
+    """
+    probability = probability_of_change(evidence, subject.options)
+    evidence = causes
+    loadings = _of_called(evidence)
+    nulls = [
+        (
+            float(weight),
+            loadings @ evidence.null_mean[k],
+            loadings @ evidence.null_covariance[k] @ loadings.T,
+        )
+        for k, weight in enumerate(np.exp(evidence.log_null))
+    ]
+    q = len(subject.quantities)
+    everything = np.ones(len(evidence.directions), bool)
+    weights, means, sds, changes = _shifts(evidence, everything, loadings)
+    none = np.array([each[0] for each in nulls]) * (1 - probability)
+    all_weights = np.concatenate([none, probability * weights]) if len(weights) else none
+    all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
+    sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
+    all_sds = np.concatenate([sds_of_null.reshape(-1, q), sds])
+    told = np.ones(len(all_weights))
+    if len(changes) and not evidence.called:
+        told[len(none) :] = _materials(subject, evidence, changes, effects)
+    found = []
+    for j, quantity in enumerate(subject.quantities):
+        chosen = (all_weights, all_means, all_sds)
+        if not evidence.called and len(evidence.beginnings):
+            part = np.array([j in each.members for each in evidence.directions])
+            own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
+            chosen = own[:3] if len(own[0]) else chosen
+        shift = shift_of_mixture(quantity, chosen[0], chosen[1][:, j], chosen[2][:, j])
+        moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
+        threshold = threshold_of(quantity, subject.hanger)
+        chance = beyond(
+            quantity,
+            (told * all_weights)[moving],
+            all_means[moving, j],
+            all_sds[moving, j],
+            threshold,
+            subject.options.least_frequency_shift,
+        )
+        found.append(_drift(subject, quantity, reading, shift, threshold, chance))
+    return tuple(found)
+
+
+def _of_called(evidence: Evidence) -> FloatArray:
+    """Loadings (q, null) of the called changes on the shift of each quantity by now."""
+    layout, now = evidence.layout, float(evidence.years[-1])
+    size = layout.n + layout.q
+    blocks = [np.zeros((layout.q, len(layout.null)))]
+    own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
+    for each in evidence.called:
+        blocks.append(own)
+        if each.is_ramp:
+            blocks.append((now - each.years) * own)
+    assert all(block.shape[1] in (size, len(layout.null)) for block in blocks)
+    return np.hstack(blocks)
+
+
+def _shifts(
+    evidence: Evidence, part: FloatArray, loadings: FloatArray, *, alone: bool = True
+) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[int, ...]]]:
+    """Weights (B,), means and sds (B, q) of the quantities' shifts, given one change of `part`.
+
+    Unless `alone` may, a change that the last test by itself speaks for does not count.
+    """
+    layout = evidence.layout
+    if not len(evidence.beginnings):
+        return np.zeros(0), np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
+    weights, changes = _leading(evidence, part)
+    if not alone:
+        kept = [n for n, each in enumerate(changes) if each[0] < len(evidence.beginnings) - 1]
+        weights, changes = weights[kept], [changes[n] for n in kept]
+        weights = weights / weights.sum() if len(kept) else weights
+    means, sds = [], []
+    for each in changes:
+        mean, factor = evidence.change_at(each)
+        own_mean, own = mean[layout.n :], factor[layout.n :]
+        covariance = own @ own.T
+        if evidence.called:
+            before, spread = evidence.of_null(each, loadings)
+            own_mean, covariance = own_mean + before, covariance + spread
+        means.append(own_mean)
+        sds.append(np.sqrt(np.maximum(np.diag(covariance), 0)))
+    shape = (-1, layout.q)
+    return weights, np.array(means).reshape(shape), np.array(sds).reshape(shape), changes
+
+
+def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:
+    """The shift of which its owner must know: a fraction of the tension, or decades."""
+    limits = hanger.thresholds
+    if quantity.name == TENSION:
+        return limits.tension_shift_fraction
+    return limits.stiffness_shift_decades
+
+
+def _drift(
+    subject: Subject,
+    quantity: WatchedQuantity,
+    reading: Reading,
+    shift: Shift,
+    threshold: float,
+    probability: float,
+) -> Drift:
+    at_rest = value_at(quantity, 0.0)
+    is_tension = quantity.name == TENSION
+    return Drift(
+        hanger=subject.hanger.id,
+        test=reading.test,
+        time=reading.time,
+        quantity=quantity.name,
+        baseline=quantity.baseline,
+        value=at_rest * (1 + shift.mean) if is_tension else at_rest + shift.mean,
+        shift_mean=shift.mean,
+        shift_sd=shift.sd,
+        threshold=threshold,
+        probability=probability,
+    )
+
+
+# Technical: exact for polynomials of degree 13.
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Mean and sd of a shift."""
+
+    mean: float
+    sd: float
+
+
+def shift_of_mixture(
+    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
+) -> Shift:
+    """Of normal distributions (B,) in the coordinate; no shift at all with what `weights` leave.
+
+    By Gauss-Hermite quadrature of seven nodes in each.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights = weights[kept]
+    mean, sd = mean[kept], sd[kept]
+    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
+    first = float(weights @ shifts @ _WEIGHTS)
+    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
+    second += (1 - float(weights.sum())) * first**2
+    return Shift(first, math.sqrt(max(second, 0.0)))
+
+
+def beyond(
+    quantity: WatchedQuantity,
+    weights: FloatArray,
+    mean: FloatArray,
+    sd: FloatArray,
+    threshold: float,
+    least: float = 0.0,
+) -> float:
+    """Probability of a shift beyond a threshold, the likelier way, by the same mixture.
+
+    Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
+    less than `least`, a spring's coordinate, is not beyond.
+    """
+    kept = weights > _NEGLIGIBLE
+    weights, mean = weights[kept], mean[kept]
+    sd = np.maximum(sd[kept], 1e-12)
+    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
+    if quantity.name != TENSION:
+        low, high = min(low, -least), max(high, least)
+    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
+    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
+    return min(max(down, up), 1.0)
+
+
+def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
+    """The coordinate of a shift; infinite where the quantity's table ends before it."""
+    tension = quantity.name == TENSION
+    value = quantity.baseline * (1 + shift) if tension else quantity.baseline + shift
+    if not min(quantity.values) < value < max(quantity.values):
+        return math.copysign(math.inf, shift)
+    return coordinate_of(quantity, value)

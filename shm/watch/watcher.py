@@ -1,0 +1,472 @@
+"""The watch of one hanger, test by test: what stands after each rests on the tests up to it alone.
+
+After a call the called change is part of what is known, and a further one is looked for.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput, UsageError
+from shm.values import (
+    TENSION,
+    BoolArray,
+    Change,
+    FloatArray,
+    Hanger,
+    IntArray,
+    Reading,
+    WatchedQuantity,
+    WatchedTest,
+)
+from shm.watch.causes import Columns, Structure, structure_of
+from shm.watch.change_point import (
+    SIZES,
+    Evidence,
+    Sums,
+    Told,
+    evidence_of,
+    sums_of,
+)
+from shm.watch.conditions import DAYS_PER_YEAR, Warmth, years_between
+from shm.watch.isolated_tests import Seen, counted, outlier_probability
+from shm.watch.options import WatchOptions
+from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
+from shm.watch.scatter import differences, learnt
+
+# To be raised whenever the same readings give other results than before: kept states are void then.
+_VERSION = 3
+_SAME_DAY_YEARS = 1.5 / DAYS_PER_YEAR  # judgement: of one visit: wind, sensors, operator
+_LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
+_LEAST_SHARE = 1e-3  # judgement: of a cause in a call, which later tests may yet speak for
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A change that was called after the test at `index` of the watch; `change` as it was then."""
+
+    index: int
+    change: Change
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """The result after each reading, and the changes called on the way, in the order of time."""
+
+    tests: tuple[WatchedTest, ...]
+    calls: tuple[Call, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class WatchState:
+    """All that the next result rests on, of T tests so far, in plain arrays.
+
+    It goes on only where `key` is that of the watch which is to go on. `told` is text that goes
+    with it, `still_same` the probability that nothing had changed before the last call.
+    `weight` (T,) is what is left of tests that alone would say more than one test may.
+    `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
+    (calls, n + q, n + q) what called it. `scatter_variance` is what tests scatter by.
+    """
+
+    key: str
+    start: datetime
+    last_time: datetime
+    reference_c: float
+    values: FloatArray
+    variances: FloatArray
+    slopes: FloatArray
+    per_kelvin: FloatArray
+    coordinates: FloatArray
+    years: FloatArray
+    kelvin: FloatArray
+    log_amplitude: FloatArray
+    doubt: FloatArray
+    weight: FloatArray
+    unknown_years: FloatArray
+    counted: BoolArray
+    coefficients: FloatArray
+    scatter_variance: FloatArray
+    called: FloatArray
+    called_precision: FloatArray
+    still_same: float = 1.0
+    told: str = ""
+
+    @property
+    def tests(self) -> int:
+        return len(self.years)
+
+    def to_bytes(self) -> bytes:
+        """The state as a file of numpy arrays, without any pickled object."""
+        kept = io.BytesIO()
+        plain: dict[str, Any] = {
+            each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
+            for each in fields(self)
+            for value in [getattr(self, each.name)]
+        }
+        np.savez_compressed(kept, **plain)
+        return kept.getvalue()
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> WatchState:
+        """The state back; raises BadInput where the content is no such state."""
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as kept:
+                found = dict(kept)
+            for name in ("key", "told"):
+                found[name] = str(found[name])
+            for name in ("start", "last_time"):
+                found[name] = datetime.fromisoformat(str(found[name]))
+            for name in ("reference_c", "still_same"):
+                found[name] = float(found[name])
+            return cls(**found)
+        except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
+            raise BadInput(
+                f"A kept state of the watch cannot be read: {error}.",
+                remedy="Drop it: the watch then goes over all tests again.",
+            ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class Watcher:
+    """Watches one hanger, test by test: `begin` with its baseline, `after` for each one later.
+
+    Raises BadInput without any quantity.
+    """
+
+    quantities: tuple[WatchedQuantity, ...]
+    columns: Columns
+    hanger: Hanger
+    options: WatchOptions = field(default_factory=WatchOptions)
+
+    def __post_init__(self) -> None:
+        if not self.quantities:
+            raise BadInput("The watch was given no quantity.", remedy="Watch the tension at least.")
+
+    @cached_property
+    def key(self) -> str:
+        """Names what a state rests on beside the readings: the rules, options and quantities."""
+        given = [_VERSION, asdict(self.options), [_told(each) for each in self.quantities]]
+        return hashlib.sha256(json.dumps(given).encode()).hexdigest()
+
+    @cached_property
+    def structure(self) -> Structure:
+        """The hypotheses."""
+        return structure_of(self.quantities, self.columns, self.options)
+
+    def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
+        """The state after the readings of the baseline, by time, and a result for each of them.
+
+        Raises UsageError where these are more than the options' `baseline_tests`, or none. Where
+        they are fewer, the state cannot go on.
+        """
+        if not 0 < len(readings) <= self.options.baseline_tests:
+            raise UsageError(
+                f"The watch was to begin with {len(readings)} readings; its baseline has "
+                f"{self.options.baseline_tests}."
+            )
+        time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
+        warmth = Warmth.at([reading.temperature_c for reading in readings])
+        state = WatchState(
+            key=self.key,
+            start=time,
+            last_time=time,
+            reference_c=warmth.reference_c,
+            values=np.zeros((0, n)),
+            variances=np.zeros((0, n)),
+            slopes=np.zeros((0, n, q)),
+            per_kelvin=np.zeros((0, n)),
+            coordinates=np.zeros((0, q)),
+            years=np.zeros(0),
+            kelvin=np.zeros(0),
+            log_amplitude=np.zeros(0),
+            doubt=np.zeros((0, n)),
+            weight=np.zeros(0),
+            unknown_years=np.zeros(0),
+            counted=np.zeros(0, bool),
+            coefficients=np.zeros(q),
+            scatter_variance=self.structure.scatter_variance,
+            called=np.zeros((0, 3)),
+            called_precision=np.zeros((0, n + q, n + q)),
+        )
+        tests = []
+        for reading in readings:
+            state, found = self._next(state, reading)
+            tests.append(found)
+        return state, Watch(tuple(tests), ())
+
+    def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        """The state after one more reading, and the result.
+
+        Raises BadInput where the reading is older than the last, or of other quantities, UsageError
+        where the state is that of another watch, or its baseline is not complete.
+        """
+        if state.key != self.key or state.tests < self.options.baseline_tests:
+            raise UsageError(
+                "This state of a watch is not of this hanger, baseline and options.",
+                remedy="Begin the watch anew.",
+            )
+        return self._next(state, reading)
+
+    def _next(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+        if reading.time < state.last_time:
+            raise BadInput(
+                f"The watch was given test {reading.test} after one that is later.",
+                remedy="Sort the tests by time.",
+            )
+        state = self._with(state, reading)
+        state = self._bounded(state)
+        rows = np.flatnonzero(state.counted)
+        evidence = self._evidence(state, rows)
+        causes = evidence
+        if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
+            # How sure it is that anything changed is bounded; which cause it was is for all to say.
+            causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
+        subject = Subject(self.quantities, self.hanger, self.options, state.start)
+        last, effects = state.tests - 1, self._effects(state)
+        outlier = self._outlier(state, last)
+        found = WatchedTest(
+            test=reading.test,
+            time=reading.time,
+            temperature_c=reading.temperature_c,
+            drifts=drifted(subject, evidence, causes, reading, effects),
+            change=changed(
+                subject,
+                evidence,
+                causes,
+                reading,
+                1 - state.still_same,
+                outlier,
+                effects,
+            ),
+        )
+        coefficients = self._coefficients(evidence)
+        if found.change.called and state.counted[-1]:
+            still = state.still_same * (1 - probability_of_change(evidence, self.options))
+            begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
+            sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
+            state = replace(state, called=begun, called_precision=sizes, still_same=still)
+        return replace(state, coefficients=coefficients), found
+
+    def _bounded(self, state: WatchState) -> WatchState:
+        """The newest test with what is left of its weight: alone it speaks for no change by more
+        than it may, whether it counts by now or only once another agrees with it."""
+        rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
+        alone = self._evidence(state, rows).log_of_last
+        most = self.options.most_of_one_test_nats
+        if alone <= most:
+            return state
+        weight = state.weight.copy()
+        weight[-1] = most / alone
+        return replace(state, weight=weight)
+
+    def _with(self, state: WatchState, reading: Reading) -> WatchState:
+        """The state with one more test in it, and who counts now."""
+        n, q = self.structure.layout.n, self.structure.layout.q
+        if reading.mean.shape != (q,):
+            raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
+        years = years_between(state.start, reading.time)
+        known = state.kelvin[~np.isin(state.years, state.unknown_years)]
+        warmth = Warmth(state.reference_c, known, state.unknown_years)
+        warmth, kelvin, sd = warmth.after(reading.temperature_c, years, self.options)
+        modes = reading.modes
+        values = np.zeros(n) if modes is None else modes.values
+        variances = np.full(n, np.inf) if modes is None else modes.variances
+        slopes = np.zeros((n, q)) if modes is None else modes.slopes
+        softening = np.zeros(n) if modes is None else modes.per_kelvin
+        level = math.log(reading.amplitude) if reading.amplitude > 0 else math.nan
+        doubt = sd * (softening + slopes @ state.coefficients)
+        rows = {
+            "values": values - kelvin * softening,
+            "variances": variances,
+            "slopes": slopes,
+            "per_kelvin": softening,
+            "coordinates": reading.mean,
+            "years": years,
+            "kelvin": kelvin,
+            "log_amplitude": level,
+            "doubt": doubt,
+            "weight": 1.0,
+        }
+        grown: dict[str, Any] = {
+            name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
+            for name, row in rows.items()
+        }
+        grown["unknown_years"] = warmth.unknown_years
+        later = replace(state, last_time=reading.time, reference_c=warmth.reference_c, **grown)
+        counts = counted(self._seen(later), state.counted, self.options.baseline_tests)
+        later = replace(later, counted=counts)
+        return replace(later, scatter_variance=self._scatter(later))
+
+    def _factors(self, state: WatchState) -> FloatArray:
+        """Along what each test scatters (T, n, q + c)."""
+        fixed = np.broadcast_to(
+            self.structure.scattering, (state.tests, *self.structure.scattering.shape)
+        )
+        return np.concatenate([state.slopes, fixed], axis=2)
+
+    def _seen(self, state: WatchState) -> Seen:
+        """All tests so far, their swing with the temperature taken off as far as it is known."""
+        at_rest = state.values - state.kelvin[:, None] * (state.slopes @ state.coefficients)
+        factors = self._factors(state)
+        measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
+        variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
+        return Seen(
+            values=at_rest,
+            variances=state.variances,
+            doubt=state.doubt,
+            factors=factors[measured[-1]] if len(measured) else factors[-1],
+            sds=np.sqrt(variance),
+        )
+
+    def _scatter(self, state: WatchState) -> FloatArray:
+        """What the counted tests so far say of the scatter (q + c,)."""
+        seen = self._seen(state)
+        rows = state.counted
+        doubted = np.square(state.doubt[rows])
+        found = differences(
+            seen.values[rows], state.variances[rows] + doubted, self._factors(state)[rows]
+        )
+        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
+
+    def _sums(self, state: WatchState, rows: IntArray) -> Sums:
+        """Of the tests `rows`; those of one day scatter together, and say no more than one."""
+        structure, layout = self.structure, self.structure.layout
+        years = state.years[rows]
+        of_a_day = (np.abs(years[:, None] - years) < _SAME_DAY_YEARS).sum(axis=1)
+        slopes, level = state.slopes[rows], state.log_amplitude[rows]
+        known = np.isfinite(level)
+        usual = float(np.median(level[known])) if known.any() else 0.0
+        level = np.where(known, level - usual, 0.0)
+        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
+        unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
+        unknown[known] = 0.0
+        doubt = state.doubt[rows]
+        common = unknown @ np.swapaxes(unknown, 1, 2) + doubt[:, :, None] * doubt[:, None, :]
+        tension = [each.name == TENSION for each in self.quantities]
+        columns = np.concatenate(
+            [
+                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
+                slopes,
+                slopes * state.kelvin[rows, None, None],
+                slopes * level[:, None, None],
+                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+            ],
+            axis=2,
+        )
+        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
+        spread = factors @ np.swapaxes(factors, 1, 2)
+        scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
+        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
+        wider = 1 / state.weight[rows]
+        return sums_of(
+            columns,
+            state.values[rows],
+            wider[:, None] * state.variances[rows],
+            wider[:, None, None, None] * covariance,
+        )
+
+    def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
+        """Of the tests `rows`."""
+        called = [
+            Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
+            for (first, years, is_ramp), precision in zip(
+                state.called.tolist(), state.called_precision, strict=True
+            )
+        ]
+        first = int((rows < self.options.baseline_tests).sum())
+        return evidence_of(
+            self._sums(state, rows),
+            state.years[rows],
+            max(first, 1),
+            self.structure.layout,
+            self.structure.directions,
+            called,
+            self.options.beginnings,
+        )
+
+    def _effects(self, state: WatchState) -> FloatArray:
+        """What a change does to each plane's first frequency and to the mean (r, n + q)."""
+        measured = np.isfinite(state.variances)
+        count = np.maximum(measured.sum(axis=0), 1)[:, None]
+        slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
+        of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
+        planes = [plane for plane, _ in self.columns.modes]
+        firsts = [planes.index(plane) for plane in dict.fromkeys(planes)]
+        return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
+
+    def _coefficients(self, evidence: Evidence) -> FloatArray:
+        """How far each quantity goes with a kelvin (q,), by the likeliest scatter."""
+        n, q = self.structure.layout.n, self.structure.layout.q
+        return np.asarray(evidence.null_mean[int(evidence.log_null.argmax()), n : n + q])
+
+    def _outlier(self, state: WatchState, test: int) -> float:
+        before = np.flatnonzero(state.counted[:test])
+        prior = self.options.outlier_probability
+        if not len(before):
+            return prior
+        return outlier_probability(self._seen(state), test, int(before[-1]), prior)
+
+
+def watched(
+    readings: Sequence[Reading],
+    quantities: tuple[WatchedQuantity, ...],
+    columns: Columns,
+    hanger: Hanger,
+    options: WatchOptions | None = None,
+) -> Watch:
+    """One result a reading, each of which rests on the readings up to it alone.
+
+    The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
+    time or not of these quantities.
+    """
+    watcher = Watcher(quantities, columns, hanger, options or WatchOptions())
+    if not readings:
+        return Watch((), ())
+    count = watcher.options.baseline_tests
+    state, begun = watcher.begin(readings[:count])
+    tests = list(begun.tests)
+    for reading in readings[count:]:
+        state, found = watcher.after(state, reading)
+        tests.append(found)
+    calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
+    return Watch(tuple(tests), tuple(calls))
+
+
+def _begun(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
+    """The likeliest first test of a called change, when it began, and whether it goes on."""
+    share = evidence.shares.sum(axis=(1, 2, 3, 4))
+    first = int(evidence.beginnings[int(share.argmax())])
+    is_ramp = bool(change.sudden < 0.5)
+    return [float(rows[first]), float(evidence.years[first - 1]), float(is_ramp)]
+
+
+def _size_of(evidence: Evidence) -> FloatArray:
+    """Precision (n + q, n + q) of a called change's size: each cause as probable as it was then."""
+    layout = evidence.layout
+    least = np.concatenate(
+        [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
+    )
+    covariance = np.diag(least**2)
+    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
+    for direction, by_size in zip(evidence.directions, shares, strict=True):
+        for share, size in zip(by_size, SIZES, strict=True):
+            covariance += share * size**2 * direction.factor @ direction.factor.T
+    return np.asarray(np.linalg.inv(covariance))
+
+
+def _told(quantity: WatchedQuantity) -> list[object]:
+    """All of a quantity, its table as a digest."""
+    table = np.array([quantity.coordinates, quantity.values]).tobytes()
+    plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))
+    return [*plain, *quantity.parameters, hashlib.sha256(table).hexdigest()]

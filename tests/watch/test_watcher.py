@@ -1,0 +1,480 @@
+"""What the watch calls, how soon, and what it says has moved."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import timedelta
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput
+from shm.values import WatchedTest
+from shm.watch.causes import POINT_MASS, TIMEBASE, Columns
+from shm.watch.options import WatchOptions
+from shm.watch.watcher import Watch, watched
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.synthetic_readings import (
+    BOTH_ENDS,
+    MODES,
+    PLANES_ALONE,
+    SPRING_STEP,
+    TENSION_ALONE,
+    History,
+    columns,
+    off_by,
+    shifted,
+    slopes,
+    watch_of,
+    with_modes,
+    without_modes,
+)
+
+CHANGE_AT = 10
+SEEDS = range(2)
+
+
+def watch(history: History, seed: int = 0) -> Watch:
+    return watch_of(history.readings(seed), history.quantities)
+
+
+def delays(history: History) -> list[int]:
+    """Tests from the change to its call, one a seed, the call's own among them; none called before
+    the change."""
+    found = []
+    for seed in SEEDS:
+        calls = [call.index for call in watch(history, seed).calls]
+        assert calls, "the change was not called"
+        assert min(calls) >= history.change_at, "called before it happened"
+        found.append(calls[0] - history.change_at + 1)
+    return found
+
+
+def last(tests: tuple[WatchedTest, ...]) -> WatchedTest:
+    return tests[-1]
+
+
+def lost(fraction: float, q: int = 1) -> list[float]:
+    return [math.log(1 - fraction), *[0.0] * (q - 1)]
+
+
+@pytest.mark.parametrize("fraction", [0.02, 0.05, 0.10])
+def test_a_lost_share_of_tension_is_called_by_its_fourth_test(fraction: float) -> None:
+    history = History(tests=CHANGE_AT + 5, change_at=CHANGE_AT, step=lost(fraction), seasons_k=20)
+
+    assert max(delays(history)) <= 4
+    assert np.median(delays(history)) <= 3
+
+
+def test_a_slow_loss_of_two_percent_a_year_is_called_before_it_has_lost_two_percent() -> None:
+    history = History(tests=34, change_at=CHANGE_AT, ramp=[-0.02], seasons_k=20)
+
+    assert max(delays(history)) <= 18
+    assert np.median(delays(history)) <= 12
+
+
+def test_a_slow_loss_is_told_from_a_sudden_one() -> None:
+    slow = watch(History(tests=34, change_at=CHANGE_AT, ramp=[-0.02]))
+    sudden = watch(History(tests=14, change_at=CHANGE_AT, step=lost(0.05), outliers=0))
+
+    assert slow.calls[0].change.sudden < 0.5 < 0.9 < sudden.calls[0].change.sudden
+
+
+def test_the_temperature_alone_calls_nothing_over_years() -> None:
+    history = History(tests=40, seasons_k=25, per_kelvin=0.002)
+
+    assert not any(watch(history, seed).calls for seed in SEEDS)
+
+
+def test_a_loss_of_three_percent_is_called_under_a_swing_of_25_kelvin() -> None:
+    history = History(tests=CHANGE_AT + 5, change_at=CHANGE_AT, step=lost(0.03), seasons_k=25)
+
+    assert max(delays(history)) <= 4
+
+
+def test_tests_without_temperatures_do_not_call_and_do_not_hide_a_loss() -> None:
+    quiet = History(tests=24, temperatures_missing=0.5, seasons_k=20)
+    losing = replace(quiet, change_at=CHANGE_AT, step=lost(0.10))
+
+    assert not any(watch(quiet, seed).calls for seed in SEEDS)
+    assert max(delays(losing)) <= 8
+
+
+def test_a_hanger_none_of_whose_temperatures_is_known_can_be_watched() -> None:
+    history = History(tests=18, temperatures_missing=1.0, change_at=10, step=lost(0.10))
+
+    assert watch(history).calls[0].change.moved[0].shift_mean == pytest.approx(-0.1, abs=0.03)
+
+
+@pytest.mark.parametrize("size", [0.03, 0.1, 0.5, 2.0, -0.9])
+def test_an_outlier_of_any_size_calls_no_change_and_hardly_moves_the_drift(size: float) -> None:
+    readings = History(tests=14, outliers=0).readings(1)
+
+    found = watch_of(shifted(readings, 9, [size]), TENSION_ALONE)
+
+    assert not found.calls
+    # Of three hundredths nobody could say whether it is the scatter.
+    assert found.tests[9].change.outlier_probability > (0.5 if abs(size) > 0.05 else -1)
+    for index in (9, 13):
+        drift = found.tests[index].drifts[0]
+        assert drift.probability < 0.5
+        assert abs(drift.shift_mean) < min(2 * drift.shift_sd, 0.01)
+
+
+def test_an_outlier_along_one_spring_of_many_calls_no_change() -> None:
+    history = History(PLANES_ALONE, tests=12, outliers=0)
+    readings = shifted(history.readings(1), 9, [0.0, -10 * SPRING_STEP, 0.0])
+
+    found = watch_of(readings, PLANES_ALONE)
+
+    assert not found.calls
+    assert max(drift.probability for drift in found.tests[9].drifts) < 0.8
+
+
+def test_two_tests_that_agree_on_a_large_loss_call_it() -> None:
+    history = History(tests=CHANGE_AT + 2, outliers=0, change_at=CHANGE_AT, step=lost(0.3))
+
+    assert [call.index for call in watch(history).calls] == [CHANGE_AT + 1]
+
+
+def test_a_called_step_is_called_once_and_a_second_one_anew() -> None:
+    once = History(tests=30, change_at=8, step=lost(0.05), outliers=0)
+    readings = once.readings(3)
+    for index in range(20, 30):
+        readings = shifted(readings, index, [0.03])
+
+    alone = watch_of(once.readings(3), TENSION_ALONE)
+    both = watch_of(readings, TENSION_ALONE)
+
+    assert len(alone.calls) == 1
+    assert 8 <= alone.calls[0].index < 11
+    assert len(both.calls) == 2
+    assert 20 <= both.calls[1].index < 23
+    assert both.calls[1].change.began_after == readings[19].time
+    expected = math.expm1(math.log(0.95) + 0.03)
+    assert last(both.tests).drifts[0].shift_mean == pytest.approx(expected, abs=0.004)
+
+
+def test_a_loss_that_goes_on_is_followed_after_its_call() -> None:
+    history = History(tests=45, change_at=CHANGE_AT, ramp=[-0.02], outliers=0)
+    readings = history.readings(2)
+    years = (readings[-1].time - readings[CHANGE_AT - 1].time).days / 365.25
+
+    found = watch_of(readings, TENSION_ALONE)
+    drift = last(found.tests).drifts[0]
+
+    assert len(found.calls) == 1
+    assert drift.shift_mean == pytest.approx(math.expm1(-0.02 * years), abs=0.004)
+    assert drift.shift_sd < 0.02
+
+
+def test_the_beginning_lies_in_its_interval() -> None:
+    history = History(tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=lost(0.05))
+    readings = history.readings(0)
+
+    change = watch_of(readings, TENSION_ALONE).calls[0].change
+
+    assert change.began_after <= readings[CHANGE_AT - 1].time
+    assert readings[CHANGE_AT].time <= change.began_by <= readings[CHANGE_AT + 2].time
+
+
+def test_a_loss_of_tension_is_told_from_a_loosened_end() -> None:
+    history = History(PLANES_ALONE, tests=CHANGE_AT + 5, change_at=CHANGE_AT)
+    tension = watch(replace(history, step=lost(0.04, q=3))).calls[0].change.moved
+    end = watch(replace(history, step=[0.0, -3 * SPRING_STEP, 0.0])).calls[0].change.moved
+
+    assert (tension[0].quantity, end[0].quantity) == ("tension", "log10_kx")
+    assert min(tension[0].probability, end[0].probability) > 0.95
+    assert tension[0].alike == end[0].alike == ()
+    assert end[0].plane == "transverse"
+    assert tension[0].shift_mean == pytest.approx(-0.04, abs=0.01)
+
+
+def test_ends_that_no_test_tells_apart_are_said_to_be_alike() -> None:
+    step = [0.0, -3 * SPRING_STEP, 0.0, 0.0, 0.0]
+    history = History(BOTH_ENDS, tests=CHANGE_AT + 4, change_at=CHANGE_AT, step=step)
+
+    first, second, third = watch(history).calls[0].change.moved[:3]
+
+    assert {first.quantity, second.quantity} == {"log10_k1", "log10_k3"}
+    assert {first.end, second.end} == {"deck", "arch"}
+    assert first.alike == (second.quantity,)
+    assert second.alike == (first.quantity,)
+    assert first.probability == pytest.approx(second.probability, abs=0.02)
+    assert first.probability + second.probability > 0.9 > 0.1 > third.probability
+    # -0.9 decades by the slope at the baseline, a little more by the curve
+    assert first.shift_mean == pytest.approx(-0.97, abs=0.2)
+
+
+def test_both_planes_of_an_end_that_loosen_together_are_called_and_named_together() -> None:
+    history = History(BOTH_ENDS, tests=CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0)
+    step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
+
+    call = watch(replace(history, step=step)).calls[0]
+    first = call.change.moved[0]
+    by_name = {each.quantity: each for each in call.change.moved}
+
+    assert call.index <= CHANGE_AT + 2
+    pair = {"log10_k1": "log10_k2", "log10_k3": "log10_k4"}
+    pair |= {other: one for one, other in pair.items()}
+    assert pair[first.quantity] in first.together
+    other = by_name[pair[first.quantity]]
+    assert other.probability == pytest.approx(first.probability, abs=0.05)
+    # Which end it is no test tells here.
+    springs = {each.name for each in BOTH_ENDS} - {"tension"}
+    assert springs - {first.quantity} <= {*first.together, *first.alike}
+    assert by_name["tension"].probability < 0.05
+
+
+def test_nothing_is_said_to_move_together_with_itself() -> None:
+    step = [0.0, -1.6 * SPRING_STEP, -2 * SPRING_STEP, 0.0, 0.0]
+    history = History(BOTH_ENDS, CHANGE_AT + 3, change_at=CHANGE_AT, outliers=0, step=step)
+
+    for each in watch(history).calls[0].change.moved:
+        assert each.quantity not in {*each.together, *each.alike}
+
+
+def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_at_once() -> None:
+    pairs = tuple(
+        each if each.name == "tension" else replace(each, parameters=("one", "other"))
+        for each in PLANES_ALONE
+    )
+    step = [0.06, -1.8 * SPRING_STEP, -2.1 * SPRING_STEP]
+    history = History(pairs, tests=CHANGE_AT + 3, change_at=CHANGE_AT, step=step, outliers=0)
+
+    call = watch(history).calls[0]
+
+    assert call.index <= CHANGE_AT + 2
+    assert {each.quantity for each in call.change.moved if each.probability > 0.95} == {
+        "tension",
+        "log10_kx",
+        "log10_ky",
+    }
+    assert call.change.moved[0].quantity != "tension"
+
+
+def test_a_small_shift_that_is_not_called_is_told_with_its_uncertainty() -> None:
+    gained = 0.005
+    step = [math.log(1 + gained)]
+    shifts = []
+    for seed in range(3):
+        history = History(tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=step, outliers=0)
+        drift = last(watch(history, seed).tests).drifts[0]
+        assert drift.probability < 0.01
+        assert drift.shift_mean == pytest.approx(gained, abs=3.5 * drift.shift_sd)
+        assert 0.0005 < drift.shift_sd < 0.01
+        shifts.append(drift.shift_mean)
+
+    # Ten tests before, six after: each is uncertain by 0.0016, three of them by 0.001.
+    assert np.mean(shifts) == pytest.approx(gained, abs=0.003)
+
+
+@pytest.mark.parametrize("gained", [0.0, 0.01, -0.02])
+def test_the_first_test_since_the_baseline_tells_no_less_than_it_leaves_open(gained: float) -> None:
+    for seed in range(3):
+        history = History(tests=2, change_at=1, step=[math.log(1 + gained)], outliers=0)
+        drift = last(watch(history, seed).tests).drifts[0]
+        assert drift.probability < 0.05
+        assert drift.shift_mean == pytest.approx(gained, abs=3 * drift.shift_sd)
+        assert 0.002 < drift.shift_sd < 0.03
+
+
+def test_a_test_that_sees_nothing_leaves_the_shift_as_open_as_it_was_before() -> None:
+    first, second = History(tests=2, outliers=0).readings(1)
+    blind = without_modes(second, range(len(MODES)))
+
+    drift = last(watch_of([first, blind], TENSION_ALONE).tests).drifts[0]
+
+    assert drift.shift_mean == pytest.approx(0, abs=0.01)
+    assert 1 < drift.shift_sd / TENSION_ALONE[0].step_sd < 2
+
+
+def test_the_drift_is_the_state_with_the_swing_of_the_temperature_taken_out() -> None:
+    history = History(tests=26, seasons_k=25, change_at=16, step=lost(0.08), outliers=0)
+
+    drift = last(watch(history).tests).drifts[0]
+
+    assert drift.value == pytest.approx(0.92 * 700e3, rel=0.004)
+    assert drift.baseline == 700e3
+    assert drift.threshold == HANGER_3.thresholds.tension_shift_fraction
+    assert drift.probability > 0.99
+
+
+def test_a_result_rests_on_the_readings_up_to_it_alone() -> None:
+    readings = History(tests=14, change_at=8, step=lost(0.05)).readings(0)
+
+    early = watch_of(readings[:11], TENSION_ALONE).tests
+    late = watch_of(readings, TENSION_ALONE).tests[:11]
+
+    assert [test.change for test in early[1:]] == [test.change for test in late[1:]]
+    assert [test.drifts for test in early] == [test.drifts for test in late]
+
+
+def test_a_reading_that_sees_nothing_changes_nothing() -> None:
+    readings = History(tests=12).readings(0)
+    blind = replace(readings[6], information=np.zeros((1, 1)), mean=np.zeros(1), modes=None)
+
+    found = watch_of([*readings[:6], blind], TENSION_ALONE).tests
+
+    before, after = (found[index].drifts[0] for index in (5, 6))
+    assert after.shift_mean == pytest.approx(before.shift_mean, abs=before.shift_sd / 2)
+    assert found[6].change.evidence_years < 1
+
+
+def test_readings_out_of_order_or_of_other_quantities_are_refused() -> None:
+    readings = History(tests=4).readings(0)
+
+    with pytest.raises(BadInput, match="later"):
+        watch_of(readings[::-1], TENSION_ALONE)
+    with pytest.raises(BadInput, match="3 quantities"):
+        watch_of(readings, PLANES_ALONE)
+
+
+def test_no_reading_gives_no_result() -> None:
+    found = watch_of([], TENSION_ALONE)
+
+    assert (found.tests, found.calls) == ((), ())
+
+
+@pytest.mark.parametrize("by", [0.05, -0.3, 3.0])
+def test_one_wild_test_never_calls_and_two_that_agree_do(by: float) -> None:
+    readings = History(tests=13, outliers=0).readings(5)
+    wild = off_by(readings[9], by)
+
+    alone = watch_of([*readings[:9], wild, *readings[10:]], TENSION_ALONE)
+    both = watch_of(
+        [*readings[:9], wild, *(off_by(each, by) for each in readings[10:])], TENSION_ALONE
+    )
+
+    assert not alone.calls
+    assert alone.tests[9].change.outlier_probability > 0.9
+    assert both.calls[0].index == 10
+
+
+def test_wild_tests_that_agree_with_no_other_call_nothing() -> None:
+    readings = History(tests=15, outliers=0).readings(5)
+    for index, by in ((8, -0.2), (10, 0.3), (11, -0.6), (13, 0.1)):
+        readings[index] = off_by(readings[index], by)
+
+    assert not watch_of(readings, TENSION_ALONE).calls
+
+
+def test_tests_of_one_day_say_no_more_than_one() -> None:
+    lost_readings = History(tests=10, change_at=8, step=lost(0.02), outliers=0).readings(2)
+    of_a_day = [
+        replace(lost_readings[8], test=f"same{n}", time=lost_readings[8].time + timedelta(hours=n))
+        for n in range(6)
+    ]
+
+    one = watch_of(lost_readings[:9], TENSION_ALONE).tests[-1].change
+    many = watch_of([*lost_readings[:8], *of_a_day], TENSION_ALONE).tests[-1].change
+
+    assert not many.called
+    assert many.evidence_years < 10
+    assert many.probability == pytest.approx(one.probability, abs=0.1)
+    two = watch_of(lost_readings, TENSION_ALONE).tests[-1].change
+    assert two.evidence_years > 3 * many.evidence_years
+
+
+def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
+    of_mass = columns().by_cause[POINT_MASS][4]
+    history = History(tests=CHANGE_AT + 4, change_at=CHANGE_AT, outliers=0, mode_step=3 * of_mass)
+
+    moved = watch(history).calls[0].change.moved
+
+    assert moved[0].quantity == POINT_MASS
+    by_name = {each.quantity: each.probability for each in moved}
+    assert by_name["tension"] < 0.1 < 0.6 < by_name[POINT_MASS]
+    assert moved[0].shift_mean == pytest.approx(3 * of_mass.mean(), rel=0.3)
+
+
+def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:
+    steady = WatchOptions(tension_scatter=3e-4, bending_scatter=3e-4, mode_scatter=2e-4)
+    impatient = replace(steady, limit_years=2.0)
+    history = History(
+        tests=18, change_at=CHANGE_AT, outliers=0, scatter=2e-4, seasons_k=0, days_k=1
+    )
+
+    def clock(by: float, options: WatchOptions) -> Watch:
+        return watch_of(replace(history, mode_step=[by]).readings(0), TENSION_ALONE, options)
+
+    off, trifle = clock(0.008, steady), clock(0.003, impatient)
+
+    assert off.calls[0].change.moved[0].quantity == TIMEBASE
+    assert not trifle.calls
+    # It is no want of evidence: what it does is less than what is to be told.
+    assert trifle.tests[-1].change.evidence_years > impatient.limit_years
+    assert trifle.tests[-1].change.material_probability < 0.5
+
+
+def test_modes_that_a_test_lacks_and_an_unknown_amplitude_are_no_change() -> None:
+    rng = np.random.default_rng(6)
+    history = History(PLANES_ALONE, tests=18, change_at=13, step=lost(0.06, q=3), outliers=0)
+    readings = [
+        without_modes(each, rng.choice(len(MODES), rng.integers(0, 7), replace=False).tolist())
+        for each in history.readings(4)
+    ]
+    loud = [
+        replace(each, amplitude=float(np.exp(rng.normal(0, 0.5)))) if n % 2 else each
+        for n, each in enumerate(readings)
+    ]
+
+    for given in (readings, loud):
+        (call,) = watch_of(given, PLANES_ALONE).calls
+        assert 13 <= call.index <= 16
+        assert call.change.moved[0].quantity == "tension"
+
+
+def test_what_goes_with_the_excitation_is_learnt_and_not_called() -> None:
+    rng = np.random.default_rng(7)
+    levels = rng.normal(0, 0.4, 16)
+    levels[10:] += 1.0  # another hammer from then on
+    readings = [
+        replace(off_by(each, slopes(1)[:, 0] * -0.004 * level), amplitude=float(np.exp(level)))
+        for each, level in zip(History(tests=16, outliers=0).readings(7), levels, strict=True)
+    ]
+
+    assert not watch_of(readings, TENSION_ALONE).calls
+
+
+def test_a_mode_that_is_said_to_be_unmeasured_moves_nothing_whatever_its_value() -> None:
+    readings = History(tests=8, outliers=0).readings(0)
+    lacking = [without_modes(each, [2, 7]) for each in readings]
+    wild = []
+    for each in lacking:
+        assert each.modes is not None
+        values = np.where(np.isinf(each.modes.variances), 0.4, each.modes.values)
+        wild.append(replace(each, modes=replace(each.modes, values=values)))
+
+    one, other = (watch_of(given, TENSION_ALONE).tests[-1] for given in (lacking, wild))
+    assert other.drifts[0].shift_mean == pytest.approx(one.drifts[0].shift_mean, abs=1e-6)
+    assert other.change.evidence_years == pytest.approx(one.change.evidence_years, rel=1e-4)
+
+
+def test_results_do_not_hang_on_the_order_of_modes() -> None:
+    readings = History(PLANES_ALONE, tests=7, change_at=5, step=lost(0.04, q=3)).readings(1)
+    backwards = [
+        with_modes(
+            each,
+            replace(
+                each.modes,
+                values=each.modes.values[::-1],
+                variances=each.modes.variances[::-1],
+                slopes=each.modes.slopes[::-1],
+            ),
+        )
+        for each in readings
+        if each.modes is not None
+    ]
+    turned = Columns(
+        MODES[::-1],
+        {name: places[:, ::-1] for name, places in columns().by_cause.items()},
+        columns().sensors[::-1, ::-1],
+    )
+
+    one = watch_of(readings, PLANES_ALONE).tests[-1]
+    other = watched(backwards, PLANES_ALONE, turned, HANGER_3).tests[-1]
+
+    assert other.change.evidence_years == pytest.approx(one.change.evidence_years, rel=1e-6)
+    assert other.drifts[0].shift_mean == pytest.approx(one.drifts[0].shift_mean, rel=1e-6)
