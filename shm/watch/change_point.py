@@ -24,6 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.values import FloatArray, IntArray
+from shm.watch.conditions import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
 SIZES = np.array([1.0, 6.0])
@@ -31,6 +32,7 @@ SIZES = np.array([1.0, 6.0])
 
 LOG_SHARES = np.log([0.9, 0.1])
 _ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
+_A_WEEK_YEARS = 7 / 365.25
 _NEGLIGIBLE = 1e-6  # of all masses: what it adds is not told
 
 
@@ -134,6 +136,9 @@ class Evidence:
     null_mean: FloatArray
     null_covariance: FloatArray
     seen: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+    _asked: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = field(
+        default_factory=dict, repr=False
+    )
 
     @property
     def log_statistic(self) -> float:
@@ -142,13 +147,14 @@ class Evidence:
 
     @property
     def log_evidence(self) -> float:
-        """The same without the changes that one test alone speaks for, and by the scatter without
+        """The same without the changes that one visit alone speaks for, and by the scatter without
         change that is likeliest, so that the rate of false calls holds for each scatter."""
         if not len(self.beginnings):
             return -math.inf
         choices = math.log(len(self.log_null))
         worst = float(self.log_null.max()) + choices
-        return _total(self.log_mass[self.beginnings < len(self.years) - 1]) - max(worst, 0.0)
+        of_more = self.years[self.beginnings] < self.years[-1] - OF_ONE_VISIT_YEARS
+        return _total(self.log_mass[of_more]) - max(worst, 0.0)
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -158,16 +164,18 @@ class Evidence:
         return np.exp(self.log_mass - self.log_statistic)
 
     @property
-    def log_of_last(self) -> float:
-        """By how much the last test alone speaks for any change: the largest log Bayes factor."""
-        if not len(self.beginnings) or self.beginnings[-1] != len(self.years) - 1:
-            return 0.0
-        waited = math.log(max(float(_waited(self.years, self.beginnings)[-1]), 1e-12))
-        prior = np.array([each.log_prior for each in self.directions])[:, None] + LOG_SHARES
-        own = self.log_mass[-1, :, STEP] - waited - prior - self.log_null[:, None, None]
-        kinds = np.log([1 + each.may_ramp for each in self.directions])[:, None]
-        by_scatter = (own + kinds).max(axis=(1, 2))
-        return float(np.exp(self.log_null) @ by_scatter)
+    def of_last_visit(self) -> tuple[float, float]:
+        """What the last visit alone speaks for: the largest log Bayes factor of any change, and the
+        log mass in years of all. Visits in haste count as a week apart, as far as this goes."""
+        at = int(np.searchsorted(self.years[self.beginnings], self.years[-1] - OF_ONE_VISIT_YEARS))
+        if at == len(self.beginnings):
+            return 0.0, -math.inf
+        waited = math.log(max(float(_waited(self.years, self.beginnings)[at]), 1e-12))
+        kinds = np.log([1 + each.may_ramp for each in self.directions])
+        prior = np.array([each.log_prior for each in self.directions]) - kinds
+        over_scatters = np.logaddexp.reduce(self.log_mass[at, :, STEP], axis=0) - waited
+        factor = float((over_scatters - prior[:, None] - LOG_SHARES).max())
+        return factor, _total(self.log_mass[at]) - waited + max(waited, math.log(_A_WEEK_YEARS))
 
     def by_direction(self) -> FloatArray:
         """Probability (D,) of each direction, given a change."""
@@ -183,6 +191,11 @@ class Evidence:
 
         A ramp's is what has come of it by then.
         """
+        if index not in self._asked:
+            self._asked[index] = self._change_at(index)
+        return self._asked[index]
+
+    def _change_at(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         at, k, kind, d, size = index
         information, pull, _ = self.seen
         factor = SIZES[size] * self.directions[d].factor

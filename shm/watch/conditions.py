@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
@@ -13,46 +13,43 @@ from shm.values import NAN, FloatArray
 from shm.watch.options import WatchOptions
 
 DAYS_PER_YEAR = 365.25  # Julian
+OF_ONE_VISIT_YEARS = 1.5 / DAYS_PER_YEAR  # judgement: tests that share wind, sensors and operator
 _SEASON_YEARS = 60 / DAYS_PER_YEAR  # judgement: so many days are of one season
 
 
 @dataclass(frozen=True, eq=False)
 class Warmth:
-    """What the temperatures of the readings so far say of the next that has none.
+    """Of tests (T,): kelvin from the reference, the sd of each, and how many tests of its season
+    before it lack their temperature as well, itself among them (1 where it does not)."""
 
-    `reference_c` is the mean of the baseline's, or the first one known, NaN before there is any;
-    `known_k` are those measured, from it, and `unknown_years` the times of the last tests without.
+    kelvin: FloatArray
+    sd: FloatArray
+    shared: FloatArray
+
+
+def reference_of(temperatures_c: Sequence[float]) -> float:
+    """The mean of those known; NaN where none is."""
+    known = [value for value in temperatures_c if math.isfinite(value)]
+    return float(np.mean(known)) if known else NAN
+
+
+def warmth_of(
+    temperatures_c: FloatArray, years: FloatArray, reference_c: float, options: WatchOptions
+) -> Warmth:
+    """Of tests at `years` (T,), ascending.
+
+    A temperature that was not measured is as those measured: their mean and standard deviation.
+    Tests of one season share what they miss, so that those of 60 days tell no more together than
+    one. A thermometer tells the air's, which the steel follows in its own time.
     """
-
-    reference_c: float
-    known_k: FloatArray
-    unknown_years: FloatArray
-
-    @classmethod
-    def at(cls, temperatures_c: Sequence[float]) -> Warmth:
-        """Before any reading; the reference is the mean of the baseline's `temperatures_c`."""
-        known = [value for value in temperatures_c if math.isfinite(value)]
-        return cls(float(np.mean(known)) if known else NAN, np.zeros(0), np.zeros(0))
-
-    def after(
-        self, temperature_c: float, years: float, options: WatchOptions
-    ) -> tuple[Warmth, float, float]:
-        """The same after one more reading, and what is to be taken for its kelvin and their sd.
-
-        A temperature that was not measured is as those measured before: their mean and standard
-        deviation. Tests of one season share what they miss, so that those of 60 days tell no more
-        together than one. A thermometer tells the air's, which the steel follows in its own time.
-        """
-        if math.isfinite(temperature_c):
-            reference = self.reference_c if math.isfinite(self.reference_c) else temperature_c
-            kelvin = temperature_c - reference
-            known = np.append(self.known_k, kelvin)
-            warmth = replace(self, reference_c=reference, known_k=known)
-            return warmth, kelvin, options.thermometer_sd_k
-        lately = self.unknown_years[self.unknown_years > years - _SEASON_YEARS]
-        unknown = np.append(lately, years)
-        mean, sd = _unmeasured(self.known_k, options.unknown_temperature_sd_k)
-        return replace(self, unknown_years=unknown), mean, sd * math.sqrt(len(unknown))
+    known = np.isfinite(temperatures_c)
+    from_reference = temperatures_c[known] - reference_c
+    mean, sd = _unmeasured(from_reference, options.unknown_temperature_sd_k)
+    kelvin, of_each = np.full(len(years), mean), np.full(len(years), sd)
+    kelvin[known], of_each[known] = from_reference, options.thermometer_sd_k
+    lately = (years[:, None] >= years) & (years > years[:, None] - _SEASON_YEARS) & ~known
+    in_order = np.tril(lately)  # of tests at the very same time those before
+    return Warmth(kelvin, of_each, np.where(known, 1.0, in_order.sum(axis=1)))
 
 
 def years_between(first: datetime, second: datetime) -> float:

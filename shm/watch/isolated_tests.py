@@ -26,7 +26,7 @@ class Seen:
     """Tests (T,) mode by mode: `values` and `variances` (T, n), infinite where not measured.
 
     `factors` (n, c) with `sds` (c,) are what tests of one state scatter along, and by; `doubt`
-    (T, n) is what an unknown temperature does.
+    (T, n, m) are the factors of what conditions leave open.
     """
 
     values: FloatArray
@@ -42,9 +42,8 @@ class Seen:
             return 0.0, 0, 0.0
         scatter = self.factors[both] * self.sds
         covariance = 2 * scatter @ scatter.T
-        apart = (self.doubt[one] - self.doubt[other])[both]
-        for doubt in (self.doubt[one][both], self.doubt[other][both], apart):
-            covariance += np.outer(doubt, doubt) / 2
+        for doubt in (self.doubt[one][both], self.doubt[other][both]):
+            covariance += doubt @ doubt.T
         covariance += np.diag((self.variances[one] + self.variances[other])[both])
         off = (self.values[one] - self.values[other])[both]
         return (

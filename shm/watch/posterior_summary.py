@@ -24,7 +24,7 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
-from shm.watch.change_point import STEP, Evidence
+from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import coordinate_of, shift_of, value_at
@@ -175,7 +175,7 @@ def _as_changed(
     weights, changes = _leading(evidence, part)
     found = [evidence.change_at(each) for each in changes]
     n = evidence.layout.n
-    together, alike = _company(evidence, part, names)
+    together, alike = _company(evidence, part, names, names[j])
     if j < len(quantities):
         mean = np.array([each[0][n + j] for each in found])
         sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
@@ -212,9 +212,9 @@ def _leading(evidence: Evidence, part: FloatArray) -> tuple[FloatArray, list[tup
 
 
 def _company(
-    evidence: Evidence, part: FloatArray, names: Sequence[str]
+    evidence: Evidence, part: FloatArray, names: Sequence[str], itself: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What moves with it in the likeliest direction of `part`; what does as well without.
+    """What moves with `itself` in the likeliest direction of `part`; what does as well without.
 
     The latter are what directions without it have whose evidence is as good, those aside that only
     add to another such.
@@ -236,11 +236,8 @@ def _company(
     fewest = [each for each in close if not any(other < each for other in close)]
     own = {n for j, n in enumerate(names) if n in likeliest}
     chosen = set().union(*fewest) - own
-    # What it is, is not among what moves with it.
-    first = next((n for n in names if n in likeliest), "")
-    return tuple(n for n in names if n in own and n != first), tuple(
-        n for n in names if n in chosen
-    )
+    together = tuple(name for name in names if name in own and name != itself)
+    return together, tuple(name for name in names if name in chosen)
 
 
 def drifted(
@@ -249,13 +246,16 @@ def drifted(
     causes: Evidence,
     reading: Reading,
     effects: FloatArray,
+    *,
+    is_baseline: bool,
 ) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline, called changes and a possible new one.
 
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
     threshold is averaged over all; where springs trade with the tension, and no frequency moves by
-    more than what is to be told (`effects`), nothing is beyond.
+    more than what is to be told (`effects`), nothing is beyond. As long as no test since the baseline
+    says anything, a shift is as open as before any.
     """
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
@@ -286,6 +286,9 @@ def drifted(
             part = np.array([j in each.members for each in evidence.directions])
             own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
             chosen = own[:3] if len(own[0]) else chosen
+        elif not evidence.called and not is_baseline:
+            sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
+            chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
         shift = shift_of_mixture(quantity, chosen[0], chosen[1][:, j], chosen[2][:, j])
         moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
         threshold = threshold_of(quantity, subject.hanger)

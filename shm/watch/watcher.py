@@ -39,17 +39,24 @@ from shm.watch.change_point import (
     evidence_of,
     sums_of,
 )
-from shm.watch.conditions import DAYS_PER_YEAR, Warmth, years_between
+from shm.watch.conditions import (
+    OF_ONE_VISIT_YEARS,
+    Warmth,
+    reference_of,
+    warmth_of,
+    years_between,
+)
 from shm.watch.isolated_tests import Seen, counted, outlier_probability
 from shm.watch.options import WatchOptions
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
 from shm.watch.scatter import differences, learnt
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 3
-_SAME_DAY_YEARS = 1.5 / DAYS_PER_YEAR  # judgement: of one visit: wind, sensors, operator
+_VERSION = 4
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
-_LEAST_SHARE = 1e-3  # judgement: of a cause in a call, which later tests may yet speak for
+# Technical: what a test says goes nearly in proportion to its weight.
+_MOST_REPEATS, _NEARLY = 6, 0.5
+_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +96,12 @@ class WatchState:
     per_kelvin: FloatArray
     coordinates: FloatArray
     years: FloatArray
-    kelvin: FloatArray
+    temperature_c: FloatArray
     log_amplitude: FloatArray
-    doubt: FloatArray
     weight: FloatArray
-    unknown_years: FloatArray
     counted: BoolArray
     coefficients: FloatArray
+    coefficient_sd: FloatArray
     scatter_variance: FloatArray
     called: FloatArray
     called_precision: FloatArray
@@ -176,25 +182,23 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
-        warmth = Warmth.at([reading.temperature_c for reading in readings])
         state = WatchState(
             key=self.key,
             start=time,
             last_time=time,
-            reference_c=warmth.reference_c,
+            reference_c=reference_of([reading.temperature_c for reading in readings]),
             values=np.zeros((0, n)),
             variances=np.zeros((0, n)),
             slopes=np.zeros((0, n, q)),
             per_kelvin=np.zeros((0, n)),
             coordinates=np.zeros((0, q)),
             years=np.zeros(0),
-            kelvin=np.zeros(0),
+            temperature_c=np.zeros(0),
             log_amplitude=np.zeros(0),
-            doubt=np.zeros((0, n)),
             weight=np.zeros(0),
-            unknown_years=np.zeros(0),
             counted=np.zeros(0, bool),
             coefficients=np.zeros(q),
+            coefficient_sd=self.structure.layout.prior_sd[n + q : n + 2 * q],
             scatter_variance=self.structure.scatter_variance,
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),
@@ -226,7 +230,7 @@ class Watcher:
             )
         state = self._with(state, reading)
         state = self._bounded(state)
-        rows = np.flatnonzero(state.counted)
+        rows = _counting(state)
         evidence = self._evidence(state, rows)
         causes = evidence
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
@@ -239,7 +243,14 @@ class Watcher:
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
-            drifts=drifted(subject, evidence, causes, reading, effects),
+            drifts=drifted(
+                subject,
+                evidence,
+                causes,
+                reading,
+                effects,
+                is_baseline=state.tests <= self.options.baseline_tests,
+            ),
             change=changed(
                 subject,
                 evidence,
@@ -250,25 +261,29 @@ class Watcher:
                 effects,
             ),
         )
-        coefficients = self._coefficients(evidence)
+        coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
             begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
             sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
             state = replace(state, called=begun, called_precision=sizes, still_same=still)
-        return replace(state, coefficients=coefficients), found
+        state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
+        return state, found
 
     def _bounded(self, state: WatchState) -> WatchState:
-        """The newest test with what is left of its weight: alone it speaks for no change by more
+        """The newest visit with what is left of its weight: alone it speaks for no change by more
         than it may, whether it counts by now or only once another agrees with it."""
+        visit = state.years >= state.years[-1] - OF_ONE_VISIT_YEARS
         rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
-        alone = self._evidence(state, rows).log_of_last
-        most = self.options.most_of_one_test_nats
-        if alone <= most:
-            return state
-        weight = state.weight.copy()
-        weight[-1] = most / alone
-        return replace(state, weight=weight)
+        most = math.log(self.options.most_of_one_test * self.options.limit_years)
+        for _ in range(_MOST_REPEATS):
+            factor, mass = self._evidence(state, rows).of_last_visit
+            if mass <= most + _NEARLY:
+                break
+            weight = state.weight.copy()
+            weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
+            state = replace(state, weight=weight)
+        return state
 
     def _with(self, state: WatchState, reading: Reading) -> WatchState:
         """The state with one more test in it, and who counts now."""
@@ -276,34 +291,30 @@ class Watcher:
         if reading.mean.shape != (q,):
             raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
         years = years_between(state.start, reading.time)
-        known = state.kelvin[~np.isin(state.years, state.unknown_years)]
-        warmth = Warmth(state.reference_c, known, state.unknown_years)
-        warmth, kelvin, sd = warmth.after(reading.temperature_c, years, self.options)
+        known = [value for value in (state.reference_c, reading.temperature_c) if value == value]
         modes = reading.modes
         values = np.zeros(n) if modes is None else modes.values
         variances = np.full(n, np.inf) if modes is None else modes.variances
         slopes = np.zeros((n, q)) if modes is None else modes.slopes
         softening = np.zeros(n) if modes is None else modes.per_kelvin
         level = math.log(reading.amplitude) if reading.amplitude > 0 else math.nan
-        doubt = sd * (softening + slopes @ state.coefficients)
         rows = {
-            "values": values - kelvin * softening,
+            "values": values,
             "variances": variances,
             "slopes": slopes,
             "per_kelvin": softening,
             "coordinates": reading.mean,
             "years": years,
-            "kelvin": kelvin,
+            "temperature_c": reading.temperature_c,
             "log_amplitude": level,
-            "doubt": doubt,
             "weight": 1.0,
         }
         grown: dict[str, Any] = {
             name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
             for name, row in rows.items()
         }
-        grown["unknown_years"] = warmth.unknown_years
-        later = replace(state, last_time=reading.time, reference_c=warmth.reference_c, **grown)
+        reference_c = known[0] if known else math.nan
+        later = replace(state, last_time=reading.time, reference_c=reference_c, **grown)
         counts = counted(self._seen(later), state.counted, self.options.baseline_tests)
         later = replace(later, counted=counts)
         return replace(later, scatter_variance=self._scatter(later))
@@ -315,35 +326,52 @@ class Watcher:
         )
         return np.concatenate([state.slopes, fixed], axis=2)
 
+    def _warmth(self, state: WatchState) -> Warmth:
+        return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
+
+    def _doubt(self, state: WatchState, kelvin_sd: FloatArray) -> FloatArray:
+        """Factors (T, n, 1 + q) of what a temperature that is not known, or not well, leaves open:
+        what a kelvin does as far as that is known, and as far as it is not."""
+        known = state.per_kelvin + state.slopes @ state.coefficients
+        unknown = state.slopes * state.coefficient_sd
+        per_kelvin = np.concatenate([known[:, :, None], unknown], axis=2)
+        return np.asarray(kelvin_sd[:, None, None] * per_kelvin)
+
     def _seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
-        at_rest = state.values - state.kelvin[:, None] * (state.slopes @ state.coefficients)
-        factors = self._factors(state)
+        factors, warmth = self._factors(state), self._warmth(state)
         measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
         variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
-            values=at_rest,
+            values=self._at_rest(state, warmth),
             variances=state.variances,
-            doubt=state.doubt,
+            doubt=self._doubt(state, warmth.sd),
             factors=factors[measured[-1]] if len(measured) else factors[-1],
             sds=np.sqrt(variance),
         )
 
+    def _at_rest(self, state: WatchState, warmth: Warmth) -> FloatArray:
+        swing = warmth.kelvin[:, None] * (state.per_kelvin + state.slopes @ state.coefficients)
+        return np.asarray(state.values - swing)
+
     def _scatter(self, state: WatchState) -> FloatArray:
-        """What the counted tests so far say of the scatter (q + c,)."""
-        seen = self._seen(state)
-        rows = state.counted
-        doubted = np.square(state.doubt[rows])
+        """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
+        rows = np.flatnonzero(state.counted)
+        rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
+        warmth = self._warmth(state)
         found = differences(
-            seen.values[rows], state.variances[rows] + doubted, self._factors(state)[rows]
+            self._at_rest(state, warmth)[rows],
+            state.variances[rows],
+            self._factors(state)[rows],
+            self._doubt(state, warmth.sd)[rows],
         )
         return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
     def _sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
         structure, layout = self.structure, self.structure.layout
-        years = state.years[rows]
-        of_a_day = (np.abs(years[:, None] - years) < _SAME_DAY_YEARS).sum(axis=1)
+        warmth, years = self._warmth(state), state.years[rows]
+        of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
         slopes, level = state.slopes[rows], state.log_amplitude[rows]
         known = np.isfinite(level)
         usual = float(np.median(level[known])) if known.any() else 0.0
@@ -351,14 +379,15 @@ class Watcher:
         of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
         unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
         unknown[known] = 0.0
-        doubt = state.doubt[rows]
-        common = unknown @ np.swapaxes(unknown, 1, 2) + doubt[:, :, None] * doubt[:, None, :]
+        doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
+        open_left = np.concatenate([unknown, doubt], axis=2)
+        common = open_left @ np.swapaxes(open_left, 1, 2)
         tension = [each.name == TENSION for each in self.quantities]
         columns = np.concatenate(
             [
                 np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
                 slopes,
-                slopes * state.kelvin[rows, None, None],
+                slopes * warmth.kelvin[rows, None, None],
                 slopes * level[:, None, None],
                 slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
             ],
@@ -371,7 +400,7 @@ class Watcher:
         wider = 1 / state.weight[rows]
         return sums_of(
             columns,
-            state.values[rows],
+            state.values[rows] - warmth.kelvin[rows, None] * state.per_kelvin[rows],
             wider[:, None] * state.variances[rows],
             wider[:, None, None, None] * covariance,
         )
@@ -405,10 +434,12 @@ class Watcher:
         firsts = [planes.index(plane) for plane in dict.fromkeys(planes)]
         return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
 
-    def _coefficients(self, evidence: Evidence) -> FloatArray:
-        """How far each quantity goes with a kelvin (q,), by the likeliest scatter."""
+    def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
+        """How far each quantity goes with a kelvin (q,) and its sd, by the likeliest scatter."""
         n, q = self.structure.layout.n, self.structure.layout.q
-        return np.asarray(evidence.null_mean[int(evidence.log_null.argmax()), n : n + q])
+        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + q)
+        variance = np.diag(evidence.null_covariance[likeliest])[own]
+        return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
 
     def _outlier(self, state: WatchState, test: int) -> float:
         before = np.flatnonzero(state.counted[:test])
@@ -441,6 +472,12 @@ def watched(
         tests.append(found)
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
+
+
+def _counting(state: WatchState) -> IntArray:
+    """The tests that count; as long as none does, the newest, which then says nothing."""
+    rows = np.flatnonzero(state.counted)
+    return rows if len(rows) else np.array([state.tests - 1])
 
 
 def _begun(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:

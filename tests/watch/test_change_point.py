@@ -208,8 +208,10 @@ def test_the_last_test_alone_speaks_by_its_largest_factor() -> None:
     waited = math.log(1 / 12)
     factor = example.evidence.log_mass[-1, 0, STEP, 0] - math.log(0.4) - LOG_SHARES - waited
 
-    assert example.evidence.log_of_last == pytest.approx(float(factor.max()))
-    assert example.evidence.log_of_last > 3
+    found, mass = example.evidence.of_last_visit
+    assert found == pytest.approx(float(factor.max()))
+    assert found > 3
+    assert mass == pytest.approx(float(logsumexp(example.evidence.log_mass[-1])))
     of_last = example.evidence.log_mass[-1]
     assert example.evidence.log_evidence < float(logsumexp(of_last))
 

@@ -27,7 +27,9 @@ def found(values: FloatArray, variances: FloatArray | None = None) -> FloatArray
     factors = np.broadcast_to(np.hstack([FACTORS, ABSENT]), (tests, MODES, 4))
     variance = PRIOR
     for _ in range(4):
-        variance = learnt(differences(values, variances, factors), PRIOR, variance)
+        variance = learnt(
+            differences(values, variances, factors, np.zeros((tests, MODES, 1))), PRIOR, variance
+        )
     return np.sqrt(variance)
 
 
