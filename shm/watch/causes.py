@@ -25,13 +25,14 @@ from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
 
 POINT_MASS, SECTION_LOSS, TIMEBASE = "point_mass", "section_loss", "timebase"
+SPRINGS = "springs"
 SENSOR_MASS, BENDING_STIFFNESS, UNEXPLAINED = "sensor_mass", "bending_stiffness", "unexplained"
 
 # Judgement, from what owners of bridges report: most of what lasts are tension and joints; lamps,
 # cables and sensors follow; what nobody thought of is as likely as any one of these.
 _SHARES = {
     TENSION: 0.4,
-    "springs": 0.28,
+    SPRINGS: 0.28,
     POINT_MASS: 0.07,
     SENSOR_MASS: 0.06,
     SECTION_LOSS: 0.04,
@@ -198,11 +199,11 @@ def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list
         factor = np.zeros((n + q, len(members)))
         factor[n:] = steps[:, None] * root
         alone = members == (0,) and quantities[0].name == TENSION
-        share = _SHARES[TENSION] if alone else _SHARES["springs"] / max(len(own) - 1, 1)
-        name = TENSION if alone else "springs"
+        share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(own) - 1, 1)
+        name = TENSION if alone else SPRINGS
         found.append(Direction(name, factor, members, float(np.log(share))))
     if len(own) == 1:
-        found[0] = replace(found[0], log_prior=float(np.log(_SHARES[TENSION] + _SHARES["springs"])))
+        found[0] = replace(found[0], log_prior=float(np.log(_SHARES[TENSION] + _SHARES[SPRINGS])))
     for cause in (POINT_MASS, SECTION_LOSS, BENDING_STIFFNESS, TIMEBASE):
         places = columns.by_cause[cause]
         for place in places:

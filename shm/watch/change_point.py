@@ -122,6 +122,7 @@ def sums_of(
 class Evidence:
     """What all tests say: of each change (beginnings, K, kinds, D, sizes) its log mass in years.
 
+    `log_most` bounds what all masses together are worth (`persistence`).
     `log_null` (K,) is the log probability of each scatter without change. `beginnings` are numbers
     of tests: the change came before it. `years` are the tests' times.
     """
@@ -136,6 +137,7 @@ class Evidence:
     null_mean: FloatArray
     null_covariance: FloatArray
     seen: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
+    log_most: float = math.inf
     _asked: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = field(
         default_factory=dict, repr=False
     )
@@ -154,7 +156,12 @@ class Evidence:
         choices = math.log(len(self.log_null))
         worst = float(self.log_null.max()) + choices
         of_more = self.years[self.beginnings] < self.years[-1] - OF_ONE_VISIT_YEARS
-        return _total(self.log_mass[of_more]) - max(worst, 0.0)
+        return min(_total(self.log_mass[of_more]) - max(worst, 0.0), self.log_most)
+
+    @property
+    def waited(self) -> FloatArray:
+        """Years (beginnings,) in which each may have begun."""
+        return _waited(self.years, self.beginnings)
 
     @cached_property
     def shares(self) -> FloatArray:

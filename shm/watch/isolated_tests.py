@@ -98,11 +98,15 @@ def _of_baseline(seen: Seen, first: int) -> BoolArray:
     return np.asarray(found if found.any() else measured)
 
 
-def outlier_probability(seen: Seen, test: int, before: int, prior: float) -> float:
-    """That `test` is a blunder, by how it lies to the test `before` it that counts."""
-    square, d, _ = seen.distance(test, before)
-    if not d:
+def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -> float:
+    """That `test` is a blunder, by how it lies to the nearest of the last that count (`known`)."""
+    odds = np.log(prior / (1 - prior))
+    against = []
+    for before in np.flatnonzero(known[:test])[-_BEFORE:]:
+        square, d, _ = seen.distance(test, int(before))
+        if d:
+            wide = -(_TAIL + d) / 2 * np.log1p(square / _TAIL / _WIDER**2) - d * np.log(_WIDER)
+            against.append(wide + square / 2)
+    if not against:
         return prior
-    wide = -(_TAIL + d) / 2 * np.log1p(square / _TAIL / _WIDER**2) - d * np.log(_WIDER)
-    odds = np.log(prior / (1 - prior)) + wide + square / 2
-    return float(1 / (1 + np.exp(-np.clip(odds, -700, 700))))
+    return float(1 / (1 + np.exp(-np.clip(odds + min(against), -700, 700))))

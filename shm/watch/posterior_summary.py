@@ -51,7 +51,7 @@ class Subject:
 
 def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
     """That something has changed since the last call, if changes come at the rate assumed."""
-    odds = evidence.log_statistic + math.log(options.change_rate_per_year)
+    odds = min(evidence.log_statistic, evidence.log_most) + math.log(options.change_rate_per_year)
     return 1 / (1 + math.exp(min(-odds, 700.0)))
 
 

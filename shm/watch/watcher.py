@@ -48,6 +48,7 @@ from shm.watch.conditions import (
 )
 from shm.watch.isolated_tests import Seen, counted, outlier_probability
 from shm.watch.options import WatchOptions
+from shm.watch.persistence import Course, most_evidence
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
 from shm.watch.scatter import differences, learnt
 
@@ -236,6 +237,8 @@ class Watcher:
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
+            stays = most_evidence(causes, self._course(state, rows, causes.called))
+            evidence = replace(evidence, log_most=stays)
         subject = Subject(self.quantities, self.hanger, self.options, state.start)
         last, effects = state.tests - 1, self._effects(state)
         outlier = self._outlier(state, last)
@@ -367,42 +370,67 @@ class Watcher:
         )
         return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
+    def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
+        """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
+        layout, warmth = self.structure.layout, self._warmth(state)
+        slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
+        tension = [each.name == TENSION for each in self.quantities]
+        return np.concatenate(
+            [
+                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
+                slopes,
+                slopes * warmth.kelvin[rows, None, None],
+                slopes * np.nan_to_num(level)[:, None, None],
+                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+            ],
+            axis=2,
+        )
+
+    def _softened(self, state: WatchState, rows: IntArray) -> FloatArray:
+        """Log frequencies (T, n) less what a softer steel does."""
+        kelvin = self._warmth(state).kelvin
+        return np.asarray(state.values[rows] - kelvin[rows, None] * state.per_kelvin[rows])
+
     def _sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
         structure, layout = self.structure, self.structure.layout
         warmth, years = self._warmth(state), state.years[rows]
         of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
-        slopes, level = state.slopes[rows], state.log_amplitude[rows]
-        known = np.isfinite(level)
-        usual = float(np.median(level[known])) if known.any() else 0.0
-        level = np.where(known, level - usual, 0.0)
         of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
-        unknown = slopes * (self.options.unknown_log_amplitude_sd * of_level)
-        unknown[known] = 0.0
+        unknown = state.slopes[rows] * (self.options.unknown_log_amplitude_sd * of_level)
+        unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
         doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
         open_left = np.concatenate([unknown, doubt], axis=2)
         common = open_left @ np.swapaxes(open_left, 1, 2)
-        tension = [each.name == TENSION for each in self.quantities]
-        columns = np.concatenate(
-            [
-                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
-                slopes,
-                slopes * warmth.kelvin[rows, None, None],
-                slopes * level[:, None, None],
-                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
-            ],
-            axis=2,
-        )
         factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
         spread = factors @ np.swapaxes(factors, 1, 2)
         scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
         covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
         wider = 1 / state.weight[rows]
         return sums_of(
-            columns,
-            state.values[rows] - warmth.kelvin[rows, None] * state.per_kelvin[rows],
+            self._columns(state, rows),
+            self._softened(state, rows),
             wider[:, None] * state.variances[rows],
             wider[:, None, None, None] * covariance,
+        )
+
+    def _course(self, state: WatchState, rows: IntArray, called: Sequence[Told]) -> Course:
+        """The tests `rows` with what the null says of each, called changes included."""
+        layout = self.structure.layout
+        columns = self._columns(state, rows)
+        changing, years = columns[:, :, layout.change], state.years[rows]
+        parts = [columns[:, :, layout.null]]
+        for each in called:
+            since = np.where(np.arange(len(rows)) >= each.first, 1.0, 0.0)
+            for _ in range(2 if each.is_ramp else 1):
+                parts.append(changing * since[:, None, None])
+                since = since * (years - each.years)
+        own = self.options.mode_scatter**2
+        return Course(
+            np.concatenate(parts, axis=2),
+            changing,
+            self._softened(state, rows),
+            state.variances[rows] + own,
         )
 
     def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
@@ -442,11 +470,8 @@ class Watcher:
         return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
 
     def _outlier(self, state: WatchState, test: int) -> float:
-        before = np.flatnonzero(state.counted[:test])
         prior = self.options.outlier_probability
-        if not len(before):
-            return prior
-        return outlier_probability(self._seen(state), test, int(before[-1]), prior)
+        return outlier_probability(self._seen(state), state.counted, test, prior)
 
 
 def watched(
@@ -472,6 +497,12 @@ def watched(
         tests.append(found)
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
+
+
+def _levels(log_amplitude: FloatArray) -> FloatArray:
+    """Over the usual one, NaN where unknown."""
+    known = np.isfinite(log_amplitude)
+    return log_amplitude - (float(np.median(log_amplitude[known])) if known.any() else 0.0)
 
 
 def _counting(state: WatchState) -> IntArray:
