@@ -47,10 +47,12 @@ class Course:
 
 
 def most_evidence(evidence: Evidence, course: Course) -> float:
-    """Log of the years that what stays has for it: the most of the likeliest changes."""
+    """Log of the years that what stays has for it: of each change no more than it has anyway, and
+    the most of all."""
     found = -math.inf
     for index in _likeliest(evidence):
-        found = max(found, _of_change(evidence, course, index))
+        mass = float(evidence.log_mass[index])
+        found = max(found, min(mass, _of_change(evidence, course, index)))
     return found
 
 

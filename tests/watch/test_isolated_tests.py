@@ -69,7 +69,7 @@ def test_a_test_without_modes_in_common_agrees_with_none() -> None:
 
     assert given.distance(0, 1) == (0.0, 0, 0.0)
     assert not given.agree(0, 1)
-    assert outlier_probability(given, 1, 0, 0.01) == 0.01
+    assert outlier_probability(given, np.ones(2, bool), 1, 0.01) == 0.01
 
 
 def test_what_an_unknown_temperature_does_is_allowed_for() -> None:
@@ -81,7 +81,7 @@ def test_what_an_unknown_temperature_does_is_allowed_for() -> None:
 
 def test_the_probability_of_a_blunder_grows_with_its_distance() -> None:
     given = seen(np.array([0.0, 0.0, 0.005, 0.01, 0.02, 0.2]))
-    found = [outlier_probability(given, test, 0, 0.01) for test in range(1, 6)]
+    found = [outlier_probability(given, np.arange(6) == 0, test, 0.01) for test in range(1, 6)]
 
     assert found == sorted(found)
     assert found[0] < 0.01 < 0.99 < found[-1]
