@@ -33,7 +33,8 @@ class WatchedQuantity:
     to the baseline's; of a spring the change of the mean log frequency. `coordinates` (m,),
     ascending, and `values` (m,) map it to the tension in N or to log10 of the stiffness; `baseline`
     is the value at 0. `step_sd` is the standard deviation of a change, if there is one, before any
-    data, in the coordinate.
+    data, in the coordinate. `scale_sd` is by what share of itself a shift may be off since the
+    baseline's value is not known well: a bar's frequencies tell newtons, a fraction is of these.
     """
 
     name: str
@@ -44,6 +45,7 @@ class WatchedQuantity:
     end: End | None = None
     plane: Plane | None = None
     parameters: tuple[str, ...] = ()
+    scale_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

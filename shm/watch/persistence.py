@@ -28,6 +28,8 @@ _SHOWING = 0.9  # judgement: of the tests after a change; one in ten is disturbe
 # and along any other, as if from so many tests. Judgement: windy days are one in seven; heavy
 # vehicles, sensors and mistakes together one test in thirty, which no number of tests disproves.
 _SPRINGS_SEEM, _SEEM, _AS_FROM = 0.15, 0.03, 5.0
+# Of a log frequency: no load that passes does as much, but a blunder may.
+_LARGE, _LARGE_SEEM = 0.04, 0.01
 _LEADING = 12  # technical: hypotheses that are asked, the likeliest
 _TELLING = 0.5  # of a change: a test that is less sure of it by itself says nothing
 
@@ -60,7 +62,7 @@ def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
     """The likeliest changes of different beginning, kind and cause."""
     by_cause = evidence.log_mass.max(axis=(1, 4), initial=-math.inf)
     order = np.argsort(by_cause.ravel())[::-1][:_LEADING]
-    chosen = []
+    chosen: list[tuple[int, ...]] = []
     for at, kind, d in np.array(np.unravel_index(order, by_cause.shape)).T.tolist():
         of_one = evidence.log_mass[at, :, kind, d]
         k, size = np.unravel_index(int(of_one.argmax()), of_one.shape)
@@ -73,7 +75,7 @@ def _of_change(evidence: Evidence, course: Course, index: tuple[int, ...]) -> fl
     at, _, kind, d, _ = index
     first = int(evidence.beginnings[at])
     begun = max((each.first for each in evidence.called), default=0)
-    shown, sd = _shown(evidence, course, index)
+    shown, sd, largest = _shown(evidence, course, index)
     expected = np.ones(len(shown))
     if kind == RAMP:
         since = evidence.years - float(evidence.years[first - 1])
@@ -81,10 +83,11 @@ def _of_change(evidence: Evidence, course: Course, index: tuple[int, ...]) -> fl
     is_after = np.arange(len(shown)) >= first
     before = shown[begun:first][sd[begun:first] < _TELLING]
     after = is_after & (sd < _TELLING * expected)
-    seem = _SPRINGS_SEEM if evidence.directions[d].name == SPRINGS else _SEEM
+    least = _LARGE_SEEM if largest > _LARGE else _SEEM
+    seem = _SPRINGS_SEEM if evidence.directions[d].name == SPRINGS else least
     does = shown[after] >= _SHOWN * expected[after]
     as_far = (before[:, None] >= _SHOWN * expected[after]).sum(axis=0)
-    odd = np.maximum((as_far + seem * _AS_FROM) / (len(before) + _AS_FROM), _SEEM)
+    odd = np.maximum((as_far + seem * _AS_FROM) / (len(before) + _AS_FROM), least)
     showing, not_showing = _SHOWING * _AS_FROM, (1 - _SHOWING) * _AS_FROM
     likely = scipy.special.betaln(showing + does.sum(), not_showing + (~does).sum())
     likely -= scipy.special.betaln(showing, not_showing)
@@ -97,8 +100,9 @@ def _of_change(evidence: Evidence, course: Course, index: tuple[int, ...]) -> fl
 
 def _shown(
     evidence: Evidence, course: Course, index: tuple[int, ...]
-) -> tuple[FloatArray, FloatArray]:
-    """How much of a change each test (T,) shows by itself, 1 all of it, and the sd of that."""
+) -> tuple[FloatArray, FloatArray, float]:
+    """How much of a change each test (T,) shows by itself, 1 all of it, the sd of that, and the
+    largest that it does to a log frequency."""
     change, _ = evidence.change_at(index)
     null, _ = evidence.of_null(index, np.eye(evidence.null_mean.shape[1]))
     measured = np.isfinite(course.variances)
@@ -106,4 +110,5 @@ def _shown(
     moves = course.changing @ change
     rest = course.values - course.rows @ null
     strength = np.maximum((weight * moves**2).sum(axis=1), 1e-12)
-    return (weight * moves * rest).sum(axis=1) / strength, strength**-0.5
+    largest = float(np.abs(moves).max(initial=0.0))
+    return (weight * moves * rest).sum(axis=1) / strength, strength**-0.5, largest

@@ -37,12 +37,14 @@ _MOST = 120  # technical: changes that a mixture is made of, the likeliest
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What all tests of one hanger share; `start` is the time of the first reading."""
+    """What all tests of one hanger share; `start` is the time of the first reading, and
+    `baseline_years` from it the mean of the baseline's."""
 
     quantities: tuple[WatchedQuantity, ...]
     hanger: Hanger
     options: WatchOptions
     start: datetime
+    baseline_years: float
 
     def at(self, years: float) -> datetime:
         """The time so many years from the start."""
@@ -179,6 +181,7 @@ def _as_changed(
     if j < len(quantities):
         mean = np.array([each[0][n + j] for each in found])
         sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
+        sd = np.hypot(sd, quantities[j].scale_sd * mean)
         shift = shift_of_mixture(quantities[j], weights, mean, sd)
         end, plane = quantities[j].end, quantities[j].plane
     else:
@@ -249,7 +252,7 @@ def drifted(
     *,
     is_baseline: bool,
 ) -> tuple[Drift, ...]:
-    """The shift of each quantity since the baseline, called changes and a possible new one.
+    """The shift of each quantity since the baseline: slow creep, called changes, and a new one.
 
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
@@ -259,7 +262,7 @@ def drifted(
     """
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
-    loadings = _of_called(evidence)
+    loadings = _of_null(evidence, subject)
     nulls = [
         (
             float(weight),
@@ -275,7 +278,8 @@ def drifted(
     all_weights = np.concatenate([none, probability * weights]) if len(weights) else none
     all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
     sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
-    all_sds = np.concatenate([sds_of_null.reshape(-1, q), sds])
+    scale = np.array([each.scale_sd for each in subject.quantities])
+    all_sds = np.hypot(np.concatenate([sds_of_null.reshape(-1, q), sds]), scale * all_means)
     told = np.ones(len(all_weights))
     if len(changes) and not evidence.called:
         told[len(none) :] = _materials(subject, evidence, changes, effects)
@@ -285,7 +289,7 @@ def drifted(
         if not evidence.called and len(evidence.beginnings):
             part = np.array([j in each.members for each in evidence.directions])
             own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
-            chosen = own[:3] if len(own[0]) else chosen
+            chosen = (*own[:2], np.hypot(own[2], scale * own[1])) if len(own[0]) else chosen
         elif not evidence.called and not is_baseline:
             sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
             chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
@@ -304,17 +308,17 @@ def drifted(
     return tuple(found)
 
 
-def _of_called(evidence: Evidence) -> FloatArray:
-    """Loadings (q, null) of the called changes on the shift of each quantity by now."""
+def _of_null(evidence: Evidence, subject: Subject) -> FloatArray:
+    """Loadings (q, null) of slow creep and called changes on the shift of each quantity by now."""
     layout, now = evidence.layout, float(evidence.years[-1])
-    size = layout.n + layout.q
-    blocks = [np.zeros((layout.q, len(layout.null)))]
     own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
+    creep = np.zeros((layout.q, len(layout.null)))
+    creep[[each.name == TENSION for each in subject.quantities], -1] = now - subject.baseline_years
+    blocks = [creep]
     for each in evidence.called:
         blocks.append(own)
         if each.is_ramp:
             blocks.append((now - each.years) * own)
-    assert all(block.shape[1] in (size, len(layout.null)) for block in blocks)
     return np.hstack(blocks)
 
 
@@ -336,13 +340,10 @@ def _shifts(
     means, sds = [], []
     for each in changes:
         mean, factor = evidence.change_at(each)
-        own_mean, own = mean[layout.n :], factor[layout.n :]
-        covariance = own @ own.T
-        if evidence.called:
-            before, spread = evidence.of_null(each, loadings)
-            own_mean, covariance = own_mean + before, covariance + spread
-        means.append(own_mean)
-        sds.append(np.sqrt(np.maximum(np.diag(covariance), 0)))
+        before, spread = evidence.of_null(each, loadings)
+        means.append(mean[layout.n :] + before)
+        variance = np.square(factor[layout.n :]).sum(axis=1) + np.diag(spread)
+        sds.append(np.sqrt(np.maximum(variance, 0)))
     shape = (-1, layout.q)
     return weights, np.array(means).reshape(shape), np.array(sds).reshape(shape), changes
 

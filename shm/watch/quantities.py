@@ -177,8 +177,15 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
     coordinates = np.union1d(between, 0.0)
     mean_n = float(baseline.tension_n.mean())
     values = mean_n * np.exp(coordinates)
+    at_base_n = base[column] * model.hanger.nominal_tension_n
     return WatchedQuantity(
-        TENSION, mean_n, coordinates, values, _TENSION_STEP, parameters=(_TENSION_RATIO,)
+        TENSION,
+        mean_n,
+        coordinates,
+        values,
+        _TENSION_STEP,
+        parameters=(_TENSION_RATIO,),
+        scale_sd=_off_by(at_base_n / baseline.tension_n),
     )
 
 
@@ -311,6 +318,7 @@ def _spring(response: _Response, baseline: Posterior) -> WatchedQuantity:
     kept = _rising(response.mean, int(np.searchsorted(response.log10_k, response.base)))
     samples = np.column_stack([baseline.parameter(name) for name in response.names])
     alone = len(response.names) == 1
+    of_samples = np.maximum(_step_at(response, common_stiffness(samples)), _INVISIBLE)
     return WatchedQuantity(
         name=response.names[0] if alone else f"{response.plane}_end_stiffness",
         baseline=response.base,
@@ -320,6 +328,7 @@ def _spring(response: _Response, baseline: Posterior) -> WatchedQuantity:
         end=_ENDS.get(_bare(response.names[0])) if alone else None,
         plane=response.plane,
         parameters=response.names,
+        scale_sd=_off_by(_step_at(response, np.array([response.base])) / of_samples),
     )
 
 
@@ -333,6 +342,11 @@ def _rising(mean: FloatArray, at: int) -> list[int]:
         if mean[index] < mean[below[-1]] - _ROUNDING:
             below.append(index)
     return [*below[:0:-1], *above]
+
+
+def _off_by(ratios: FloatArray) -> float:
+    """Root mean square of ratios (n,) less 1; off by all of itself is not known at all."""
+    return min(float(np.sqrt(np.mean((ratios - 1) ** 2))), 1.0)
 
 
 def _spring_step(response: _Response, samples: FloatArray) -> float:

@@ -239,7 +239,8 @@ class Watcher:
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
             stays = most_evidence(causes, self._course(state, rows, causes.called))
             evidence = replace(evidence, log_most=stays)
-        subject = Subject(self.quantities, self.hanger, self.options, state.start)
+        of_baseline = float(state.years[: self.options.baseline_tests].mean())
+        subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
         last, effects = state.tests - 1, self._effects(state)
         outlier = self._outlier(state, last)
         found = WatchedTest(
