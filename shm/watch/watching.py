@@ -36,7 +36,8 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import message_of, message_of_odd, short_name, suspects
+from shm.watch.alert_text import message_of, message_of_odd, short_name
+from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.watcher import Watch, Watcher, WatchState, watched

@@ -544,7 +544,8 @@ def test_a_counted_and_a_held_test_that_agree_say_so_in_either_order(
     spool(workspace, "held", EPOCH, tension=0.9)
     ingest(workspace)
     with workspace.store() as store:
-        (notice,) = (stored.alert for stored in store.alerts.list_all())
+        repeat, notice = (stored.alert for stored in store.alerts.list_all())
+        assert repeat.kinds == ("repeat the test",)
         assert notice.kinds == ("held",)
         assert "of its tension: 2 tests agree, 1 of them held. Repeat" in notice.message
 

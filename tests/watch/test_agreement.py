@@ -121,10 +121,14 @@ def test_what_two_tests_have_told_the_watch_does_not_tell_again() -> None:
     and the fourth finds it beyond the threshold: no news for the owner."""
     apart = [replace(a_test(n), time=BEGIN + n * timedelta(days=30)) for n in range(1, 6)]
     baseline = baseline_of(a_test(0, 1.0))
-    kept, alerts, before = None, [], None
+    kept: bytes | None = None
+    before: ModalTest | None = None
+    alerts = []
     for test in apart:
         beside = came(*([before] if before else []))
-        found = watch_newest(*baseline, [(test, test.time)], HANGER, WatchOptions(), kept, beside)
+        found = watch_newest(
+            *baseline, [(test, test.time or BEGIN)], HANGER, WatchOptions(), kept, beside
+        )
         assert found is not None
         kept, before = found.kept, test
         alerts.append(found.alert and found.alert.key)
