@@ -159,15 +159,37 @@ class Change:
         return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
+@dataclass(frozen=True)
+class CreepRate:
+    """How fast the tension creeps, a fraction per year; `prior_sd` is the sd before any test.
+
+    Relaxation at such a rate is reported, and is no alarm.
+    """
+
+    mean: float
+    sd: float
+    prior_sd: float
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the tests, and not what is assumed before them, say what it is."""
+        return math.isfinite(self.mean) and self.sd < _INFORMED * self.prior_sd
+
+
 @dataclass(frozen=True, eq=False)
 class WatchedTest:
-    """The watch after one test: shifts of all quantities and what the sequential test says."""
+    """The watch after one test: shifts of all quantities and what the sequential test says.
+
+    `creep_per_year` is None where it is not known: a change that may have come is not told from it,
+    and former versions did not keep it.
+    """
 
     test: str
     time: datetime
     temperature_c: float
     drifts: tuple[Drift, ...]
     change: Change
+    creep_per_year: CreepRate | None = None
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from shm.values.force_units import force_unit
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
+    creep_words,
     ends_words,
     factor,
     group_words,
@@ -119,9 +120,14 @@ def short_name(test: str) -> str:
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:
-    """What was detected since the baseline, or how near the evidence is to a detection."""
+    """What was detected since the baseline, or how near the evidence is to a detection; creep."""
     if not watched:
         return ""
+    creep = creep_words(watched[-1].creep_per_year)
+    return " ".join(filter(None, (_detected_words(watched), creep)))
+
+
+def _detected_words(watched: Sequence[WatchedTest]) -> str:
     detected = [each.change for each in watched if each.change.called]
     if detected:
         each_one = (f"{_sentence(_changed(each))} {_when(each)}" for each in detected)

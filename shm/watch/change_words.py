@@ -10,7 +10,7 @@ from collections.abc import Sequence, Set
 
 from shm.models.effects import EFFECTS
 from shm.models.effects.base import OverTime
-from shm.values import TENSION, Change, Drift, End, Moved, Plane
+from shm.values import TENSION, Change, CreepRate, Drift, End, Moved, Plane
 from shm.watch.history import NINETY_PERCENT
 
 _PROBABLE = 0.1  # judgement: one in ten is worth a test that tells it from the rest
@@ -102,6 +102,17 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
     if verb == "moved":
         return f"moved by {rounded(mean, half, '+')}"
     return f"{verb} by {rounded(abs(mean), half)}"
+
+
+def creep_words(creep: CreepRate | None) -> str:
+    """`Tension relaxes by 0.30 ± 0.10 % a year.`; empty where the tests do not show the rate."""
+    if creep is None or not creep.is_known:
+        return ""
+    half = NINETY_PERCENT * creep.sd
+    if abs(creep.mean) <= half:
+        return f"Tension creeps by {rounded(creep.mean, half, '+')} a year, if at all."
+    verb = "relaxes" if creep.mean < 0 else "grows"
+    return f"Tension {verb} by {rounded(abs(creep.mean), half)} a year."
 
 
 def is_stiffness(quantity: str) -> bool:

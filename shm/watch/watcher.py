@@ -23,6 +23,7 @@ from shm.values import (
     TENSION,
     BoolArray,
     Change,
+    CreepRate,
     FloatArray,
     Hanger,
     IntArray,
@@ -249,6 +250,7 @@ class Watcher:
                 outlier,
                 effects,
             ),
+            creep_per_year=self._creep(evidence),
         )
         coefficients = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
@@ -409,6 +411,19 @@ class Watcher:
         """How far each quantity goes with a kelvin (q,), by the likeliest scatter."""
         n, q = self.structure.layout.n, self.structure.layout.q
         return np.asarray(evidence.null_mean[int(evidence.log_null.argmax()), n : n + q])
+
+    def _creep(self, evidence: Evidence) -> CreepRate | None:
+        """The tension's creep if nothing but what was called changes; None where that is unlikely.
+
+        It is the last covariate of the null, before the called changes.
+        """
+        if probability_of_change(evidence, self.options) > 0.5:
+            return None
+        at, weights = len(self.structure.layout.null) - 1, np.exp(evidence.log_null)
+        means, variances = evidence.null_mean[:, at], evidence.null_covariance[:, at, at]
+        mean = float(weights @ means)
+        variance = float(weights @ (variances + (means - mean) ** 2))
+        return CreepRate(mean, math.sqrt(variance), self.options.creep_per_year_sd)
 
     def _outlier(self, state: WatchState, test: int) -> float:
         before = np.flatnonzero(state.counted[:test])
