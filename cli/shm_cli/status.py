@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 
+from shm.documents import creep_document
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.report.formatting import model_class
-from shm.report.hanger_report import creep_document
 from shm.store import (
     ENDED,
     Decision,

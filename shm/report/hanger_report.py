@@ -16,9 +16,8 @@ from shm.report.hanger_tables import numbers, origins
 from shm.report.paper import CREDIBLE, Fact, Paper, Part
 from shm.report.period import period_json
 from shm.report.temperatures import temperature_documents
-from shm.values import CreepRate, FrequencyResponse
+from shm.values import FrequencyResponse
 from shm.values.stated_tension import StatedTension, stated
-from shm.watch.change_words import creep_words
 
 if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration
@@ -138,13 +137,6 @@ def _since_baseline(data: HangerReport) -> Fact:
     )
 
 
-def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
-    """The rate of creep, a fraction a year, and its sentence; None where no test shows it."""
-    if creep is None or not creep.is_known:
-        return None
-    return {"mean": creep.mean, "sd": creep.sd, "words": creep_words(creep)}
-
-
 REPORT_SCHEMA = "shm.report/1"
 
 
@@ -175,7 +167,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
-        "creep_per_year": creep_document(data.creep),
+        "creep_per_year": documents.creep_document(data.creep),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),
         "temperature_coefficients": temperature_documents(data.states),

@@ -17,7 +17,6 @@ from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
 from shm.watch.alert_text import action_words
-from shm.watch.change_words import creep_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -37,7 +36,7 @@ def summary(data: HangerReport) -> str:
         _against_nominal(data),
         _against_baseline(data),
         _change(data),
-        creep_words(data.creep),
+        data.creep.words if data.creep else "",
         in_period(data),
         _over_the_bridge(data),
         _model(data),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
 from shm.values.posterior import Averaged
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 
 if TYPE_CHECKING:
     from shm.values import ModalTest
@@ -174,6 +175,17 @@ class CreepRate:
     def is_known(self) -> bool:
         """Whether the tests, and not what is assumed before them, say what it is."""
         return math.isfinite(self.mean) and self.sd < _INFORMED * self.prior_sd
+
+    @property
+    def words(self) -> str:
+        """`Tension relaxes by 0.30 ± 0.10 % a year.`; empty where the rate is not known."""
+        if not self.is_known:
+            return ""
+        half = NINETY_PERCENT * self.sd
+        if abs(self.mean) <= half:
+            return f"Tension creeps by {rounded_percent(self.mean, half, '+')} a year, if at all."
+        verb = "relaxes" if self.mean < 0 else "grows"
+        return f"Tension {verb} by {rounded_percent(abs(self.mean), half)} a year."
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,22 +14,20 @@ from typing import Literal
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
-    creep_words,
     ends_words,
     factor,
     group_words,
     is_stiffness,
     probable_groups,
     quantity_words,
-    rounded,
     size_words,
     suspects,
     threshold_words,
 )
-from shm.watch.history import NINETY_PERCENT
 
 Urgency = Literal["next_test", "week", "today"]
 
@@ -123,8 +121,9 @@ def watch_words(watched: Sequence[WatchedTest]) -> str:
     """What was detected since the baseline, or how near the evidence is to a detection; creep."""
     if not watched:
         return ""
-    creep = creep_words(watched[-1].creep_per_year)
-    return " ".join(filter(None, (_detected_words(watched), creep)))
+    creep = watched[-1].creep_per_year
+    rate = creep.words if creep else ""
+    return " ".join(filter(None, (_detected_words(watched), rate)))
 
 
 def _detected_words(watched: Sequence[WatchedTest]) -> str:
@@ -209,7 +208,7 @@ def _kind_moved(group: Sequence[Moved]) -> str:
     """The same with its size."""
     first = group[0]
     if first.quantity in CAUSES:
-        size = rounded(first.shift_mean, NINETY_PERCENT * first.shift_sd, "+")
+        size = rounded_percent(first.shift_mean, NINETY_PERCENT * first.shift_sd, "+")
         return f"{group_words(group)} (frequencies {size})"
     if _is_mixed(group):
         tension = next(each for each in group if each.quantity == TENSION)

@@ -10,8 +10,8 @@ from collections.abc import Sequence, Set
 
 from shm.models.effects import EFFECTS
 from shm.models.effects.base import OverTime
-from shm.values import TENSION, Change, CreepRate, Drift, End, Moved, Plane
-from shm.watch.history import NINETY_PERCENT
+from shm.values import TENSION, Change, Drift, End, Moved, Plane
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 
 _PROBABLE = 0.1  # judgement: one in ten is worth a test that tells it from the rest
 _WHICH_END = "which end is not known"
@@ -100,30 +100,12 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
     if is_stiffness(quantity):
         return f"{verb} to {_factor_words(mean)}"
     if verb == "moved":
-        return f"moved by {rounded(mean, half, '+')}"
-    return f"{verb} by {rounded(abs(mean), half)}"
-
-
-def creep_words(creep: CreepRate | None) -> str:
-    """`Tension relaxes by 0.30 ± 0.10 % a year.`; empty where the tests do not show the rate."""
-    if creep is None or not creep.is_known:
-        return ""
-    half = NINETY_PERCENT * creep.sd
-    if abs(creep.mean) <= half:
-        return f"Tension creeps by {rounded(creep.mean, half, '+')} a year, if at all."
-    verb = "relaxes" if creep.mean < 0 else "grows"
-    return f"Tension {verb} by {rounded(abs(creep.mean), half)} a year."
+        return f"moved by {rounded_percent(mean, half, '+')}"
+    return f"{verb} by {rounded_percent(abs(mean), half)}"
 
 
 def is_stiffness(quantity: str) -> bool:
     return quantity != TENSION and quantity not in CAUSES
-
-
-def rounded(fraction: float, half: float, sign: str = "") -> str:
-    """`8.2 ± 1.1 %`: two significant digits of the half width, two decimals at most."""
-    percent = 100 * half
-    places = 0 if percent >= 10 else 1 if percent >= 1 else 2
-    return f"{100 * fraction:{sign}.{places}f} ± {percent:.{places}f} %"
 
 
 def _factor_words(decades: float) -> str:

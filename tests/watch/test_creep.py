@@ -11,7 +11,6 @@ from shm.documents import dump
 from shm.store.blobs import watch_document, watch_from
 from shm.values import CreepRate
 from shm.watch.alert_text import watch_words
-from shm.watch.change_words import creep_words
 from tests.helpers.synthetic_readings import History, watch_of
 
 RELAXES = History(tests=80, days_between=30.0, change_at=0, ramp=(-0.003,), outliers=0.0)
@@ -34,7 +33,7 @@ def test_a_few_tests_do_not_show_a_rate() -> None:
     assert creep is not None
     assert not creep.is_known
     assert creep.sd == pytest.approx(creep.prior_sd, rel=0.05)
-    assert creep_words(creep) == ""
+    assert creep.words == ""
 
 
 def test_no_rate_is_given_while_a_change_is_likelier_than_none() -> None:
@@ -59,11 +58,10 @@ def test_a_called_loss_is_not_taken_for_creep() -> None:
         (CreepRate(0.003, 0.0006, 0.002), "Tension grows by 0.30 ± 0.10 % a year."),
         (CreepRate(-0.0003, 0.0006, 0.002), "Tension creeps by -0.03 ± 0.10 % a year, if at all."),
         (CreepRate(-0.003, 0.0015, 0.002), ""),
-        (None, ""),
     ],
 )
-def test_a_rate_is_said_where_the_tests_show_it(creep: CreepRate | None, words: str) -> None:
-    assert creep_words(creep) == words
+def test_a_rate_is_said_where_the_tests_show_it(creep: CreepRate, words: str) -> None:
+    assert creep.words == words
 
 
 def test_the_rate_is_kept_and_a_watch_of_before_has_none() -> None:
