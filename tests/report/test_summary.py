@@ -192,7 +192,8 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
         "probability 0.930. Weighed over all that may be, the tension is 702 kN (90 % interval 690 "
         "to 715 kN). (What became of it.) Repeat the hammer test today and decide on traffic "
         "until then; if the loss stays, inspect its anchorages and the rod, and compare the "
-        "hangers beside it (`shm drift bridge`). To tell point mass from section loss, measure next: known mass of 25 kg at 3.6 m (expected odds of 400 to 1)."
+        "hangers beside it (`shm drift bridge`). To tell point mass from section loss, measure "
+        "next: known mass of 25 kg at 3.6 m (expected odds of 400 to 1)."
     )
     assert summary(bare) == (
         "Hanger 3 of Arch bridge carries 711 kN (90 % interval 697 to 725 kN) by the test only "
