@@ -24,6 +24,7 @@ from shm.values import (
     NAN,
     Alert,
     Averaged,
+    CreepRate,
     Drift,
     FloatArray,
     Limits,
@@ -284,6 +285,13 @@ def averaged_document(averaged: Averaged) -> dict[str, Any]:
 def drift_document(drift: Drift) -> dict[str, Any]:
     """One row of `shm drift --json`."""
     return asdict(drift)
+
+
+def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
+    """The rate of creep, a fraction a year, and its sentence; None where no test shows it."""
+    if creep is None or not creep.is_known:
+        return None
+    return {"mean": creep.mean, "sd": creep.sd, "words": creep.words}
 
 
 def alert_document(alert: Alert) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from shm.report.temperatures import temperature_documents, temperature_table
 from shm.store import Baseline
 from shm.values import Drift
 from shm.values.force_units import force_unit
+from shm.watch.events import EVENT_KINDS
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -89,12 +90,23 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     metavar="DAY",
     help="The first day (UTC) whose tests count, such as 2026-05-01.",
 )
+@click.option(
+    "--kind",
+    type=click.Choice(list(EVENT_KINDS)),
+    help="What was done: ends only the alerts that this explains.",
+)
 @click.option("--why", type=Words(), required=True, help="For the record.")
 @click.option("--who", show_default="the user's name", help="For the record.")
 @json_option
 @click.pass_context
 def rebaseline(
-    ctx: click.Context, hanger_id: int, since: datetime, why: str, who: str | None, as_json: bool
+    ctx: click.Context,
+    hanger_id: int,
+    since: datetime,
+    kind: str | None,
+    why: str,
+    who: str | None,
+    as_json: bool,
 ) -> None:
     """Compare a hanger with itself as it is since some day.
 
@@ -103,20 +115,26 @@ def rebaseline(
     watched against it. What was compared with the old baseline stays on record, and so do its
     alerts.
 
+    With --kind only the alerts end that such an event explains, with a note who said so: a lamp
+    ends those of an added mass, but not of lost tension. The others stay open.
+
     \b
     Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"
+    Example: shm drift rebaseline --hanger 7 --since 2026-05-03 --kind retensioned --why "to 640 kN"
     """
-    order = Order(since.replace(tzinfo=UTC), why, who or getpass.getuser())
+    event = EVENT_KINDS[kind] if kind else None
+    order = Order(since.replace(tzinfo=UTC), why, who or getpass.getuser(), event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         within = changes_within(store, hanger_id, order.since)
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
-        alerts = [
-            each.id for each in store.alerts.list_all(hanger_id) if each.acknowledgement is None
-        ]
+        all_alerts = store.alerts.list_all(hanger_id)
+    alerts = [each.id for each in all_alerts if each.acknowledgement is None]
+    explained = [each.id for each in all_alerts if _is_explained_by(each, made)] if kind else []
     if as_json:
-        show({**_document(made), "changes_within": [each.began_by for each in within]})
+        of_event = {"kind": kind, "alerts_explained": explained, "alerts_open": alerts}
+        show({**_document(made), **of_event, "changes_within": [each.began_by for each in within]})
         return
     if within:
         day = f"{max(each.began_by for each in within):%Y-%m-%d}"
@@ -134,9 +152,17 @@ def rebaseline(
         f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
         f"{tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
     )
+    for each in explained:
+        click.echo(f"Alert {each} is explained by it and resolved.")
     if alerts:
         notes = ", ".join(f"`shm alerts ack {each}`" for each in alerts)
         click.echo(f"Alerts of it are still open. Take note of them: {notes}.")
+
+
+def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
+    """Whether a new baseline has ended an alert, and nobody had taken note of it before."""
+    noted = stored.acknowledgement
+    return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
 
 
 def _document(made: Baseline) -> dict[str, object]:
@@ -155,7 +181,7 @@ def _document(made: Baseline) -> dict[str, object]:
 
 
 if TYPE_CHECKING:
-    from shm.store import Baseline, Store
+    from shm.store import Baseline, Store, StoredAlert
 
 
 @click.group(invoke_without_command=True)

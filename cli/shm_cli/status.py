@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 
+from shm.documents import creep_document
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
@@ -29,6 +30,7 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
+from shm.store.checksums import of_readable
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.silences import said_of
@@ -64,6 +66,8 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     for said, hangers in _competitions(document["hangers"]).items():
         click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
     for row in document["hangers"]:
+        if row["creep_per_year"] is not None:
+            click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
         if row["damage"] is not None:
@@ -221,6 +225,7 @@ def _hangers(
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
     damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
+    watches = of_readable(store.watch.latest, {})
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
@@ -242,6 +247,9 @@ def _hangers(
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
+                "creep_per_year": creep_document(
+                    watches[hanger.id].watched.creep_per_year if hanger.id in watches else None
+                ),
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
                 "gap": _gap(watch),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
+from shm.values.rounding import NINETY_PERCENT
 
 _HALF = 0.5  # judgement: of a shift below the threshold, so much must be left of it
 
@@ -17,7 +18,9 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
 
     A shift beyond its threshold has ended once its probability is below half the level. A change
     that was detected below the threshold has ended once less than half of it is left, by the same
-    level. A held test ends by a decision, never here.
+    level. Where no change is behind it, as of two tests that agree while their clocks left the
+    watch no time for a change, the probability was low all along: the shift must have come back,
+    too. A held test ends by a decision, never here.
     """
     if test.time <= alert.time or "held" in alert.kinds:
         return ""
@@ -30,6 +33,8 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
     for told in alert.drifts:
         later = now.get(told.quantity)
         if later is None or not _left(told, later) < level:
+            return ""
+        if alert.change is None and _may_be_beyond(told, later):
             return ""
     return f"test {test.test} reads as the baseline does again"
 
@@ -44,6 +49,12 @@ def _left(told: Drift, later: Drift) -> float:
     return (
         0.5 * math.erfc(-off / (math.sqrt(2) * later.shift_sd)) if later.shift_sd > 0 else math.nan
     )
+
+
+def _may_be_beyond(told: Drift, later: Drift) -> bool:
+    """Whether the 90 % interval of a later shift reaches beyond the threshold, the same way."""
+    way = math.copysign(1, told.shift_mean)
+    return way * later.shift_mean + NINETY_PERCENT * later.shift_sd >= told.threshold
 
 
 def gap_stands(baseline: Posterior, current: Posterior) -> bool:

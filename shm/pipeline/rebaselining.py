@@ -18,15 +18,20 @@ from shm.pipeline.calibrating import options_of
 from shm.pipeline.lineage import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
 from shm.values import Change, Hanger
+from shm.watch.events import EventKind, is_explained
 
 
 @dataclass(frozen=True)
 class Order:
-    """Who wants a hanger compared anew, since when, and why."""
+    """Who wants a hanger compared with itself as it is since when, and why.
+
+    With a `kind` of event only the alerts that it explains are resolved.
+    """
 
     since: datetime
     why: str
     who: str
+    kind: EventKind | None = None
 
 
 def rebaseline(
@@ -59,8 +64,15 @@ def rebaseline(
         progress,
         warm_start=before.posterior,
     )
-    record = (order.who, order.why, order.since)
-    return store.watch.rebaseline(before, posterior, chosen, record, lineage, at)
+    why = f"{order.kind.name}: {order.why}" if order.kind else order.why
+    record, explained = (order.who, why, order.since), None
+    if order.kind is not None:
+        explained = [
+            each.id
+            for each in store.alerts.list_all(hanger.id)
+            if is_explained(each.alert, order.kind, order.since)
+        ]
+    return store.watch.rebaseline(before, posterior, chosen, record, lineage, at, explained)
 
 
 def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, ...]:

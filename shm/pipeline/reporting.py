@@ -96,6 +96,7 @@ def hanger_now(
         diagnosis=diagnosis.diagnosis if diagnosis else None,
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
+        creep=watched[-1].creep_per_year if watched else None,
         is_called=any(each.change.called for each in watched),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),

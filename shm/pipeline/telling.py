@@ -198,9 +198,12 @@ def _of_several(deliveries: Sequence[Delivery]) -> str:
         return f"{len(alerts)} hangers: {kinds}: {named}. {alerts[0].message}"
     largest = max(leads, key=lambda drift: abs(drift.shift_mean))
     name, way = _moved(largest)
+    # As urgent as each alert by itself: a loss beyond its threshold is for today.
+    is_loss = "beyond threshold" in alerts[0].kinds and largest.shift_mean < 0
+    soon = "today" if is_loss else "within a week"
     return (
         f"{len(alerts)} hangers: {name} {way}: {named}; largest {_amount(largest)} at hanger "
-        f"{largest.hanger}. Repeat the test of that hanger today, and ask what all have in "
+        f"{largest.hanger}. Repeat the test of that hanger {soon}, and ask what all have in "
         f"common: load, temperature, works, a sensor. See `shm alerts` for each. "
         f"{_message_of(alerts, largest.hanger)}"
     )

@@ -18,6 +18,7 @@ from shm.values import (
     NAN,
     Alert,
     Averaged,
+    CreepRate,
     Diagnosis,
     Drift,
     FrequencyResponse,
@@ -109,7 +110,8 @@ class HangerReport:
     `lineage` names where the numbers come from: checksums, settings, files. `quality` is that of
     the latest test, empty where it was not checked; `diagnosis` the latest of its gap. `gap_watch`
     says in a sentence how the gap has gone since an effect was adopted, `drift_watch` what the
-    sequential test has called since the baseline, `is_called` whether it has. `states` are empty
+    sequential test has called since the baseline, `is_called` whether it has, `creep`
+    how fast the tension creeps. `states` are empty
     where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
@@ -135,6 +137,7 @@ class HangerReport:
     diagnosis: Diagnosis | None = None
     gap_watch: str = ""
     drift_watch: str = ""
+    creep: CreepRate | None = None
     states: StatesOverTime = NOTHING_WATCHED
     is_called: bool = False
     neighbours: BridgePattern | None = None

@@ -16,6 +16,7 @@ from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
+from shm.watch.alert_text import action_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -35,6 +36,7 @@ def summary(data: HangerReport) -> str:
         _against_nominal(data),
         _against_baseline(data),
         _change(data),
+        data.creep.words if data.creep else "",
         in_period(data),
         _over_the_bridge(data),
         _model(data),
@@ -192,7 +194,7 @@ def in_period(data: HangerReport) -> str:
     tests = formatting.counted(len(data.trend), "test")
     raised = formatting.counted(len(data.alerts), "alert")
     called = formatting.listed(
-        [each.words for each in _called_in(data)] or ["no change was called"]
+        [each.words for each in _called_in(data)] or ["no change was detected"]
     )
     return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
 
@@ -297,20 +299,21 @@ def _chosen(data: HangerReport) -> str:
 
 
 def _urgent(data: HangerReport) -> str:
+    """The same action and urgency as in the alert."""
+    level = data.hanger.thresholds.alert_probability
+    beyond = [drift for drift in data.drifts if drift.probability >= level]
+    change = next((each.change for each in reversed(data.alerts) if each.change), None)
     match status(data):
         case Status.ALERT:
-            return (
-                "Repeat the hammer test within days; if the shift stays, inspect both ends of "
-                "the hanger and test its neighbours."
-            )
+            return action_words(data.hanger, change, beyond, data.drifts)
         case Status.WATCH if data.is_called:
             return (
-                "A change was called, though none is surely beyond its threshold: look after what "
-                "may have moved, and set a new baseline once it is explained (shm drift "
-                "rebaseline)."
+                "A change was detected, though nothing is surely beyond its threshold. "
+                f"{action_words(data.hanger, change, beyond, data.drifts)} Once it is explained, "
+                "set a new baseline (shm drift rebaseline)."
             )
         case Status.WATCH:
-            return "Test this hanger again soon: a shift is likelier than not."
+            return "Test this hanger again within a week: a shift is likelier than not."
         case Status.FIRST:
             return "Repeat the test at another temperature to make the baseline firm."
         case Status.STEADY:

@@ -19,7 +19,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch import Watched
-from shm.watch.alert_text import group_words, quantity_words, suspected_groups
+from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
 from shm.watch.history import Band, StateHistory
 from shm.watch.state import StateOptions, set_free, states
 
@@ -142,16 +142,17 @@ def _called(change: Change) -> CalledChange:
 
 
 def called_words(change: Change) -> str:
-    """`sudden: tension -6.3 %`; of a stiffness how many times what it was."""
+    """`sudden: tension -6.3 %`; of a stiffness how many times what it was, of another cause what it
+    does to the frequencies on average."""
     kind = "sudden" if change.sudden > 0.5 else "slow"
-    groups = suspected_groups(change)
+    groups = probable_groups(change)
     if not groups:
         return f"{kind}: not known what"
     first = groups[0][0]
-    size = (
-        f"{100 * first.shift_mean:+z.1f} %"
-        if first.quantity == TENSION
-        else f"{10**first.shift_mean:.2f} times"
-    )
-    doubt = " (or else)" if len(groups) > 1 else ""
+    size = f"{100 * first.shift_mean:+z.1f} %"
+    if is_stiffness(first.quantity):
+        size = f"{10**first.shift_mean:.2f} times"
+    elif first.quantity != TENSION:
+        size = f"(frequencies {size})"
+    doubt = " (or another cause)" if len(groups) > 1 else ""
     return f"{kind}: {group_words(groups[0])} {size}{doubt}"

@@ -14,6 +14,7 @@ from shm.documents import number, value_of
 from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.values import (
     Change,
+    CreepRate,
     Drift,
     FrequencyResponse,
     ModalTest,
@@ -106,7 +107,12 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
 def watch_document(watched: WatchedTest) -> dict[str, Any]:
     """What the sequential test says after a test; its drifts are kept by themselves."""
-    return {"temperature_c": watched.temperature_c, "change": asdict(watched.change)}
+    creep = watched.creep_per_year
+    return {
+        "temperature_c": watched.temperature_c,
+        "change": asdict(watched.change),
+        "creep_per_year": creep and asdict(creep),
+    }
 
 
 def watch_from(
@@ -114,7 +120,9 @@ def watch_from(
 ) -> WatchedTest:
     """The watch after a test back from its document and its drifts."""
     temperature_c = number(document["temperature_c"])
-    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document))
+    kept = document.get("creep_per_year")
+    creep = value_of(CreepRate, kept) if kept else None
+    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document), creep)
 
 
 def change_from(document: Mapping[str, Any]) -> Change:

@@ -22,7 +22,16 @@ from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import baseline_in_force, baselines_now, compared_with, read_baseline
 from shm.store.results import all_at, insert_baseline, insert_posterior, move
-from shm.store.rows import Baseline, KeptWatch, Lineage, Stage, StoredAlert, StoredTest, StoredWatch
+from shm.store.rows import (
+    Acknowledgement,
+    Baseline,
+    KeptWatch,
+    Lineage,
+    Stage,
+    StoredAlert,
+    StoredTest,
+    StoredWatch,
+)
 from shm.store.tables import (
     acknowledgements,
     alerts,
@@ -133,12 +142,14 @@ class Watch(Repository):
         record: tuple[str, str, datetime],
         lineage: Lineage,
         at: datetime,
+        explained: Collection[int] | None = None,
     ) -> Baseline:
         """Has later tests compared with `posterior`, of the tests `chosen`, from now on.
 
         `record` is who, why, and the time since which those tests were taken. What was compared
-        with the baseline `before` stays, its alerts are resolved. Raises StoreBusy where that one
-        is no longer in force.
+        with the baseline `before` stays, its alerts are resolved: all, or those of the numbers
+        `explained`, which nobody need take note of any more. Raises StoreBusy where that one is no
+        longer in force.
         """
         (who, why, since), hanger = record, before.hanger
         with self.writing() as connection:
@@ -154,8 +165,14 @@ class Watch(Repository):
                 ),
                 alerts.c.id.not_in(sa.select(resolutions.c.alert_id)),
             )
+            acknowledged = set(connection.scalars(sa.select(acknowledgements.c.alert_id)))
             for alert_id in connection.scalars(stands.order_by(alerts.c.id)).all():
+                if explained is not None and alert_id not in explained:
+                    continue
                 resolve(connection, alert_id, who, f"new baseline: {why}", at)
+                if explained is not None and alert_id not in acknowledged:
+                    noted = Acknowledgement(alert_id, who, f"explained by: {why}", at)
+                    insert(connection, acknowledgements, vars(noted))
         return Baseline(id_, hanger, posterior, at, who, why, since)
 
     def list_watched(

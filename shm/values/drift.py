@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
 from shm.values.posterior import Averaged
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 
 if TYPE_CHECKING:
     from shm.values import ModalTest
@@ -161,15 +162,48 @@ class Change:
         return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
+@dataclass(frozen=True)
+class CreepRate:
+    """How fast the tension creeps, a fraction per year; `prior_sd` is the sd before any test.
+
+    Relaxation at such a rate is reported, and is no alarm.
+    """
+
+    mean: float
+    sd: float
+    prior_sd: float
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the tests, and not what is assumed before them, say what it is."""
+        return math.isfinite(self.mean) and self.sd < _INFORMED * self.prior_sd
+
+    @property
+    def words(self) -> str:
+        """`Tension relaxes by 0.30 ± 0.10 % a year.`; empty where the rate is not known."""
+        if not self.is_known:
+            return ""
+        half = NINETY_PERCENT * self.sd
+        if abs(self.mean) <= half:
+            return f"Tension creeps by {rounded_percent(self.mean, half, '+')} a year, if at all."
+        verb = "relaxes" if self.mean < 0 else "grows"
+        return f"Tension {verb} by {rounded_percent(abs(self.mean), half)} a year."
+
+
 @dataclass(frozen=True, eq=False)
 class WatchedTest:
-    """The watch after one test: shifts of all quantities and what the sequential test says."""
+    """The watch after one test: shifts of all quantities and what the sequential test says.
+
+    `creep_per_year` is None where it is not known: a change that may have come is not told from it,
+    and former versions did not keep it.
+    """
 
     test: str
     time: datetime
     temperature_c: float
     drifts: tuple[Drift, ...]
     change: Change
+    creep_per_year: CreepRate | None = None
 
 
 @dataclass(frozen=True)

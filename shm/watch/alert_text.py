@@ -1,40 +1,42 @@
-"""What an alert says: an owner reads it on a phone, what moved first, what to do last."""
+"""What an alert says: the state in a sentence, what to do and how soon, why; details last.
+
+An owner reads the first two sentences on a phone: one number with its interval, one urgency. Each
+probability is given once, at the end. Traffic is named for lost tension and loosened ends alone.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from datetime import datetime
+from typing import Literal
 
-from shm.values import TENSION, Change, Drift, End, Hanger, Moved, Plane, WatchedTest
+from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
-from shm.watch.history import NINETY_PERCENT
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.watch.change_words import (
+    CAUSES,
+    beyond_words,
+    ends_words,
+    factor,
+    group_words,
+    is_stiffness,
+    probable_groups,
+    quantity_words,
+    size_words,
+    suspects,
+    threshold_words,
+)
 
-_CERTAIN = 0.999  # beyond, draws of a thousand cannot tell
-_LISTED = 3  # technical: what a sentence bears
+Urgency = Literal["next_test", "week", "today"]
+
+_SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
+_EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
+_CERTAIN = 0.995  # reads 1.00 in two decimals, which nobody may claim
+_LISTED = 3  # technical: what a list in a message bears
 _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
-_EITHER_LIKELY = 0.8
-_WHICH_END = "which end is not known"
-
-_CAUSES = {
-    "point_mass": "a mass put on or taken off",
-    "section_loss": "section lost over a stretch",
-    "bending_stiffness": "another bending stiffness",
-    "timebase": "the logger's clock",
-    "sensor_mass": "sensors of other mass or place",
-    "unexplained": "something that no cause we know explains",
-}
-"""What may have moved the frequencies beside tension and end stiffness."""
-
-_LOOK_AT = {
-    "point_mass": "look for a lamp, a clamp, a cable or ice on the hanger, or what was taken off.",
-    "section_loss": "look along the rod for corrosion, wear or a crack.",
-    "bending_stiffness": "look for broken wires, a loose sleeve or new grout.",
-    "timebase": "check the logger's clock and the sampling rate in the file.",
-    "sensor_mass": "ask who put the sensors where, and with what.",
-    "unexplained": "check the test's files first: hanger, sensors, axes and orders of the modes.",
-}
+_HALF_WIDTH = "± is half the 90 % interval"
 
 
 def message_of(
@@ -46,22 +48,28 @@ def message_of(
     is_call: bool,
     is_further: bool = False,
 ) -> str:
-    """Which hanger, what moved and by how much, where, since when, how sure, what to do.
+    """What moved and by how much, what to do and how soon, since when; then details.
 
-    `change` is the change behind it, as far as one is known; `is_call` says whether that is called
+    `change` is the change behind it, as far as one is known; `is_call` says whether it is detected
     now, and `is_further` whether others were before it, from which on its shift counts. `beyond`
-    are the shifts from the baseline that the alert tells to be beyond their threshold.
+    are the shifts from the baseline that the alert says to be beyond their threshold.
     """
     change = change if change and change.moved else None
-    head = _shifts(beyond, change) if beyond else _change(change)
+    tension = next((each for each in test.drifts if each.quantity == TENSION), None)
+    spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
+    is_odd = test.change.outlier_probability > 0.5
+    state = _state(hanger, change, beyond, is_further=is_further)
     parts = [
-        f"Hanger {hanger.id}: {'a further change: ' if is_further and not beyond else ''}{head}",
-        _now(test, beyond, change),
+        state,
+        action_words(hanger, change, beyond, test.drifts),
         _when(change),
-        _certainty(change, is_call),
-        "" if beyond else _thresholds(test, change),
-        _blunder(test.change),
-        _advice(change, beyond),
+        "This test itself is probably an outlier." if is_odd else "",
+        _tension_now(tension) if tension and TENSION in spoken else "",
+        _details(
+            _sizes(change, beyond) or _HALF_WIDTH * ("±" in state),
+            _probabilities(test, change, beyond),
+            _false_alarms(change) if is_call else "",
+        ),
     ]
     return " ".join(part for part in parts if part)
 
@@ -71,17 +79,18 @@ def message_of_agreeing(
 ) -> str:
     """The same of two `tests` that read beyond a threshold; the first `is_held` for its clock.
 
-    Nothing is said of when: that they are told at all is since their clocks may not tell.
+    When it came is not said: these tests speak since their clocks may be wrong.
     """
-    name = quantity_words(drift.quantity)
     first = f"{tests[0]} (held for its clock)" if is_held else tests[0]
+    words = f"{quantity_words(drift.quantity)} {size_words(drift)}"
+    said = [(drift.probability, f"that {beyond_words(drift)}")]
     parts = [
-        f"Hanger {hanger.id}: {name} "
-        f"{shift_words(drift.quantity, drift.shift_mean, drift.shift_sd)}.",
-        f"Tests {first} and {tests[1]} both read beyond its threshold of {_threshold(drift)}.",
-        _tension(drift) if drift.quantity == TENSION else "",
-        "This counts whatever their clocks say, so that it is not said when it came.",
-        f"{_advice(None, [drift])} Check the logger's clock.",
+        f"Hanger {hanger.id}: {words}, beyond its threshold.",
+        action_words(hanger, None, [drift]),
+        f"Tests {first} and {tests[1]} both read beyond its threshold of {threshold_words(drift)}.",
+        "Check the logger's clock: if it is wrong, the date of the change is not known.",
+        _tension_now(drift) if drift.quantity == TENSION else "",
+        _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(said)),
     ]
     return " ".join(part for part in parts if part)
 
@@ -91,13 +100,13 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     if in_a_row == 1:
         return (
             f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
-            "a week: it counts in nothing until another agrees with it. Another hanger may have "
-            "been hit, a sensor put elsewhere or an order mistaken; else the hanger has changed."
+            "a week; it does not count until another test agrees with it. Another hanger may have "
+            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
         )
     return (
         f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
-        "each other. Repeat the test today, by the same people and with the same sensors. What the "
-        "watch says of this hanger rests on older tests until then."
+        "each other. Repeat the hammer test within a week, with the same people and sensors as at "
+        "the baseline. Until then the state of this hanger rests on older tests."
     )
 
 
@@ -109,222 +118,196 @@ def short_name(test: str) -> str:
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:
-    """What the sequential test has called since the baseline, or that it has called nothing."""
+    """What was detected since the baseline, or how near the evidence is to a detection; creep."""
     if not watched:
         return ""
-    called = [each.change for each in watched if each.change.called]
-    if called:
-        told = (f"{_change(each)} {_when(each)}" for each in called)
-        return f"Called since the baseline: {' Then: '.join(told)}"
+    creep = watched[-1].creep_per_year
+    rate = creep.words if creep else ""
+    return " ".join(filter(None, (_detected_words(watched), rate)))
+
+
+def _detected_words(watched: Sequence[WatchedTest]) -> str:
+    detected = [each.change for each in watched if each.change.called]
+    if detected:
+        each_one = (f"{_sentence(_changed(each))} {_when(each)}" for each in detected)
+        return f"Detected since the baseline: {' Then: '.join(each_one)}"
     latest = watched[-1].change
+    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
     return (
-        f"No change is called: the evidence for one stands for {latest.evidence_years:.2g} years "
-        f"without change, and is believed from {latest.limit_years:.3g} years on."
+        "No change was detected since the baseline: the evidence for one is "
+        f"{share} % of what it takes."
     )
 
 
-def quantity_words(name: str, end: End | None = None, plane: Plane | None = None) -> str:
-    """`tension`, or `end stiffness k1 (deck end, transverse)`."""
-    if name == TENSION:
-        return "tension"
-    if name in _CAUSES:
-        return _CAUSES[name]
-    if not name.startswith("log10_k"):
-        return name.replace("_", " ")
-    at = f"{end} end" if end else _WHICH_END if plane else ""
-    where = ", ".join(word for word in (at, plane or "") if word)
-    return f"end stiffness {name.removeprefix('log10_')}" + (f" ({where})" if where else "")
+# ---------------------------------------------------------------- the first sentence
 
 
-def shift_words(quantity: str, mean: float, sd: float) -> str:
-    """`fell by 8.2 % (90 % interval 7.1 to 9.3 %)`; of a stiffness the factor it fell or rose to.
-
-    `mean` and `sd` are a fraction of the tension, or decades of a stiffness.
-    """
-    low, high = mean - NINETY_PERCENT * sd, mean + NINETY_PERCENT * sd
-    if quantity in _CAUSES:
-        return f"moved the frequencies by {100 * mean:+.2f} % in the mean"
-    if quantity != TENSION:
-        verb = "fell" if high < 0 else "rose" if low > 0 else "moved"
-        return (
-            f"{verb} to {_factor(mean)} times what it was "
-            f"(90 % interval {_factor(low)} to {_factor(high)} times)"
-        )
-    if low <= 0 <= high:
-        low_percent, high_percent = (f"{100 * each:+.1f} %" for each in (low, high))
-        return f"moved by {100 * mean:+.1f} % (90 % interval {low_percent} to {high_percent})"
-    near, far = sorted((abs(low), abs(high)))
-    verb = "fell" if mean < 0 else "rose"
-    places = 1 if far - near > 0.004 else 2
-    text = f"{100 * abs(mean):.{places}f} % (90 % interval {100 * near:.{places}f} to "
-    return f"{verb} by {text}{100 * far:.{places}f} %)"
-
-
-def _factor(decades: float) -> str:
-    """Of what it was: `0.50`, `3.2`."""
-    if decades > 3:
-        return "more than 1000"
-    factor = 10**decades
-    if factor < 0.01:
-        return "less than 0.01"
-    return f"{factor:.2f}" if factor < 1 else f"{factor:.1f}" if factor < 10 else f"{factor:.0f}"
-
-
-def _probability(value: float) -> str:
-    """Two decimals or three near the ends, with no certainty pretended."""
-    if math.isnan(value):
-        return "not known"
-    if value > _CERTAIN:
-        return "above 0.999"
-    if value < 1 - _CERTAIN:
-        return "below 0.001"
-    return f"{value:.3f}" if not 0.01 <= value <= 0.99 else f"{value:.2f}"
-
-
-# ---------------------------------------------------------------- what moved
-
-
-def _change(change: Change | None) -> str:
-    """What has changed, or what all may have."""
+def _state(
+    hanger: Hanger, change: Change | None, beyond: Sequence[Drift], *, is_further: bool
+) -> str:
+    """The state in a sentence of at most 25 words, with one number and its interval."""
+    name = f"Hanger {hanger.id}"
+    if beyond:
+        lead = _gravest(beyond)
+        places = {
+            each.quantity: (each.end, each.plane) for each in (change.moved if change else ())
+        }
+        words = quantity_words(lead.quantity, *places.get(lead.quantity, (None, None)))
+        return f"{name}: {words} {size_words(lead)}, beyond its threshold."
+    again = " again" if is_further else ""
     if change is None:
-        return "something has changed."
-    groups = suspected_groups(change)
-    if len(groups) == 1:
-        return f"{_moved(groups[0])}. {_this(groups[0], change)}"
-    told = "; or ".join(
-        f"{_moved(each)}, probability {_probability(each[0].probability)}"
-        for each in groups[:_LISTED]
-    )
-    return (
-        f"something moved, and these tests cannot tell what: {told}"
-        f"{_and_more(len(groups) - _LISTED)}."
-    )
+        return f"{name} changed{again}; its tests do not show what."
+    return f"{name}{' changed again' if again else ''}: {_changed(change)}."
 
 
-def suspects(change: Change) -> list[Moved]:
-    """The likeliest quantity, those that moved with it, and those that may have instead."""
-    return list(dict.fromkeys(each for group in suspected_groups(change) for each in group))
+def _gravest(beyond: Sequence[Drift]) -> Drift:
+    """A loss before a gain, the tension before the ends."""
+    return min(beyond, key=lambda each: (each.shift_mean > 0, each.quantity != TENSION))
 
 
-def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
-    """What may have moved, each with what moved with it, the likeliest first."""
-    by_name = {each.quantity: each for each in change.moved}
-    groups: dict[frozenset[str], tuple[Moved, ...]] = {}
-    for first in change.moved[:1]:
-        for name in (first.quantity, *(n for n in by_name if n in first.alike)):
-            names = (name, *by_name[name].together)
-            group = tuple(by_name[each] for each in names if each in by_name)
-            groups.setdefault(frozenset(names), group)
-    return list(groups.values())
+def _changed(change: Change) -> str:
+    """What changed and by how much; what it may be instead, where the tests fit that as well."""
+    groups = probable_groups(change)
+    if not groups:
+        return "the tests do not show what changed"
+    first, *others = groups
+    if not others:
+        doubt = "" if first[0].probability >= _SURE else "most likely, "
+        return f"{doubt}{_moved(first)}"
+    kinds = list(dict.fromkeys(_kind(each) for each in others if _kind(each) != _kind(first)))
+    if not kinds:
+        return f"{_kind_moved(first)}, and the tests do not show at which end or in which plane"
+    more = ", or another cause" if len(kinds) > 1 else ""
+    return f"either {_kind_moved(first)}, or {kinds[0]}{more}"
 
 
 def _moved(group: Sequence[Moved]) -> str:
-    """What moved together and how far; each by itself where they went different ways."""
+    """What moved together and how far."""
     first = group[0]
-    if all(_is_like(each, first) for each in group):
-        size = shift_words(first.quantity, first.shift_mean, first.shift_sd)
-        return f"{group_words(group)} {size}"
-    each_way = (
-        f"{group_words([each])} {shift_words(each.quantity, each.shift_mean, each.shift_sd)}"
-        for each in group
-    )
-    return f"{group_words(group)} moved together: {', and '.join(each_way)}"
+    if first.quantity in CAUSES:
+        return f"{group_words(group)} (frequencies {size_words(first)} on average)"
+    if _is_mixed(group):
+        tension = next(each for each in group if each.quantity == TENSION)
+        return f"tension {size_words(tension)}, and end stiffness {_way(group)} with it"
+    if all(abs(e.shift_mean - first.shift_mean) <= max(e.shift_sd, first.shift_sd) for e in group):
+        return f"{group_words(group)} {size_words(first)}"
+    return f"{group_words(group)} {_way(group)}, by different amounts"
 
 
-def _is_like(moved: Moved, first: Moved) -> bool:
-    """Whether two shifts are one size, as far as they are known."""
-    if (moved.quantity == TENSION) != (first.quantity == TENSION):
-        return False
-    apart = abs(moved.shift_mean - first.shift_mean)
-    return apart <= max(moved.shift_sd, first.shift_sd)
-
-
-def group_words(group: Sequence[Moved]) -> str:
-    """`end stiffness in both planes at the deck end`, or the quantities' own names."""
-    ends = {each.end for each in group}
-    planes = {each.plane for each in group}
-    if len(group) == 1 or None in planes:
-        return " and ".join(quantity_words(g.quantity, g.end, g.plane) for g in group)
-    where = f"both planes ({_WHICH_END})" if None in ends else f"both planes at {_ends(ends)}"
-    if len(planes) == 1:
-        where = f"the {group[0].plane} plane at {_ends(ends)}"
-    return f"end stiffness in {where}"
-
-
-def _ends(ends: Set[End | None]) -> str:
-    return "both ends" if len(ends) > 1 else f"the {next(iter(ends))} end"
-
-
-def _this(group: Sequence[Moved], change: Change) -> str:
-    """How sure it is that it was this, and what else it might be."""
+def _kind(group: Sequence[Moved]) -> str:
+    """A group in the fewest words, without its size: `end stiffness fell`."""
     first = group[0]
-    text = f"That it is this that moved: probability {_probability(first.probability)}"
-    others = [each for each in change.moved if each not in group]
-    if first.probability > 0.9 or not others:
-        return f"{text}."
-    name = quantity_words(others[0].quantity, others[0].end, others[0].plane)
-    return f"{text}; next {name}, {_probability(others[0].probability)}."
+    if first.quantity in CAUSES:
+        return group_words(group)
+    if _is_mixed(group):
+        return "tension and end stiffness changed together"
+    return f"{'tension' if first.quantity == TENSION else 'end stiffness'} {_way(group)}"
 
 
-def _and_more(count: int) -> str:
-    if count <= 0:
-        return ""
-    return f"; or {count} more" if count > 1 else "; or one more"
+def _kind_moved(group: Sequence[Moved]) -> str:
+    """The same with its size."""
+    first = group[0]
+    if first.quantity in CAUSES:
+        size = rounded_percent(first.shift_mean, NINETY_PERCENT * first.shift_sd, "+")
+        return f"{group_words(group)} (frequencies {size})"
+    if _is_mixed(group):
+        tension = next(each for each in group if each.quantity == TENSION)
+        return f"tension, with end stiffness, {size_words(tension)}"
+    return f"{'tension' if first.quantity == TENSION else 'end stiffness'} {size_words(first)}"
 
 
-def _shifts(beyond: Sequence[Drift], change: Change | None) -> str:
-    """What is beyond its threshold and, as far as is known, where the data put it."""
-    places = {each.quantity: (each.end, each.plane) for each in (change.moved if change else ())}
-    told = "; ".join(
-        f"{quantity_words(drift.quantity, *places.get(drift.quantity, (None, None)))} "
-        f"{shift_words(drift.quantity, drift.shift_mean, drift.shift_sd)}, beyond its threshold "
-        f"of {_threshold(drift)} with probability {_probability(drift.probability)}"
-        for drift in beyond
-    )
-    return f"{told}.{_told_apart(change)}"
+def _is_mixed(group: Sequence[Moved]) -> bool:
+    return len(group) > 1 and any(each.quantity == TENSION for each in group)
 
 
-def _told_apart(change: Change | None) -> str:
-    if change is None:
-        return ""
-    groups = suspected_groups(change)
-    told = " or ".join(
-        f"{group_words(each)} (probability {_probability(each[0].probability)})"
-        for each in groups[:_LISTED]
-    )
-    if len(groups) == 1:
-        return f" It is the {told} that has changed."
-    more = _and_more(len(groups) - _LISTED)
-    return f" These tests cannot tell whether it is {told}{more} that has changed."
+def _way(group: Sequence[Moved]) -> str:
+    """Which way a group went, the tension of a mixed one aside."""
+    springs = [each for each in group if len(group) == 1 or each.quantity != TENSION]
+    ways = {each.shift_mean > 0 for each in springs}
+    return "changed" if len(ways) > 1 else "rose" if ways.pop() else "fell"
 
 
-def _threshold(drift: Drift) -> str:
-    if drift.quantity == TENSION:
-        return f"{100 * drift.threshold:.3g} %"
-    return f"{_factor(math.copysign(drift.threshold, drift.shift_mean))} times"
+# ---------------------------------------------------------------- what to do, and how soon
 
 
-def _now(test: WatchedTest, beyond: Sequence[Drift], change: Change | None) -> str:
-    """The tension where it is spoken of: a figure that the owner knows."""
-    spoken = [drift.quantity for drift in beyond] + (
-        [each.quantity for each in suspects(change)] if change else []
-    )
-    for drift in test.drifts:
-        if drift.quantity == TENSION and TENSION in spoken:
-            return _tension(drift)
-    return ""
+def urgency_of(
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    drifts: Sequence[Drift] = (),
+) -> Urgency:
+    """How soon: today for a loss beyond its threshold as surely as the owner asked to be told.
+
+    A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
+    then the next planned test is soon enough to see where it goes.
+    """
+    if _losses(hanger, beyond):
+        return "today"
+    slow = change is not None and change.sudden < 0.5
+    near = any(each.probability > 0.5 for each in drifts)
+    return "next_test" if slow and not beyond and not near else "week"
 
 
-def _tension(drift: Drift) -> str:
-    now_n, before_n = drift.value, drift.baseline
-    unit = force_unit(now_n, before_n)
-    return (
-        f"Tension is now {unit.told(now_n)}, {100 * abs(now_n / before_n - 1):.1f} % "
-        f"{'below' if now_n < before_n else 'above'} the {unit.told(before_n)} of the baseline."
-    )
+def _losses(hanger: Hanger, beyond: Sequence[Drift]) -> list[Drift]:
+    """Lost tension or loosened ends that are probable, for which alone traffic is named."""
+    level = hanger.thresholds.alert_probability
+    return [each for each in beyond if each.shift_mean < 0 and each.probability >= level]
 
 
-# ---------------------------------------------------------------- when, how sure
+def action_words(
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    drifts: Sequence[Drift] = (),
+) -> str:
+    """What to do and how soon, in a sentence."""
+    urgency = urgency_of(hanger, change, beyond, drifts)
+    if urgency == "today":
+        look = _look(_gravest(beyond), change)
+        return f"Repeat the hammer test today and decide on traffic until then; {look}."
+    groups = probable_groups(change) if change else []
+    if len(groups) > 1 and not beyond:
+        return _tell_apart(groups, urgency)
+    lead = _gravest(beyond) if beyond else groups[0][0] if groups else None
+    when = "within a week" if urgency == "week" else "at the next planned date"
+    if lead is None:
+        return f"Repeat the hammer test {when}, with more modes."
+    if lead.quantity in CAUSES:
+        check = CAUSES[lead.quantity].check
+        return _sentence(f"{_before(urgency)}, {check}, then test again")
+    return f"Repeat the hammer test {when}; {_look(lead, change)}."
+
+
+def _before(urgency: Urgency) -> str:
+    return "within a week" if urgency == "week" else "before the next planned test"
+
+
+def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
+    """What shows which of several causes it was."""
+    causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
+    if not causes:
+        with_what = "a sensor near each end and more modes"
+        return f"Repeat the hammer test {_before(urgency)} with {with_what}, to see what changed."
+    check, apart_by = causes[0].check, causes[0].apart_by
+    return _sentence(f"{_before(urgency)}, {check}; then test with {apart_by}, to tell them apart")
+
+
+def _look(lead: Moved | Drift, change: Change | None) -> str:
+    """Where to look if a change of tension or of an end stays."""
+    lost = lead.shift_mean < 0
+    if lead.quantity == TENSION:
+        beside = "compare the hangers beside it (`shm drift bridge`)"
+        look = f"inspect its anchorages and the rod, and {beside}" if lost else beside
+        return f"if the {'loss' if lost else 'gain'} stays, {look}"
+    moved = {each.quantity: each for each in (change.moved if change else ())}
+    own = moved.get(lead.quantity)
+    ends = {moved[n].end for n in (lead.quantity, *own.together) if n in moved} if own else {None}
+    end = "both ends" if None in ends else ends_words(ends)
+    found = "a worn pin, a cracked plate or loose bolts" if lost else "a pin seized by rust or dirt"
+    return f"if the change stays, inspect {end} for {found}"
+
+
+# ---------------------------------------------------------------- why, and details
 
 
 def _when(change: Change | None) -> str:
@@ -332,13 +315,10 @@ def _when(change: Change | None) -> str:
         return ""
     since = _between(change.began_after, change.began_by)
     if change.sudden >= _EITHER_LIKELY:
-        return f"It came suddenly (probability {_probability(change.sudden)}), {since}."
+        return f"It came suddenly, {since}."
     if change.sudden <= 1 - _EITHER_LIKELY:
-        return f"It came slowly (probability {_probability(1 - change.sudden)}); it began {since}."
-    return (
-        f"It began {since}; whether suddenly or slowly cannot be told yet (suddenly: probability "
-        f"{_probability(change.sudden)})."
-    )
+        return f"It came slowly and began {since}."
+    return f"It began {since}; it is not clear yet whether suddenly or slowly."
 
 
 def _between(after: datetime, by: datetime) -> str:
@@ -346,97 +326,106 @@ def _between(after: datetime, by: datetime) -> str:
     return f"on {first}" if first == last else f"between {first} and {last}"
 
 
-def _certainty(change: Change | None, is_call: bool) -> str:
-    if change is None:
-        return ""
-    text = f"That anything has changed: probability {_probability(change.probability)}"
-    if not is_call:
-        return f"{text}."
-    return (
-        f"{text}; a hanger that does not change raises such an alert at most once in "
-        f"{change.limit_years:.3g} years on the average."
-    )
+def _tension_now(drift: Drift) -> str:
+    """The tension in the unit that fits it: a figure that the owner knows."""
+    unit = force_unit(drift.value, drift.baseline)
+    half = unit.of(NINETY_PERCENT * drift.shift_sd * drift.baseline)
+    places = max(0, 1 - math.floor(math.log10(half))) if 0 < half < 10 else 0
+    now = f"{unit.of(drift.value):.{min(places, unit.decimals(drift.baseline))}f} {unit.name}"
+    return f"Tension is now {now}, {unit.told(drift.baseline)} at the baseline."
 
 
-def _thresholds(test: WatchedTest, change: Change | None) -> str:
-    """How near what may have changed is to its threshold."""
-    if change is None:
-        return ""
+def _details(*parts: str) -> str:
+    given = "; ".join(part for part in parts if part)
+    return f"Details: {given}." if given else ""
+
+
+def _sizes(change: Change | None, beyond: Sequence[Drift]) -> str:
+    """Intervals of stiffnesses, and of whatever else may have changed."""
+    groups = probable_groups(change) if change else []
+    moved = [each for group in groups for each in group]
+    if beyond and len(groups) < 2:
+        moved = []
+    names = {each.quantity: quantity_words(each.quantity, each.end, each.plane) for each in moved}
+    chosen: dict[str, Moved | Drift] = {each.quantity: each for each in beyond}
+    for each in moved:
+        chosen.setdefault(each.quantity, each)
+    shown = [
+        _interval(names.get(name) or quantity_words(name), each)
+        for name, each in chosen.items()
+        if is_stiffness(name) or (name == TENSION and len(chosen) > 1)
+    ]
+    more = f" and {len(shown) - _LISTED} more" if len(shown) > _LISTED else ""
+    return f"90 % intervals: {', '.join(shown[:_LISTED])}{more}" if shown else ""
+
+
+def _interval(name: str, each: Moved | Drift) -> str:
+    if each.quantity == TENSION:
+        return f"tension {size_words(each)}"
+    ends = (each.shift_mean + sign * NINETY_PERCENT * each.shift_sd for sign in (-1, 1))
+    low, high = map(factor, ends)
+    return f"{name} {low} to {high} times what it was"
+
+
+def _probabilities(test: WatchedTest, change: Change | None, beyond: Sequence[Drift]) -> str:
+    """Each probability once."""
+    said = [(each.probability, f"that {beyond_words(each)}") for each in beyond]
+    if change is not None:
+        groups = probable_groups(change)
+        said += [(each[0].probability, _that(each)) for each in groups[:_LISTED]]
+        others = [each for each in change.moved if each not in groups[0]]
+        if len(groups) == 1 and groups[0][0].probability < _SURE and others:
+            said.append((others[0].probability, _that([others[0]])))
+        said.append((change.probability, "that anything changed"))
+        is_sudden = change.sudden >= 0.5
+        way = "suddenly" if is_sudden else "slowly"
+        said.append((max(change.sudden, 1 - change.sudden), f"that it came {way}"))
+        if not beyond and (nearest := _nearest(test, change)):
+            said.append((nearest.probability, f"that {beyond_words(nearest)}"))
+    if test.change.outlier_probability > 0.5:
+        said.append((test.change.outlier_probability, "that this test is an outlier"))
+    return _merged(said)
+
+
+def _that(group: Sequence[Moved]) -> str:
+    words = group_words(group)
+    return f"that {words}" if group[0].quantity in CAUSES else f"that {words} changed"
+
+
+def _merged(said: Sequence[tuple[float, str]]) -> str:
+    """`probability 0.97 that tension changed; 0.90 that ...`: what is as likely stands together."""
+    by_value: dict[str, list[str]] = {}
+    for value, words in said:
+        if not math.isnan(value):
+            by_value.setdefault(_probability(value), []).append(words)
+    told = (f"{value} {_listed(words)}" for value, words in by_value.items())
+    return f"probability {', '.join(told)}" if by_value else ""
+
+
+def _listed(words: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+
+
+def _probability(value: float) -> str:
+    """Two decimals, with no certainty pretended."""
+    if value > _CERTAIN:
+        return "above 0.99"
+    return "below 0.01" if value < 1 - _CERTAIN else f"{value:.2f}"
+
+
+def _nearest(test: WatchedTest, change: Change) -> Drift | None:
+    """What may have changed and is the likeliest to be beyond its threshold."""
     by_name = {drift.quantity: drift for drift in test.drifts}
     found = [by_name[each.quantity] for each in suspects(change) if each.quantity in by_name]
-    if not found:
+    return max(found, key=lambda drift: drift.probability, default=None)
+
+
+def _false_alarms(change: Change | None) -> str:
+    if change is None:
         return ""
-    nearest = max(found, key=lambda drift: drift.probability)
-    name = quantity_words(nearest.quantity)
-    return (
-        f"The threshold of the {name} is {_threshold(nearest)}: passed with probability "
-        f"{_probability(nearest.probability)}."
-    )
+    return f"mean time between false alarms at least {change.limit_years:.3g} years"
 
 
-def _blunder(change: Change) -> str:
-    if not change.outlier_probability > 0.5:
-        return ""
-    chance = _probability(change.outlier_probability)
-    return f"This test itself may be a blunder (probability {chance})."
-
-
-# ---------------------------------------------------------------- what to do
-
-
-def _advice(change: Change | None, beyond: Sequence[Drift]) -> str:
-    return f"What to do: {_urgency(change, beyond)} {_look(change, beyond)}"
-
-
-def _is_dangerous(beyond: Sequence[Drift]) -> bool:
-    """Lost tension or loosened ends, for which alone traffic is named."""
-    return any(drift.shift_mean < 0 for drift in beyond)
-
-
-def _urgency(change: Change | None, beyond: Sequence[Drift]) -> str:
-    if _is_dangerous(beyond):
-        return "have the engineer in charge decide on traffic now, and hit it again today."
-    if beyond:
-        return "hit it again today."
-    if change is not None and change.sudden < 0.5:
-        return "hit it again within weeks."
-    return "hit it again within days."
-
-
-def _look(change: Change | None, beyond: Sequence[Drift]) -> str:
-    groups = suspected_groups(change) if change else []
-    first = groups[0][0] if groups else None
-    if len(groups) > 1:
-        return (
-            "A sensor near each end and more modes tell them apart. Compare the hangers beside it "
-            "(shm drift bridge), and look at its anchorages."
-        )
-    quantity, shift = _leading(first, beyond)
-    if quantity in _LOOK_AT:
-        return f"If it holds, {_LOOK_AT[quantity]}"
-    if quantity == TENSION:
-        return _look_at_tension(shift > 0)
-    ends = {each.end for each in groups[0]} if first and first.quantity == quantity else {None}
-    end = "both ends" if None in ends else _ends(ends)
-    if shift < 0:
-        return f"If it holds, look at {end}: a worn pin, a crack in the plate, loose bolts."
-    return f"If it holds, look at {end}: a pin that rust or dirt has seized."
-
-
-def _leading(first: Moved | None, beyond: Sequence[Drift]) -> tuple[str, float]:
-    """What the crew looks after, and its shift; a loss of tension where nothing is known."""
-    for each in (*beyond[:1], *((first,) if first else ())):
-        return each.quantity, each.shift_mean
-    return TENSION, -1.0
-
-
-def _look_at_tension(rose: bool) -> str:
-    if rose:
-        return (
-            "If it holds, compare the hangers beside it (shm drift bridge): one of them may have "
-            "shed load."
-        )
-    return (
-        "If it holds, compare the hangers beside it (shm drift bridge), which take up what it "
-        "sheds, and look at its anchorages and along the rod."
-    )
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."

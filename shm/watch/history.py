@@ -10,9 +10,8 @@ import numpy as np
 from shm.errors import UsageError
 from shm.values import FloatArray
 from shm.values.drift import TENSION, Reading, TemperatureCoefficient, WatchedQuantity
+from shm.values.rounding import NINETY_PERCENT
 from shm.watch.quantities import value_at
-
-NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 
 @dataclass(frozen=True, eq=False)

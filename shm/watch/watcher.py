@@ -23,6 +23,7 @@ from shm.values import (
     TENSION,
     BoolArray,
     Change,
+    CreepRate,
     FloatArray,
     Hanger,
     IntArray,
@@ -264,6 +265,7 @@ class Watcher:
                 outlier,
                 effects,
             ),
+            creep_per_year=self._creep(evidence),
         )
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
@@ -469,6 +471,19 @@ class Watcher:
         likeliest, own = int(evidence.log_null.argmax()), slice(n, n + q)
         variance = np.diag(evidence.null_covariance[likeliest])[own]
         return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
+
+    def _creep(self, evidence: Evidence) -> CreepRate | None:
+        """The tension's creep if nothing but what was called changes; None where that is unlikely.
+
+        It is the last covariate of the null, before the called changes.
+        """
+        if probability_of_change(evidence, self.options) > 0.5:
+            return None
+        at, weights = len(self.structure.layout.null) - 1, np.exp(evidence.log_null)
+        means, variances = evidence.null_mean[:, at], evidence.null_covariance[:, at, at]
+        mean = float(weights @ means)
+        variance = float(weights @ (variances + (means - mean) ** 2))
+        return CreepRate(mean, math.sqrt(variance), self.options.creep_per_year_sd)
 
     def _outlier(self, state: WatchState, test: int) -> float:
         prior = self.options.outlier_probability

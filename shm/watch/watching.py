@@ -36,7 +36,8 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import message_of, message_of_odd, short_name, suspects
+from shm.watch.alert_text import message_of, message_of_odd, short_name
+from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.watcher import Watch, Watcher, WatchState, watched
@@ -44,6 +45,7 @@ from shm.watch.watcher import Watch, Watcher, WatchState, watched
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
 _BEYOND: AlertKind = "beyond threshold"
+_REPEAT: AlertKind = "repeat the test"
 _ODD = 0.9  # nine to one: a notice that is wrong costs a test
 _ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
 
@@ -135,8 +137,11 @@ def watch_newest(
     for test, time in later:
         state, found = watcher.after(state, reader.reading(test, max(time, since)))
         told, alert = after(told, found, hanger)
-    if alert is None and beside is not None and later:
-        alert = agreement(reader, later[-1], beside, hanger, options, told.beyond)
+    # A second test that agrees answers the notice that asks for one.
+    if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
+        agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
+        if agreed is not None:
+            alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
@@ -172,22 +177,29 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     level = hanger.thresholds.alert_probability
     standing = _still(told, test, hanger.thresholds.end_probability)
     news = _news(standing, test, level)
-    beyond = {(drift.quantity, way_of(drift.shift_mean)): test.time for drift in news.beyond}
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    stands = AlertState({**standing.beyond, **beyond}, call, called, odd)
+    stands = replace(
+        _with_beyond(standing, news.beyond, test.time), call=call, called=called, odd=odd
+    )
     alert = _alert(news, change, test, hanger, is_further=is_further)
     return stands, alert or _of_odd(test, hanger, odd)
+
+
+def _with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
+    """The state with shifts that were told at a test to be beyond their threshold."""
+    news = {(drift.quantity, way_of(drift.shift_mean)): at for drift in beyond}
+    return replace(told, beyond={**told.beyond, **news})
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     """Of a test that fits nothing: a notice of the first, an alert of the third in a row."""
     if in_a_row not in (1, _ODD_IN_A_ROW):
         return None
-    kind: AlertKind = "repeat the test" if in_a_row == 1 else "tests disagree"
+    kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
     return Alert(
         key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
         hanger=hanger.id,

@@ -8,17 +8,19 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import rebaselining
-from shm.store import Workspace
+from shm.store import Store, StoredAlert, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
 
-ACK = ("alerts", "ack", 1, "--why", "pin replaced")
+LOSS = 2
+"""The number of the alert; the first asks to repeat the test that showed the loss first."""
+ACK = ("alerts", "ack", LOSS, "--why", "pin replaced")
 ANEW = ("drift", "rebaseline", "--hanger", 3, "--why", "pin replaced")
 
 
 @pytest.fixture
 def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The bridge with a short history and one alert, and a stand-in for the sampler."""
+    """The bridge with a short history and one open alert, and a stand-in for the sampler."""
     monkeypatch.setattr(
         rebaselining,
         "update",
@@ -27,16 +29,23 @@ def workspace(bridge: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     folder = tmp_path / "arch"
     shutil.copytree(bridge.folder, folder)
     with Workspace.open(folder, {}).store() as store:
-        assert len(store.alerts.list_all()) == 1
+        notice, loss = sorted(store.alerts.list_all(), key=lambda each: each.id)
+        assert (notice.alert.kinds, loss.id) == (("repeat the test",), LOSS)
+        store.alerts.resolve(notice.id, "Jansen", "repeated", loss.raised_at)
     return folder
+
+
+def loss_in(store: Store) -> StoredAlert:
+    (found,) = (each for each in store.alerts.list_all() if each.id == LOSS)
+    return found
 
 
 def test_an_alert_is_acknowledged_with_who_and_why(shm: Shm, workspace: Path) -> None:
     ended = shm("--workspace", workspace, *ACK, "--who", "Jansen")
     assert ended.code == 0, ended.err
-    assert ended.out == "Alert 1 of hanger 3 is acknowledged.\n"
+    assert ended.out == "Alert 2 of hanger 3 is acknowledged.\n"
     with Workspace.open(workspace, {}).store() as store:
-        (noted,) = [stored.acknowledgement for stored in store.alerts.list_all()]
+        noted = loss_in(store).acknowledgement
     assert noted is not None
     assert (noted.who, noted.why) == ("Jansen", "pin replaced")
 
@@ -44,9 +53,10 @@ def test_an_alert_is_acknowledged_with_who_and_why(shm: Shm, workspace: Path) ->
 def test_the_list_of_alerts_says_who_took_note(shm: Shm, workspace: Path) -> None:
     assert "open" in shm("--workspace", workspace, "alerts").out
     noted = shm("--workspace", workspace, *ACK, "--who", "Jansen", "--json").document
-    (listed,) = shm("--workspace", workspace, "alerts", "--json").document["alerts"]
+    rows = shm("--workspace", workspace, "alerts", "--json").document["alerts"]
+    (listed,) = (row for row in rows if row["id"] == LOSS)
     assert listed["acknowledged"] == noted["acknowledged"]
-    assert (noted["id"], noted["acknowledged"]["who"]) == (1, "Jansen")
+    assert (noted["id"], noted["acknowledged"]["who"]) == (LOSS, "Jansen")
     shown = shm("--workspace", workspace, "alerts").out
     assert "Jansen" in shown
     assert "open" not in shown
@@ -61,6 +71,7 @@ def test_the_list_of_alerts_says_who_took_note(shm: Shm, workspace: Path) -> Non
         ((*ANEW, "--since", "2027-01-01"), 4, "no test since 2027-01-01"),
         ((*ANEW, "--since", "lately"), 2, "--since"),
         ((*ANEW,), 2, "--since"),
+        ((*ANEW, "--since", "2026-06-30", "--kind", "painted"), 2, "--kind"),
         (("drift", "rebaseline", "--since", "2026-05-01", "--why", "x"), 2, "--hanger"),
         (("drift", "rebaseline", "--hanger", 4, "--since", "2026-05-01", "--why", "x"), 4,
          "no baseline yet"),
@@ -108,6 +119,31 @@ def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
     assert document["since"] == "2026-05-31T09:00:00Z"
 
 
+def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) -> None:
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--who", "Jansen",
+                "--kind", "retensioned", "--json")  # fmt: skip
+    assert ended.code == 0, ended.err
+    document = ended.document
+    assert (document["kind"], document["why"]) == ("retensioned", "retensioned: pin replaced")
+    assert (document["alerts_explained"], document["alerts_open"]) == ([LOSS], [])
+    with Workspace.open(workspace, {}).store() as store:
+        stored = loss_in(store)
+    assert stored.resolution is not None
+    assert stored.acknowledgement is not None
+    assert stored.acknowledgement.why == "explained by: retensioned: pin replaced"
+
+
+def test_an_event_leaves_open_what_it_does_not_explain(shm: Shm, workspace: Path) -> None:
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--kind", "lamp mounted")
+    assert ended.code == 0, ended.err
+    assert "is explained" not in ended.out
+    assert "Take note of them: `shm alerts ack 2`." in ended.out
+    with Workspace.open(workspace, {}).store() as store:
+        stored = loss_in(store)
+        assert len(store.watch.list_drifts(3)) > 0
+    assert (stored.resolution, stored.acknowledgement) == (None, None)
+
+
 def test_drift_without_a_sub_command_lists_as_ever(shm: Shm, workspace: Path) -> None:
     plain = shm("--workspace", workspace, "drift", "--json").document["drifts"]
     assert [row["test"] for row in plain] == ["t2"]
@@ -119,7 +155,7 @@ def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
     shm: Shm, workspace: Path
 ) -> None:
     told = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30").out
-    assert "Take note of them: `shm alerts ack 1`." in told
+    assert "Take note of them: `shm alerts ack 2`." in told
     shown = shm("--workspace", workspace, "drift").out
     assert " ".join(shown.split()) == (
         "Hanger 3 is compared anew since 2026-06-30; no test has come in after that baseline was "
@@ -134,7 +170,7 @@ def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
 def test_a_report_says_who_took_note_of_an_alert(shm: Shm, workspace: Path) -> None:
     shm("--workspace", workspace, *ACK, "--who", "Jansen")
     report = shm("--workspace", workspace, "report", "--hanger", 3, "--json").document
-    (noted,) = report["acknowledged"].values()
+    noted = report["acknowledged"]["hanger-3:two-tests-agree:tension-down:t2:baseline-1"]
     assert noted.startswith("Jansen, ")
     assert noted.endswith(": pin replaced")
 

@@ -42,12 +42,13 @@ def test_a_tension_that_comes_back_resolves_its_alert(bridge: Workspace) -> None
     postman = Postman()
     for day, tension in ((0, 1.0), (30, 0.8), (60, 0.8)):
         take(bridge, postman, day, tension)
-    (raised,) = {key for _, key in postman.told}
+    # The first asks to repeat the test that fits none before it.
+    (raised,) = {key for _, key in postman.told if "repeat-the-test" not in key}
     for day in (90, 120, 150):
         take(bridge, postman, day, 1.0)
     assert ("mail", f"{raised}:resolved") in postman.told
     with bridge.store() as store:
-        found = store.alerts.list_all()[0]
+        (found,) = (each for each in store.alerts.list_all() if each.alert.key == raised)
         assert found.resolution is not None
         assert found.resolution.who == "shm"
         with store.engine.connect() as connection:

@@ -11,7 +11,7 @@ import pytest
 
 from shm.inference import UpdateOptions
 from shm.models import build
-from shm.values import Alert, Beside, ModalTest, Thresholds
+from shm.values import Alert, Beside, ModalTest, Posterior, Thresholds
 from shm.watch import Newest, WatchOptions, watch_newest
 from tests.helpers import quick_update
 from tests.helpers.hangers import HANGER_3
@@ -34,19 +34,26 @@ def a_test(number: int, tension: float = LOST, temperature_c: float = 12.0) -> M
     return replace(test, modes=modes, time=BEGIN + number * SECOND, temperature_c=temperature_c)
 
 
-def watch(newest: ModalTest, beside: Beside | None, later: Sequence[ModalTest] = ()) -> Newest:
-    first = a_test(0, 1.0)
+HANGER = replace(HANGER_3, thresholds=Thresholds())
+
+
+def baseline_of(first: ModalTest) -> tuple[Posterior, list[tuple[ModalTest, datetime]]]:
     options = UpdateOptions(samples=200, seed=1)
-    baseline = quick_update.update([first], build("beam1", HANGER_3), options)
-    dated = [(test, test.time or BEGIN) for test in (*later, newest)]
-    hanger = replace(HANGER_3, thresholds=Thresholds())
-    found = watch_newest(baseline, [(first, BEGIN)], dated, hanger, WatchOptions(), beside=beside)
+    return quick_update.update([first], build("beam1", HANGER_3), options), [(first, BEGIN)]
+
+
+def watch(newest: ModalTest, beside: Beside | None) -> Newest:
+    dated = [(newest, newest.time or BEGIN)]
+    baseline = baseline_of(a_test(0, 1.0))
+    found = watch_newest(*baseline, dated, HANGER, WatchOptions(), beside=beside)
     assert found is not None
     return found
 
 
 def told(newest: ModalTest, beside: Beside) -> Alert | None:
-    return watch(newest, beside).alert
+    """What is told of two tests that agree; a request to repeat one that fits nothing is none."""
+    alert = watch(newest, beside).alert
+    return None if alert and alert.kinds == ("repeat the test",) else alert
 
 
 def came(*before: ModalTest, after: Sequence[ModalTest] = ()) -> Beside:
@@ -103,13 +110,35 @@ def test_a_held_test_is_named_as_one() -> None:
     assert "Tests t1 (held for its clock) and t2 both" in alert.message
 
 
-def test_what_the_watch_has_told_is_not_told_again() -> None:
-    """Of tests a month apart it calls the loss itself, which says more."""
-    apart = [replace(a_test(n), time=BEGIN + n * timedelta(days=30)) for n in (1, 2, 3)]
-    second = watch(apart[1], came(apart[0]), apart[:1])
-    assert second.alert is not None
-    assert "two-tests" not in second.alert.key
-    assert watch(apart[2], came(apart[1]), apart[:2]).alert is None
+def test_a_second_test_that_agrees_with_none_is_asked_to_be_repeated() -> None:
+    alert = watch(a_test(2), came(a_test(1, 1.1))).alert
+    assert alert is not None
+    assert alert.kinds == ("repeat the test",)
+
+
+def test_what_two_tests_have_told_the_watch_does_not_tell_again() -> None:
+    """Of tests a month apart the second is told for agreeing. The third detects the same change,
+    and the fourth finds it beyond the threshold: no news for the owner."""
+    apart = [replace(a_test(n), time=BEGIN + n * timedelta(days=30)) for n in range(1, 6)]
+    baseline = baseline_of(a_test(0, 1.0))
+    kept: bytes | None = None
+    before: ModalTest | None = None
+    alerts = []
+    for test in apart:
+        beside = came(*([before] if before else []))
+        found = watch_newest(
+            *baseline, [(test, test.time or BEGIN)], HANGER, WatchOptions(), kept, beside
+        )
+        assert found is not None
+        kept, before = found.kept, test
+        alerts.append(found.alert and found.alert.key)
+    assert alerts == [
+        "hanger-3:repeat-the-test:t1",
+        "hanger-3:two-tests-agree:tension-down:t2",
+        None,
+        None,
+        None,
+    ]
 
 
 def test_two_blunders_in_a_row_are_rarely_alike() -> None:

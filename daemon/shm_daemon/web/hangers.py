@@ -96,6 +96,7 @@ def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
             "nominal_tension_n": hanger.nominal_tension_n,
             "baseline_set_at": baselines[hanger.id].set_at if hanger.id in baselines else None,
             "shifts": _shifts(watches.get(hanger.id)),
+            "creep_per_year": _creep(watches.get(hanger.id)),
             "open_alerts": alerts.get(hanger.id, 0),
             **_tension(trends.get(hanger.id)),
         }
@@ -115,6 +116,11 @@ def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:
     """Those of the latest test that was compared with the baseline in force."""
     drifts = latest.watched.drifts if latest else ()
     return [{key: _known(getattr(drift, key)) for key in _SHIFT} for drift in drifts]
+
+
+def _creep(latest: StoredWatch | None) -> dict[str, float] | None:
+    creep = latest.watched.creep_per_year if latest else None
+    return {"mean": creep.mean, "sd": creep.sd} if creep and creep.is_known else None
 
 
 def _known(value: Any) -> Any:

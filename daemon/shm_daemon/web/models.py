@@ -108,6 +108,13 @@ class AveragedTension(BaseModel):
     caveats: list[str] = Field(description="What keeps it from being taken at its word.")
 
 
+class Creep(BaseModel):
+    """How fast the tension creeps: a fraction a year, below 0 where it relaxes."""
+
+    mean: float
+    sd: float
+
+
 class HangerState(BaseModel):
     """What is known of a hanger after its latest test; null or empty before the first."""
 
@@ -120,6 +127,7 @@ class HangerState(BaseModel):
     averaged: AveragedTension | None = Field(description="The headline.")
     baseline_set_at: datetime | None
     shifts: list[Shift]
+    creep_per_year: Creep | None = Field(description="Null where the tests do not show it.")
     open_alerts: int
 
 

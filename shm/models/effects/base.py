@@ -97,6 +97,20 @@ class Parameter:
         return np.asarray(np.log(value / self.lower) / np.log(self.upper / self.lower))
 
 
+@dataclass(frozen=True)
+class OverTime:
+    """An effect that came between two tests, in the words of an alert.
+
+    `fell` and `rose` say what has happened where the frequencies did so in the mean, `check` what a
+    crew looks at first, and `apart_by` with what a test is made that tells it from other causes.
+    """
+
+    fell: str
+    rose: str
+    check: str
+    apart_by: str = "more modes and their shapes"
+
+
 class Effect:
     """A member of the catalogue. It declares its names and overrides the verbs.
 
@@ -105,7 +119,7 @@ class Effect:
     for. The first parameter is the effect's size. `follows` are the conditions of a test that it
     depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
     would not have. `other_laws` says in words by which other laws, about as likely as its own, the
-    same parameters may act.
+    same parameters may act. `over_time` is None of an effect that the watch does not look for.
     """
 
     name: ClassVar[str]
@@ -116,6 +130,7 @@ class Effect:
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
     of_the_hanger: ClassVar[bool] = True
     other_laws: ClassVar[tuple[str, ...]] = ()
+    over_time: ClassVar[OverTime | None] = None
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         """Why these data cannot show the effect, a sentence for people; empty where they can."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.models.base import Conditions
 from shm.models.effects import places, scales
-from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.base import Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, PointMass
 from shm.values import FloatArray, Hanger
 
@@ -62,6 +62,11 @@ class UnknownPointMass(Effect):
 
     name = "point_mass"
     title = "A mass at one place"
+    over_time = OverTime(
+        fell="a mass was added",
+        rose="a mass was removed",
+        check="look for a lamp, clamp, cable or ice on the hanger, or for what was removed",
+    )
     source = "Chen (1963), On the vibration of beams or rods carrying a concentrated mass."
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = (
@@ -105,6 +110,12 @@ class SensorMass(Effect):
 
     name = "sensor_mass"
     title = "Heavy sensors"
+    over_time = OverTime(
+        fell="sensors are heavier or elsewhere",
+        rose="sensors are lighter or elsewhere",
+        check="check which sensors were mounted, and where",
+        apart_by="the sensors of the baseline at their old places",
+    )
     source = (
         "Ewins (2000), Modal Testing: Theory, Practice and Application; Maes, Peeters, Reynders, "
         "Lombaert and De Roeck (2013), Identification of axial forces in beam members by local "

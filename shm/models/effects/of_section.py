@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.models.base import Conditions
 from shm.models.effects import places
-from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
+from shm.models.effects.base import GRADUAL, Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, FloatArray, Hanger
 
@@ -24,6 +24,11 @@ class BendingStiffness(Effect):
 
     name = "bending_stiffness"
     title = "Another bending stiffness"
+    over_time = OverTime(
+        fell="bending stiffness fell",
+        rose="bending stiffness rose",
+        check="check for broken wires, a loose sleeve or new grout",
+    )
     source = (
         "Papailiou (1997), On the bending stiffness of transmission line conductors; Cardou and "
         "Jolicoeur (1997), Mechanical models of helical strands."
@@ -81,6 +86,11 @@ class SectionLoss(Effect):
 
     name = "section_loss"
     title = "Lost section over a stretch"
+    over_time = OverTime(
+        fell="section was lost over a stretch",
+        rose="section was lost over a stretch",
+        check="check the rod for corrosion, wear or a crack",
+    )
     source = (
         "Cawley and Adams (1979), The location of defects in structures from measurements of "
         "natural frequencies."

@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.models.base import Conditions
 from shm.models.effects import places, scales
-from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.base import Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import NAN, FloatArray, Hanger
 
@@ -21,6 +21,12 @@ class Timebase(Effect):
 
     name = "timebase"
     title = "A wrong clock"
+    over_time = OverTime(
+        fell="the logger's clock is wrong",
+        rose="the logger's clock is wrong",
+        check="check the logger's clock and the sampling rate in the file",
+        apart_by="another logger",
+    )
     source = "IEEE Std 1057-2017, Standard for Digitizing Waveform Recorders."
     seen_by = ("frequencies", "several tests")
     imitated_by = (

@@ -13,7 +13,7 @@ import scipy
 
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray
-from shm.watch.history import NINETY_PERCENT
+from shm.values.rounding import NINETY_PERCENT
 from shm.watch.neighbours.evidence import Bridge
 from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
 from shm.watch.neighbours.pattern_text import remarks_of, sentence_of

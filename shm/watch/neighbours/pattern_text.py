@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.values.force_units import force_unit
-from shm.watch.history import NINETY_PERCENT
+from shm.values.rounding import NINETY_PERCENT
 from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     ExplanationName,

@@ -1,0 +1,147 @@
+"""What may have changed, in words: quantities and causes by name, how far, rounded by the interval.
+
+The words of a cause are those of the catalogue of effects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence, Set
+
+from shm.models.effects import EFFECTS
+from shm.models.effects.base import OverTime
+from shm.values import TENSION, Change, Drift, End, Moved, Plane
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
+
+_PROBABLE = 0.1  # judgement: one in ten is worth a test that tells it from the rest
+_WHICH_END = "which end is not known"
+_SHARES = {1 / 2: "half", 1 / 3: "a third", 1 / 4: "a quarter", 1 / 5: "a fifth", 1 / 10: "a tenth"}
+_AS_GOOD_AS = 1.1  # judgement: a tenth more or less is still "about a third"
+_LEAST_SHARE, _LARGEST_FACTOR = 0.05, 1e3  # judgement: beyond, an end is as good as free or clamped
+
+CAUSES = {
+    **{name: each.over_time for name, each in EFFECTS.items() if each.over_time},
+    "unexplained": OverTime(
+        fell="no known cause explains it",
+        rose="no known cause explains it",
+        check="check hanger, sensors, axes and orders of modes in the test's files",
+    ),
+}
+"""What may have moved the frequencies beside tension and end stiffness."""
+
+
+# ---------------------------------------------------------------- what may have changed
+
+
+def suspects(change: Change) -> list[Moved]:
+    """The likeliest quantity, those that moved with it, and those that may have instead."""
+    return list(dict.fromkeys(each for group in suspected_groups(change) for each in group))
+
+
+def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
+    """What may have moved, each with what moved with it, the likeliest first."""
+    by_name = {each.quantity: each for each in change.moved}
+    groups: dict[frozenset[str], tuple[Moved, ...]] = {}
+    for first in change.moved[:1]:
+        for name in (first.quantity, *(n for n in by_name if n in first.alike)):
+            names = (name, *by_name[name].together)
+            group = tuple(by_name[each] for each in names if each in by_name)
+            groups.setdefault(frozenset(names), group)
+    return list(groups.values())
+
+
+def probable_groups(change: Change) -> list[tuple[Moved, ...]]:
+    """The same without what the data fit as well but nobody need expect."""
+    first, *others = suspected_groups(change) or [()]
+    likely = [each for each in others if each[0].probability >= _PROBABLE]
+    return [first, *likely] if first else []
+
+
+# ---------------------------------------------------------------- names and sizes
+
+
+def quantity_words(name: str, end: End | None = None, plane: Plane | None = None) -> str:
+    """`tension`, or `end stiffness k1 (deck end, transverse)`."""
+    if not name.startswith("log10_k"):
+        return name.replace("_", " ")
+    at = f"{end} end" if end else _WHICH_END if plane else ""
+    where = ", ".join(word for word in (at, plane or "") if word)
+    return f"end stiffness {name.removeprefix('log10_')}" + (f" ({where})" if where else "")
+
+
+def group_words(group: Sequence[Moved]) -> str:
+    """`end stiffness in both planes at the deck end`, a cause, or the quantities' own names."""
+    first = group[0]
+    if first.quantity in CAUSES:
+        cause = CAUSES[first.quantity]
+        return cause.fell if first.shift_mean < 0 else cause.rose
+    ends = {each.end for each in group}
+    planes = {each.plane for each in group}
+    if len(group) == 1 or None in planes:
+        return " and ".join(quantity_words(g.quantity, g.end, g.plane) for g in group)
+    where = f"both planes ({_WHICH_END})" if None in ends else f"both planes at {ends_words(ends)}"
+    if len(planes) == 1:
+        where = f"the {first.plane} plane at {ends_words(ends)}"
+    return f"end stiffness in {where}"
+
+
+def ends_words(ends: Set[End | None]) -> str:
+    return "both ends" if len(ends) > 1 else f"the {next(iter(ends))} end"
+
+
+def shift_words(quantity: str, mean: float, sd: float) -> str:
+    """`fell by 8.2 ± 1.1 %`, rounded to its 90 % interval; `fell to about a third` of a stiffness.
+
+    `mean` and `sd` are a fraction of the tension, of the frequencies' mean where `quantity` is
+    another cause, or decades of a stiffness.
+    """
+    half = NINETY_PERCENT * sd
+    verb = "moved" if abs(mean) <= half else "fell" if mean < 0 else "rose"
+    if is_stiffness(quantity):
+        return f"{verb} to {_factor_words(mean)}"
+    if verb == "moved":
+        return f"moved by {rounded_percent(mean, half, '+')}"
+    return f"{verb} by {rounded_percent(abs(mean), half)}"
+
+
+def is_stiffness(quantity: str) -> bool:
+    return quantity != TENSION and quantity not in CAUSES
+
+
+def _factor_words(decades: float) -> str:
+    """`about a third`, `about 71 % of its former value`, `about 3.2 times its former value`."""
+    times = 10 ** min(decades, 10.0)
+    if times < _LEAST_SHARE:
+        return "less than a twentieth"
+    for share, words in _SHARES.items():
+        if abs(math.log(times / share)) < math.log(_AS_GOOD_AS):
+            return f"about {words}"
+    if times < 1:
+        return f"about {100 * times:.0f} % of its former value"
+    about = "" if times > _LARGEST_FACTOR else "about "
+    return f"{about}{factor(decades)} times its former value"
+
+
+def factor(decades: float) -> str:
+    """Of what it was: `0.50`, `3.2`."""
+    times = 10 ** min(decades, 10.0)
+    if times > _LARGEST_FACTOR:
+        return "more than 1000"
+    if times < 1 / _LARGEST_FACTOR:
+        return "less than 0.001"
+    return f"{times:.2f}" if times < 1 else f"{times:.1f}" if times < 10 else f"{times:.0f}"
+
+
+def size_words(each: Moved | Drift) -> str:
+    return shift_words(each.quantity, each.shift_mean, each.shift_sd)
+
+
+def threshold_words(drift: Drift) -> str:
+    if drift.quantity == TENSION:
+        return f"{100 * drift.threshold:.3g} %"
+    return f"{factor(math.copysign(drift.threshold, drift.shift_mean))} times"
+
+
+def beyond_words(drift: Drift) -> str:
+    name = quantity_words(drift.quantity)
+    return f"{name} is beyond its threshold of {threshold_words(drift)}"
