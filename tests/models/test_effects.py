@@ -133,6 +133,7 @@ def test_the_catalogue_holds_the_effects_of_the_design_in_its_order() -> None:
 def test_an_effect_says_what_it_is_and_whence(name: str) -> None:
     effect = EFFECTS[name]
     assert effect.title
+    assert effect.phrase
     assert re.search(r"\d{4}", effect.source)
     assert effect.seen_by
     assert effect.imitated_by

@@ -18,6 +18,7 @@ class DistributedMass(Effect):
 
     name = "distributed_mass"
     title = "More mass along the hanger"
+    phrase = "a mass per length {mass_change:higher|lower} than described"
     source = (
         "Blevins (1979), Formulas for Natural Frequency and Mode Shape; ISO 12494:2001, "
         "Atmospheric icing of structures."
@@ -62,6 +63,7 @@ class UnknownPointMass(Effect):
 
     name = "point_mass"
     title = "A mass at one place"
+    phrase = "a point mass of {mass_kg} at {x_m}"
     source = "Chen (1963), On the vibration of beams or rods carrying a concentrated mass."
     seen_by = ("frequencies of many orders", "shapes")
     imitated_by = (
@@ -105,6 +107,7 @@ class SensorMass(Effect):
 
     name = "sensor_mass"
     title = "Heavy sensors"
+    phrase = "the mass of the sensors, {mass_kg} each"
     source = (
         "Ewins (2000), Modal Testing: Theory, Practice and Application; Maes, Peeters, Reynders, "
         "Lombaert and De Roeck (2013), Identification of axial forces in beam members by local "

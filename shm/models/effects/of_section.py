@@ -24,6 +24,7 @@ class BendingStiffness(Effect):
 
     name = "bending_stiffness"
     title = "Another bending stiffness"
+    phrase = "a bending stiffness {stiffness_change:higher|lower} than described"
     source = (
         "Papailiou (1997), On the bending stiffness of transmission line conductors; Cardou and "
         "Jolicoeur (1997), Mechanical models of helical strands."
@@ -81,6 +82,7 @@ class SectionLoss(Effect):
 
     name = "section_loss"
     title = "Lost section over a stretch"
+    phrase = "a loss of {loss} of the section around {x_m}, over {extent_m}"
     source = (
         "Cawley and Adams (1979), The location of defects in structures from measurements of "
         "natural frequencies."
@@ -148,6 +150,7 @@ class ShearAndRotaryInertia(Effect):
 
     name = "shear_and_rotary_inertia"
     title = "Shear and rotary inertia"
+    phrase = "shear and rotary inertia, {share} of Timoshenko"
     source = (
         "Timoshenko (1921), On the correction for shear of the differential equation for "
         "transverse vibrations of prismatic bars; Cowper (1966), The shear coefficient in "
