@@ -25,7 +25,7 @@ def migrations_folder() -> Path:
 
 
 def default_config() -> Path:
-    """The commented `bridge.toml` that `shm init` writes."""
+    """The commented `bridge.toml` that `shm init` writes, but for the lines of the settings."""
     return _locate("config/default.toml")
 
 

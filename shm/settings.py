@@ -6,6 +6,7 @@ A value comes from the flag, else the environment (`SHM_<NAME>`), else the table
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -196,6 +197,19 @@ TABLE: tuple[Setting, ...] = tuple(
     Setting(row.name, row.default, **row.metadata)  # type: ignore[arg-type]
     for row in fields(Settings)
 )
+
+
+_HELP_AT = 37  # layout: the column at which the meanings begin
+
+
+def commented() -> str:
+    """A line a setting for a new `bridge.toml`: its default, commented out, and what it means."""
+    lines = []
+    for row in TABLE:
+        meaning = f"{row.help}, in {row.unit}" if row.unit else row.help
+        default = f"# {row.name} = {json.dumps(row.default)} "
+        lines.append(f"{default.ljust(_HELP_AT - 1)} # {meaning}\n")
+    return "".join(lines)
 
 
 def load_settings(

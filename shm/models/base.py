@@ -101,7 +101,7 @@ class Model:
         if conditions.added_mass is None:
             return found
         values = dict(zip(self.parameter_names, theta.T, strict=True))
-        length_m = values.get("theta_L", np.ones(len(theta))) * self.hanger.length_m
+        length_m = self.stiffness_mass_length(theta)[2] * self.hanger.length_m
         tension_n = values["theta_F"] * self.hanger.nominal_tension_n
         springs = self.springs_n_m_rad(theta)
         mass = conditions.added_mass
@@ -129,6 +129,8 @@ class Model:
     def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Bending stiffness, mass per length and length of parameter sets (n, parameters), each
         (n,) over the described one.
+
+        A class whose length is neither the description's nor `theta_L` says it here.
         """
         one = np.ones(len(theta))
         values = dict(zip(self.parameter_names, theta.T, strict=True))

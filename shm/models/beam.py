@@ -32,7 +32,7 @@ class Beam(Model):
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
         together = sum(turnbuckle.length_m for turnbuckle in hanger.turnbuckles)
-        shortest = cls.bounds["theta_L"][0] * hanger.length_m
+        shortest = cls.bounds.get("theta_L", (1.0, 1.0))[0] * hanger.length_m
         if together < shortest:
             return ""
         return (
@@ -80,7 +80,7 @@ class Beam(Model):
         return tensioned_beam.mode_shape(xi, deck * scale, arch * scale, order, x_m / length)
 
     def _length_m(self, theta: FloatArray) -> FloatArray:
-        return theta[:, self.parameter_names.index("theta_L")] * self.hanger.length_m
+        return self.stiffness_mass_length(theta)[2] * self.hanger.length_m
 
     def _tension_n(self, theta: FloatArray) -> FloatArray:
         return theta[:, self.parameter_names.index("theta_F")] * self.hanger.nominal_tension_n

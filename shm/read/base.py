@@ -54,7 +54,8 @@ class Format:
     """One file format: the suffixes it goes by and its verbs.
 
     `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
-    `may_be_gzipped` says whether NAME.csv.gz is read too.
+    `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
+    holds time records alone.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Format:
     read: Callable[[Path], Recording | FrequencyResponse]
     write: Callable[[Recording | FrequencyResponse, Path], None] | None = None
     may_be_gzipped: bool = False
+    holds_responses: bool = True
 
 
 def names_in(described: Recording | FrequencyResponse) -> list[str]:

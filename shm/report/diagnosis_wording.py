@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from shm.models.effects import EFFECTS
 from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
@@ -90,58 +91,6 @@ _PLACES = {
 _MOST_PLACES = 2  # what a sentence bears
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
 
-PHRASES: dict[str, Callable[[Sizes], str]] = {
-    "rotational_end_flexibility": lambda s: f"ends that turn against springs of {s.springs('k')}",
-    "translational_end_flexibility": lambda s: (
-        f"ends that give way sideways against springs of {s.springs('kt')}"
-    ),
-    "effective_length": lambda s: (
-        f"an effective length {s['length_change_m'].directed('longer', 'shorter')} than described"
-    ),
-    "bending_stiffness": lambda s: (
-        f"a bending stiffness {s['stiffness_change'].directed('higher', 'lower')} than described"
-    ),
-    "distributed_mass": lambda s: (
-        f"a mass per length {s['mass_change'].directed('higher', 'lower')} than described"
-    ),
-    "point_mass": lambda s: f"a point mass of {s['mass_kg']} at {s['x_m']}",
-    "section_loss": lambda s: (
-        f"a loss of {s['loss']} of the section around {s['x_m']}, over {s['extent_m']}"
-    ),
-    "stiff_end_zones": lambda s: (
-        f"end zones of {s['zone_m']} with a bending stiffness of {s['stiffness_ratio']}"
-    ),
-    "shear_and_rotary_inertia": lambda s: f"shear and rotary inertia, {s['share']} of Timoshenko",
-    "sag": lambda s: f"sag with Irvine's lambda squared of {s['sag_parameter']}",
-    "intermediate_support": lambda s: (
-        f"an intermediate support of {s['stiffness_n_m']} at {s['x_m']}"
-    ),
-    "support_motion": lambda s: (
-        f"a support that moves as a mass of {s['support_mass_kg']} with a frequency of its own of "
-        f"{s['support_frequency_hz']}"
-    ),
-    "temperature_tension": lambda s: (
-        "a tension that changes with the temperature, by "
-        f"{s['tension_per_kelvin_n_k'].directed('(rising)', '(falling)')}"
-    ),
-    "geometric_hardening": lambda s: (
-        f"a tension that grows with the level of motion, by {s['hardening']} at the reference level"
-    ),
-    "joint_softening": lambda s: (
-        "joints that soften as the hanger moves more, with "
-        f"{s['log10_k_at_reference_level']} at the reference level"
-    ),
-    "sensor_mass": lambda s: f"the mass of the sensors, {s['mass_kg']} each",
-    "sensor_misalignment": lambda s: f"a sensor direction turned by {s['angle_deg']}",
-    "skewed_principal_axes": lambda s: (
-        f"ends that turn about one axis only, {s['angle_deg']} from the transverse plane, against "
-        f"{s['log10_k']}"
-    ),
-    "timebase": lambda s: (
-        f"a clock by which frequencies read {s['clock_error'].directed('too high', 'too low')}"
-    ),
-}
-
 
 def title(effect: str) -> str:
     """`point_mass + sag` as `point mass + sag`."""
@@ -178,7 +127,7 @@ def _clause(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
     """What the effect is, how large, where; the bare name where its size is not known."""
     where = _place(at)
     try:
-        told = PHRASES[effect](Sizes(estimates))
+        told = EFFECTS[effect].phrase.format_map(Sizes(estimates))
     except KeyError:
         told = title(effect)
     return f"{told} {where}".rstrip()
@@ -240,6 +189,11 @@ class Size:
             turned = Interval(-self.interval.mean, -self.interval.high, -self.interval.low)
             return f"{self.told(turned)} {down}"
         return f"{self.told(self.interval, '+')} {up}"
+
+    def __format__(self, directions: str) -> str:
+        """As text; with `up|down` as `directed` says it."""
+        up, bar, down = directions.partition("|")
+        return self.directed(up, down) if bar else str(self)
 
     def told(self, interval: Interval, sign: str = "") -> str:
         """An interval in this size's unit and digits."""
@@ -315,24 +269,21 @@ def base_name(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-class Sizes:
-    """The sizes of one effect by the catalogue's names of its parameters."""
+class Sizes(dict[str, "Size | str"]):
+    """The sizes of one effect by the catalogue's names of its parameters, for its phrase."""
 
     def __init__(self, estimates: Sequence[EffectEstimate]):
-        self._sizes: Mapping[str, Size] = {base_name(e.name): size(e) for e in estimates}
+        super().__init__({base_name(e.name): size(e) for e in estimates})
 
-    def __getitem__(self, name: str) -> Size:
-        return self._sizes[name]
-
-    def springs(self, letter: str) -> str:
-        """The end springs log10_`letter`1 to 4, with their planes where there are several."""
+    def __missing__(self, stem: str) -> str:
+        """The end springs `stem` 1 to 4, with their planes where there are several."""
         found = {
-            plane: self._sizes[name]
+            plane: self[name]
             for number, plane in _SPRING_PLANES.items()
-            if (name := f"{_LOGARITHM}{letter}{number}") in self._sizes
+            if (name := f"{stem}{number}") in self
         }
         if not found:
-            raise KeyError(letter)
+            raise KeyError(stem)
         if len(found) == 1:
             return str(next(iter(found.values())))
         return " and ".join(f"{size} {plane}" for plane, size in found.items())

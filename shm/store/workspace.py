@@ -12,7 +12,7 @@ from typing import Self
 from shm.bridge import Bridge, load_bridge
 from shm.errors import BadInput, UsageError
 from shm.resources import default_config
-from shm.settings import Settings, load_settings
+from shm.settings import Settings, commented, load_settings
 from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
 from shm.store.location import has_password
@@ -53,16 +53,19 @@ class Workspace:
         Raises UsageError where the folder holds a `bridge.toml` already, BadInput where `config`
         is wrong, StoreError where the store cannot be made.
         """
-        folder, config = Path(folder), config or default_config()
+        folder, described = Path(folder), config or default_config()
         target = folder / "bridge.toml"
         if target.exists():
             raise UsageError(
                 f"{folder} is a workspace already.", remedy="Edit its bridge.toml instead."
             )
-        settings = _settings(load_bridge(config), None)
+        settings = _settings(load_bridge(described), None)
         folder.mkdir(parents=True, exist_ok=True)
         Store.create(_location(folder, settings)).close()
-        shutil.copyfile(config, target)
+        shutil.copyfile(described, target)
+        if config is None:  # the template ends with the heading of the settings
+            with target.open("a", encoding="utf-8") as file:
+                file.write(commented())
         return cls.open(folder)
 
     def reopened(self) -> Self:

@@ -23,6 +23,7 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
+from shm_daemon.web.frame import NAVIGATION
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
@@ -32,14 +33,11 @@ from tests.helpers.workspaces import START, make_workspace, write_loss, write_te
 RECORDED = "recorded"
 PAGES = {
     "sign-in": "/sign-in",
-    "bridge": "/",
     "hanger": "/hangers/3",
     "tests": "/hangers/3/tests",
     "modes": page_of(3, "t1"),
     "recording": page_of(3, RECORDED),
-    "alerts": "/alerts",
-    "upload": "/upload",
-    "operation": "/operation",
+    **{name.lower(): address for address, name in NAVIGATION},
 }
 CHARTS = {"hanger": 4, "recording": 6}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"

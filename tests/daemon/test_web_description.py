@@ -13,6 +13,7 @@ from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm_daemon.doctor import Level, examine
 from shm_daemon.heartbeat import beat
+from shm_daemon.web.frame import NAVIGATION
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 from tests.store.make_released_database import fill
@@ -29,7 +30,7 @@ FAULTS = {
     "missing key": ("length_m = 12.0\n", "", 4, "length_m is missing"),
     "unknown setting": ("samples = 100", "sampels = 100", None, "unknown setting 'sampels'"),
 }
-PAGES = ("/", "/hangers/3", "/alerts", "/operation", "/upload")
+PAGES = ("/hangers/3", *(address for address, _ in NAVIGATION))
 
 
 @pytest.fixture(scope="module")

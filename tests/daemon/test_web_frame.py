@@ -16,11 +16,12 @@ import pytest
 from shm.store import Workspace
 from shm_daemon.web import plotting
 from shm_daemon.web.address import Address
+from shm_daemon.web.frame import NAVIGATION
 from shm_daemon.web.middleware import PROTECTION
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace
 
-PAGES = ("/", "/alerts", "/upload", "/operation")
+PAGES = tuple(address for address, _ in NAVIGATION)
 BROWSER = {"Accept": "text/html,application/xhtml+xml"}
 
 

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
+import pytest
 import scipy.io
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
+from shm.read import FORMATS, Format
 from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
 from shm.values import FrequencyResponse, Recording
 
 
 def write(described: Recording | FrequencyResponse, path: Path) -> None:
-    """Writes as `shm.read.write` does, and HDF5, MATLAB and TDMS in the same layout."""
-    known = {".h5": _hdf5, ".hdf5": _hdf5, ".mat": _matlab, ".tdms": _tdms}
-    if path.suffix in known:
-        known[path.suffix](layout_of(described), path)
-    else:
-        write_ours(described, path)
+    """Writes as `shm.read.write` does, and HDF5, MATLAB and TDMS in the same layout.
+
+    A format that `shm` only reads needs a line of `_WRITERS`.
+    """
+    if path.suffix in _WRITERS:
+        _WRITERS[path.suffix](layout_of(described), path)
+        return
+    if any(path.suffix in known.suffixes and known.write is None for known in FORMATS):
+        pytest.fail(f"shm only reads {path.suffix}: add a writer to _WRITERS of {__file__}.")
+    write_ours(described, path)
+
+
+def needs_responses(file_format: Format) -> None:
+    """Skips a test of frequency responses where the format holds time records alone."""
+    if not file_format.holds_responses:
+        pytest.skip(f"{file_format.name} holds time records alone")
 
 
 def _hdf5(layout: Layout, path: Path) -> None:
@@ -45,3 +58,11 @@ def _tdms(layout: Layout, path: Path) -> None:
     ]  # fmt: skip
     with path.open("wb") as stream, TdmsWriter(stream) as writer:
         writer.write_segment([RootObject(layout.attributes), GroupObject("test"), *channels])
+
+
+_WRITERS: dict[str, Callable[[Layout, Path], None]] = {
+    ".h5": _hdf5,
+    ".hdf5": _hdf5,
+    ".mat": _matlab,
+    ".tdms": _tdms,
+}

@@ -63,7 +63,7 @@ def test_the_modal_tests_are_read(tmp_path: Path) -> None:
 
 def test_the_page_names_every_format_unit_and_limit() -> None:
     for suffix in [suffix for known in FORMATS for suffix in known.suffixes]:
-        assert f"`{suffix}`" in PAGE
+        assert f"`{suffix}`" in PAGE, f"add {suffix} to the formats of docs/recordings.md"
     units = re.search(r"Units: (.*?) for forces; (.*?) for\s+accelerations", PAGE, re.DOTALL)
     assert units is not None
     named = re.sub(r"\(also (.*?)\)", r", \1", f"{units[1]}, {units[2]}")

@@ -69,8 +69,8 @@ def test_accelerance_is_an_acceleration_over_a_force(
 def test_no_two_formats_claim_one_name_or_suffix() -> None:
     suffixes = [suffix for known in FORMATS for suffix in known.suffixes]
     names = [known.name for known in FORMATS]
-    assert len(set(suffixes)) == len(suffixes)
-    assert len(set(names)) == len(names)
+    assert {each for each in suffixes if suffixes.count(each) > 1} == set()
+    assert {each for each in names if names.count(each) > 1} == set()
     assert all(suffix.startswith(".") and suffix == suffix.lower() for suffix in suffixes)
     assert ".toml" not in suffixes
 

@@ -91,8 +91,8 @@ def test_the_template_is_a_valid_description() -> None:
     assert bridge.hooks == ()
 
 
-def test_the_template_shows_every_setting_with_its_default() -> None:
-    text = default_config().read_text()
+def test_a_new_description_shows_every_setting_with_its_default(tmp_path: Path) -> None:
+    text = Path(Workspace.initialise(tmp_path / "bridge").bridge.source).read_text()
     shown = re.findall(r"^# (\w+ = .*?)  +# ", text.partition("[settings]")[2], flags=re.MULTILINE)
     assert tomllib.loads("\n".join(shown)) == {row.name: row.default for row in TABLE}
 

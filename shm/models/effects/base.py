@@ -114,7 +114,10 @@ class OverTime:
 class Effect:
     """A member of the catalogue. It declares its names and overrides the verbs.
 
-    Its docstring says what it is, in words for the manual. `source` is the literature it follows;
+    Its docstring says what it is, in words for the manual. `phrase` is what a report says of it,
+    with each parameter's size and unit in the place of its name in braces; after a colon stand the
+    words for either sign (`{x_change_m:longer|shorter}`), and `{log10_k}` also stands for the
+    springs `log10_k1` to `log10_k4`. `source` is the literature it follows;
     `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
     for. The first parameter is the effect's size. `follows` are the conditions of a test that it
     depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
@@ -124,6 +127,7 @@ class Effect:
 
     name: ClassVar[str]
     title: ClassVar[str]
+    phrase: ClassVar[str]
     source: ClassVar[str]
     seen_by: ClassVar[tuple[str, ...]]
     imitated_by: ClassVar[tuple[str, ...]]

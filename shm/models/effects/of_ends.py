@@ -26,6 +26,7 @@ class RotationalEndFlexibility(Effect):
 
     name = "rotational_end_flexibility"
     title = "Ends that turn"
+    phrase = "ends that turn against springs of {log10_k}"
     source = (
         "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; "
         "Geier, De Roeck and Flesch (2006), Accurate cable force determination using ambient "
@@ -87,6 +88,7 @@ class TranslationalEndFlexibility(Effect):
 
     name = "translational_end_flexibility"
     title = "Ends that give way sideways"
+    phrase = "ends that give way sideways against springs of {log10_kt}"
     source = "Rao and Mirza (1989), A note on vibrations of generally restrained beams."
     seen_by = ("frequencies", "the other plane", "shapes near the ends")
     imitated_by = ("support_motion", "shear_and_rotary_inertia", "stiff_end_zones", "point_mass")
@@ -144,6 +146,7 @@ class EffectiveLength(Effect):
 
     name = "effective_length"
     title = "Another length than the drawing's"
+    phrase = "an effective length {length_change_m:longer|shorter} than described"
     source = (
         "Amabili, Carra, Collini, Garziera and Panno (2010), Estimation of tensile force in "
         "tie-rods using a frequency-based identification method."
@@ -200,6 +203,7 @@ class StiffEndZones(Effect):
 
     name = "stiff_end_zones"
     title = "Stiff zones at the ends"
+    phrase = "end zones of {zone_m} with a bending stiffness of {stiffness_ratio}"
     source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
     seen_by = ("frequencies", "shapes near the ends")
     imitated_by = ("effective_length", "bending_stiffness", "shear_and_rotary_inertia")
@@ -287,6 +291,10 @@ class SupportMotion(Effect):
 
     name = "support_motion"
     title = "A support that swings along"
+    phrase = (
+        "a support that moves as a mass of {support_mass_kg} with a frequency of its "
+        "own of {support_frequency_hz}"
+    )
     source = (
         "Gattulli and Lepidi (2007), Localization and veering in the dynamics of cable-stayed "
         "bridges."

@@ -18,6 +18,7 @@ class DistributedMass(Effect):
 
     name = "distributed_mass"
     title = "More mass along the hanger"
+    phrase = "a mass per length {mass_change:higher|lower} than described"
     source = (
         "Blevins (1979), Formulas for Natural Frequency and Mode Shape; ISO 12494:2001, "
         "Atmospheric icing of structures."
@@ -62,6 +63,7 @@ class UnknownPointMass(Effect):
 
     name = "point_mass"
     title = "A mass at one place"
+    phrase = "a point mass of {mass_kg} at {x_m}"
     over_time = OverTime(
         fell="a mass was added",
         rose="a mass was removed",
@@ -110,6 +112,7 @@ class SensorMass(Effect):
 
     name = "sensor_mass"
     title = "Heavy sensors"
+    phrase = "the mass of the sensors, {mass_kg} each"
     over_time = OverTime(
         fell="sensors are heavier or elsewhere",
         rose="sensors are lighter or elsewhere",

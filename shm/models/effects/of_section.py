@@ -24,6 +24,7 @@ class BendingStiffness(Effect):
 
     name = "bending_stiffness"
     title = "Another bending stiffness"
+    phrase = "a bending stiffness {stiffness_change:higher|lower} than described"
     over_time = OverTime(
         fell="bending stiffness fell",
         rose="bending stiffness rose",
@@ -86,6 +87,7 @@ class SectionLoss(Effect):
 
     name = "section_loss"
     title = "Lost section over a stretch"
+    phrase = "a loss of {loss} of the section around {x_m}, over {extent_m}"
     over_time = OverTime(
         fell="section was lost over a stretch",
         rose="section was lost over a stretch",
@@ -158,6 +160,7 @@ class ShearAndRotaryInertia(Effect):
 
     name = "shear_and_rotary_inertia"
     title = "Shear and rotary inertia"
+    phrase = "shear and rotary inertia, {share} of Timoshenko"
     source = (
         "Timoshenko (1921), On the correction for shear of the differential equation for "
         "transverse vibrations of prismatic bars; Cowper (1966), The shear coefficient in "

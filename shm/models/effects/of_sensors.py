@@ -21,6 +21,7 @@ class Timebase(Effect):
 
     name = "timebase"
     title = "A wrong clock"
+    phrase = "a clock by which frequencies read {clock_error:too high|too low}"
     over_time = OverTime(
         fell="the logger's clock is wrong",
         rose="the logger's clock is wrong",
@@ -80,6 +81,7 @@ class SensorMisalignment(Effect):
 
     name = "sensor_misalignment"
     title = "Turned sensors"
+    phrase = "a sensor direction turned by {angle_deg}"
     source = "McConnell (1995), Vibration Testing: Theory and Practice."
     seen_by = ("shapes of biaxial sensors",)
     imitated_by = ("skewed_principal_axes",)
@@ -146,6 +148,10 @@ class SkewedPrincipalAxes(Effect):
 
     name = "skewed_principal_axes"
     title = "Joints askew to the planes"
+    phrase = (
+        "ends that turn about one axis only, {angle_deg} from the transverse plane, "
+        "against {log10_k}"
+    )
     source = (
         "Monforton and Wu (1963), Matrix analysis of semi-rigidly connected frames; Perkins and "
         "Mote (1986), Comments on curve veering in eigenvalue problems."

@@ -34,6 +34,10 @@ class TemperatureTension(Effect):
 
     name = "temperature_tension"
     title = "Tension that follows the temperature"
+    phrase = (
+        "a tension that changes with the temperature, by "
+        "{tension_per_kelvin_n_k:(rising)|(falling)}"
+    )
     source = (
         "Xia, Chen, Weng, Ni and Xu (2012), Temperature effect on vibration properties of civil "
         "structures: a literature review and case studies."
@@ -88,6 +92,7 @@ class GeometricHardening(Effect):
 
     name = "geometric_hardening"
     title = "Tension that rises with the amplitude"
+    phrase = "a tension that grows with the level of motion, by {hardening} at the reference level"
     source = (
         "Woinowsky-Krieger (1950), The effect of an axial force on the vibration of hinged bars; "
         "Nayfeh and Mook (1979), Nonlinear Oscillations."
@@ -138,6 +143,10 @@ class JointSoftening(Effect):
 
     name = "joint_softening"
     title = "Joints that soften with the amplitude"
+    phrase = (
+        "joints that soften as the hanger moves more, with "
+        "{log10_k_at_reference_level} at the reference level"
+    )
     source = "Gaul and Nitsche (2001), The role of friction in mechanical joints."
     seen_by = ("tests at different levels",)
     imitated_by = ("rotational_end_flexibility", "skewed_principal_axes")
@@ -195,6 +204,7 @@ class Sag(Effect):
 
     name = "sag"
     title = "Sag"
+    phrase = "sag with Irvine's lambda squared of {sag_parameter}"
     source = "Irvine and Caughey (1974), The linear theory of free vibrations of a suspended cable."
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
