@@ -7,6 +7,7 @@ end (0) to the arch end (its length).
 
 from __future__ import annotations
 
+from shm.values.baseline_check import BaselineCheck, MistakenMode, MistakenTest
 from shm.values.diagnosis import (
     Cause,
     Diagnosis,
@@ -33,6 +34,7 @@ from shm.values.drift import (
     ModeReading,
     Moved,
     Reading,
+    RepeatedMistake,
     TemperatureCoefficient,
     WatchedQuantity,
     WatchedTest,
@@ -121,6 +123,7 @@ __all__ = [
     "AlertKind",
     "Answer",
     "Averaged",
+    "BaselineCheck",
     "Beside",
     "Bin",
     "BoolArray",
@@ -149,6 +152,8 @@ __all__ = [
     "Limits",
     "Mark",
     "MarkName",
+    "MistakenMode",
+    "MistakenTest",
     "ModalTest",
     "Mode",
     "ModeReading",
@@ -164,6 +169,7 @@ __all__ = [
     "Quantity",
     "Reading",
     "Recording",
+    "RepeatedMistake",
     "Residual",
     "ResponsePoint",
     "Richness",
