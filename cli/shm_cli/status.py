@@ -18,6 +18,7 @@ import rich_click as click
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
+from shm.pipeline.open_warnings import warnings_of
 from shm.report.formatting import model_class
 from shm.store import (
     ENDED,
@@ -66,6 +67,11 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     for row in document["hangers"]:
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+        for said in row["warnings"]:
+            click.echo(paragraph(f"hanger {row['hanger']}: check baseline: {said}"))
+        if row["left_out"]:
+            said = "; ".join(row["left_out"])
+            click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
         if row["damage"] is not None:
             click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
 
@@ -221,6 +227,7 @@ def _hangers(
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
     damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
+    warnings = warnings_of(workspace, store, workspace.bridge.hangers)
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
@@ -231,6 +238,7 @@ def _hangers(
             watch = _gap_watch(store, hanger.id) if adopted else None
         except DamagedRow as error:
             damage[hanger.id] = str(error)
+        check = baseline.posterior.baseline_check if baseline else None
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
@@ -244,6 +252,8 @@ def _hangers(
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
+                "warnings": list(warnings.get(hanger.id, ())),
+                "left_out": list(check.left_out) if check else [],
                 "gap": _gap(watch),
                 "damage": damage.get(hanger.id),
             }

@@ -17,10 +17,14 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
 
     A shift beyond its threshold has ended once its probability is below half the level. A change
     that was detected below the threshold has ended once less than half of it is left, by the same
-    level. A held test ends by a decision, never here.
+    level. A held test ends by a decision, never here; a mode that does not fit, once
+    it does.
     """
     if test.time <= alert.time or "held" in alert.kinds:
         return ""
+    if "check the modes" in alert.kinds and not alert.drifts:
+        stands = any(each.is_notable for each in test.mistaken)
+        return "" if stands else f"all modes of test {test.test} fit again"
     if "gap" in alert.kinds and gap_stands:
         return ""
     if "gap" not in alert.kinds and not alert.drifts:

@@ -167,6 +167,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "diagnosis": diagnosis_json(sheet) if (sheet := diagnosed(data)) else None,
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
+        "warnings": list(data.warnings),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),
         "temperature_coefficients": temperature_documents(data.states),

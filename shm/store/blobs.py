@@ -18,6 +18,7 @@ from shm.values import (
     FrequencyResponse,
     ModalTest,
     Posterior,
+    RepeatedMistake,
     ResponsePoint,
     WatchedTest,
 )
@@ -106,7 +107,11 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
 
 def watch_document(watched: WatchedTest) -> dict[str, Any]:
     """What the sequential test says after a test; its drifts are kept by themselves."""
-    return {"temperature_c": watched.temperature_c, "change": asdict(watched.change)}
+    return {
+        "temperature_c": watched.temperature_c,
+        "change": asdict(watched.change),
+        "mistaken": [asdict(each) for each in watched.mistaken],
+    }
 
 
 def watch_from(
@@ -114,7 +119,9 @@ def watch_from(
 ) -> WatchedTest:
     """The watch after a test back from its document and its drifts."""
     temperature_c = number(document["temperature_c"])
-    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document))
+    # Documents of former versions tell nothing of mistaken modes.
+    mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
+    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document), mistaken)
 
 
 def change_from(document: Mapping[str, Any]) -> Change:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 End = Literal["deck", "arch"]
 
 TENSION = "tension"
+ENOUGH_MISTAKES = 3
+"""Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -159,15 +161,37 @@ class Change:
         return self.evidence_years > self.limit_years and self.material_probability > 0.5
 
 
+@dataclass(frozen=True)
+class RepeatedMistake:
+    """A mode that was taken for a mistaken one in the last `tests` tests that have it, `since`."""
+
+    plane: Plane
+    order: int
+    since: datetime
+    tests: int
+
+    def __str__(self) -> str:
+        return f"{self.plane} {self.order}"
+
+    @property
+    def is_notable(self) -> bool:
+        """Whether it is no single slip any more, but numbered wrongly each time, or true."""
+        return self.tests >= ENOUGH_MISTAKES
+
+
 @dataclass(frozen=True, eq=False)
 class WatchedTest:
-    """The watch after one test: shifts of all quantities and what the sequential test says."""
+    """The watch after one test: shifts of all quantities and what the sequential test says.
+
+    `mistaken` are the modes that this test, and maybe those before it, have wrong.
+    """
 
     test: str
     time: datetime
     temperature_c: float
     drifts: tuple[Drift, ...]
     change: Change
+    mistaken: tuple[RepeatedMistake, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -195,6 +219,7 @@ AlertKind = Literal[
     "beyond threshold",
     "repeat the test",
     "tests disagree",
+    "check the modes",
     "gap",
     "held",
     "test",

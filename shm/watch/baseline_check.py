@@ -3,69 +3,25 @@
 A baseline that holds a mistake is wrong for years: its posterior follows it, and later tests fit it
 no better than it fits itself. Tests are checked against each other, mode by mode; where there are
 too few, against what the description allows.
-
-Tests of one baseline may differ in what a hanger does: its tension, the stiffness of its ends, and
-what all frequencies have in common, the clock of the logger and the warmth of the steel. Stiff
-bars' modes move unequally with these. They are fitted to each test, by the slopes of a model class
-at the state that the tests have in the median; what no such difference explains is mistaken.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shm.models import Model
 from shm.models.base import Conditions
-from shm.values import PLANES, BoolArray, FloatArray, IntArray, ModalTest, Mode, Plane
-from shm.values.baseline_check import BaselineCheck, MistakenMode, MistakenTest
-from shm.watch.mistaken_modes import (
-    MOST_MISTAKEN,
-    SoundModes,
-    log_mixture,
-    sound_modes,
-)
+from shm.values import BaselineCheck, BoolArray, MistakenMode, MistakenTest, ModalTest
+from shm.watch.baseline_comparison import ENOUGH, Comparison, Fitted, spread_of
+from shm.watch.baseline_state import Key, best_of, known_modes, places
+from shm.watch.mistaken_modes import MOST_MISTAKEN
 
-Key = tuple[Plane, int]
-
-_ENOUGH = 3  # tests: of two that differ, none is the odd one
 _ENOUGH_OF_TESTS = 4  # of three states of a hanger, two alike may be chance
-_ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
-_MAD = 1.4826  # of a normal law
-# Mode by mode two tests of one state differ by more than is stated: judgement, as in readings.
-_SCATTER = 1e-3
-_UNKNOWN_SD = 1e-3  # of a frequency without a stated error: the worse end of usual ones
-# Of a log frequency: what a mode of its own may do from test to test (a joint, a sensor) is less.
-_LEAST = 0.006
-_FAR = 6.0  # robust standard deviations
-# What the level of a mode may be off the model by: a bar as made, sag and fittings; its tail is
-# heavy, so that a mode which most tests agree on is theirs however odd. Judgement.
-_LEVEL_SD, _HEAVY = 0.02, 2.0
-# Judgement, standard deviations of what tests of one baseline differ by: seasons and traffic move
-# a tension by less, a joint that settles an end by less than a factor of two.
-_TENSION_SD, _DECADES_SD = 0.1, 0.3
-# What all frequencies have in common: sensors and clock; and half of what a kelvin softens steel by
-# (0.03 % of its modulus), where temperatures are not known that of ten.
-_COMMON_SD, _PER_KELVIN, _UNKNOWN_KELVIN = 1e-3, 1.5e-4, 10.0
-_TENSION_STEP, _DECADES_STEP = 0.02, 0.1  # technical: of finite differences
-_FARTHEST_TENSION, _FARTHEST_DECADES = 0.4, 1.0  # technical: beyond it nothing is linearised
-# A whole test is another hanger's, or by a wrong clock: by this all its modes may be off alike.
-_WRONG_CLOCK_SD = 0.05
-_LEAST_TENSION_SD, _LEAST_DECADES_SD = 0.01, 0.03  # judgement: a day's traffic and warmth do it
 _LEAST_CLOCK = 0.007  # judgement: below, warmth and sensors do as much
 _MOST_TENSION = 0.25  # judgement: no bridge is tested across such a change within one baseline
-_WRONG_TEST = 0.003  # of tests, judgement: a wrong hanger or clock
-_DRAWS = 4000  # of the description: technical, refined below
-_NARROWER = (0.3, 0.1, 0.03)  # technical: of the prior's range, about the best draw
-# Where slopes are taken: a tension near the nominal one, the length as taped with its fittings, and
-# springs that bend with the bar. Judgement; what differs from test to test is the same anywhere.
-_PLAUSIBLE = {"theta_F": (1.0, 0.3), "theta_L": (1.0, 0.02)}
-_SPRING, _SAME_PLANE = "log10_k", ("13", "24")
-_FELT, _FELT_SD = 3.0, 0.7
-_MODEL_SD = 0.01  # judgement: of a frequency, a class beside a bar as made
 _OFF = 0.04  # judgement: no bar as made is as far off its class in one mode alone
 _FIT_NO_STATE = "fit no tension and no end stiffness that the description allows"
 _FEWEST = 5  # modes of a test: fewer leave nothing to tell the odd one by
@@ -76,9 +32,9 @@ def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
 
     `model` is any class of the hanger that is fast.
     """
-    if not any(_known(test) for test in tests):
+    if not any(known_modes(test) for test in tests):
         return BaselineCheck(unchecked="no test has a mode that a tension is inferred from")
-    if len(tests) >= _ENOUGH:
+    if len(tests) >= ENOUGH:
         return _against_each_other(tests, model)
     checks = [_against_description(test, model) for test in tests]
     return BaselineCheck(
@@ -88,234 +44,8 @@ def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
     )
 
 
-# ---------------------------------------------------------------- tests against each other
-
-
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """One test: its modes' places among the keys, what of them is sound, and by what it differs.
-
-    `expected` (modes,) are log frequencies by the sound ones; `modes.x` (q,) is what the test
-    differs by from the median one: in common, in log tension, and in decades of each spring; `off`
-    is what its log frequencies are off that one in the median.
-    """
-
-    at: IntArray
-    expected: FloatArray
-    modes: SoundModes
-    linear: tuple[FloatArray, FloatArray, FloatArray]  # log frequencies, slopes, variance
-    common_sd: float
-    off: float
-
-    def common_shift(self, spread: FloatArray) -> float:
-        """By what all log frequencies are off alike, 0 where the tension explains it as well.
-
-        `spread` (q,) is what the other tests differ by among themselves: where their ends keep
-        still, an odd test is not explained by its ends.
-        """
-        off, slopes, variance = self.linear
-        tension, clock = spread.copy(), spread.copy()
-        tension[:2], clock[0] = (self.common_sd, _TENSION_SD), _WRONG_CLOCK_SD
-        by_tension = sound_modes(off, slopes, variance, 1 / tension**2)
-        by_clock = sound_modes(off, slopes, variance, 1 / clock**2)
-        odds = math.log(_WRONG_TEST / (1 - _WRONG_TEST))
-        likelier = by_clock.log_evidence + odds > by_tension.log_evidence
-        return float(by_clock.x[0]) if likelier else 0.0
-
-
-class _Comparison:
-    """The tests of a baseline about a common level of each mode (keys,), robustly."""
-
-    def __init__(self, tests: Sequence[ModalTest], model: Model):
-        self.tests, self.model = tests, model
-        counts: dict[Key, int] = {}
-        for test in tests:
-            for mode in _known(test):
-                counts[mode.plane, mode.order] = counts.get((mode.plane, mode.order), 0) + 1
-        self.keys = sorted(key for key, count in counts.items() if count >= _ENOUGH)
-        self.counts = np.array([counts[key] for key in self.keys])
-        kelvin = np.array([test.temperature_c for test in tests])
-        kelvin = np.abs(kelvin - np.nanmedian(kelvin)) if np.isfinite(kelvin).any() else kelvin
-        kelvin = np.where(np.isfinite(kelvin), kelvin, _UNKNOWN_KELVIN)
-        self.common_sd = np.hypot(_COMMON_SD, _PER_KELVIN * kelvin)
-        self.table = np.full((len(tests), len(self.keys)), np.nan)
-        self.variance = np.full_like(self.table, np.nan)
-        for row, errors, test in zip(self.table, self.variance, tests, strict=True):
-            for mode in _known(test):
-                if (mode.plane, mode.order) in self.keys:
-                    at = self.keys.index((mode.plane, mode.order))
-                    row[at], errors[at] = math.log(mode.frequency_hz), _variance_of(mode)
-
-    def fitted(self) -> list[_Fitted]:
-        """Each test, what all have in common being the median of what they differ by."""
-        planes, orders = _places(self.keys)
-        level = np.nanmedian(self.table, axis=0)
-        base = _plausible(self.model, level, planes, orders)
-        quantities = _Quantities(self.model, base, planes, orders)
-        moved = [np.zeros(quantities.count)] * len(self.tests)
-        level = self._polished(quantities)
-        spread = _SCATTER
-        for _ in range(_ROUNDS):
-            found = [
-                self._fit(n, quantities, moved[n], level, spread) for n in range(len(self.tests))
-            ]
-            moved = [each.modes.x for each in found]
-            predicted = np.array(
-                [
-                    quantities.log_frequency(x, self.model.conditions(test))
-                    for x, test in zip(moved, self.tests, strict=True)
-                ]
-            )
-            level, off = self._levels(self.table - predicted, spread)
-            spread = max(_SCATTER, _MAD * float(np.nanmedian(np.abs(off))))
-        return found
-
-    def off_in_all(self) -> str:
-        """Which modes no description allows, though the tests agree on them; empty where none."""
-        planes, orders = _places(self.keys)
-        level = np.nanmedian(self.table, axis=0)
-        _, off = _best_of(self.model, level, planes, orders, Conditions())
-        odd = [
-            (key, each)
-            for key, each in zip(self.keys, off.tolist(), strict=True)
-            if abs(each) > _OFF
-        ]
-        if len(odd) > MOST_MISTAKEN * len(self.keys):
-            return f"{len(odd)} of the {len(self.keys)} modes of its tests {_FIT_NO_STATE}"
-        if not odd or len(self.keys) < _FEWEST:
-            return ""
-        (plane, order), worst = max(odd, key=lambda each: abs(each[1]))
-        return (
-            f"{plane} {order} of all its tests is {100 * math.expm1(worst):+.0f} % off what the "
-            "other modes and the description allow"
-        )
-
-    def _levels(self, off: FloatArray, spread: float) -> tuple[FloatArray, FloatArray]:
-        """Of what tests are off from the model (tests, keys): the level of each mode, and what is
-        left of the tests that share it, NaN of others.
-
-        The level is that of the test which most others join, weighed with how far off the model
-        it is: where two of three tests have a mode wrong, the third may still be right.
-        """
-        apart = off[None] - off[:, None]
-        variance = 2 * (self.variance + spread**2)
-        joins = np.where(np.isfinite(apart), log_mixture(apart, variance), 0.0).sum(axis=1)
-        centre = np.nanmedian(off)
-        score = joins - _HEAVY * np.log1p(((off - centre) / _LEVEL_SD) ** 2)
-        chosen = np.nanargmax(np.where(np.isfinite(off), score, -np.inf), axis=0)
-        near = np.abs(off - off[chosen, np.arange(off.shape[1])]) < max(_LEAST, _FAR * spread)
-        shared = np.where(near, off, np.nan)
-        level = np.nanmedian(shared, axis=0)
-        return level, shared - level
-
-    def _polished(self, quantities: _Quantities) -> FloatArray:
-        """The level of each mode once the tension of each test is taken off: by medians."""
-        slopes = quantities.slopes(np.zeros(quantities.count), Conditions())[:, 1]
-        slopes = np.maximum(slopes, 0.05)  # technical: a mode that no tension moves says nothing
-        tension = np.zeros(len(self.tests))
-        for _ in range(2 * _ROUNDS):
-            level = np.nanmedian(self.table - tension[:, None] * slopes, axis=0)
-            shifts = (self.table - level) / slopes
-            tension = np.array([_median_or_0(row) for row in shifts])
-            tension = tension - np.median(tension)
-        here = quantities.log_frequency(np.zeros(quantities.count), Conditions())
-        return np.asarray(level - here)
-
-    def _fit(
-        self, n: int, quantities: _Quantities, x: FloatArray, level: FloatArray, spread: float
-    ) -> _Fitted:
-        at = np.flatnonzero(np.isfinite(self.table[n]))
-        conditions = self.model.conditions(self.tests[n])
-        slopes = quantities.slopes(x, conditions)[at]
-        here = quantities.log_frequency(x, conditions)[at] + level[at]
-        off = self.table[n, at] - here + slopes @ x
-        # A median of n is off by 1.25 standard deviations over the root of n.
-        variance = (self.variance[n, at] + spread**2) * (1 + 1.57 / self.counts[at])
-        sd = np.array([self.common_sd[n], _TENSION_SD, *[_DECADES_SD] * (quantities.count - 2)])
-        modes = sound_modes(off, slopes, variance, 1 / sd**2)
-        expected = here + slopes @ (modes.x - x)
-        is_far = np.abs(self.table[n, at] - expected) > _LEAST
-        modes = replace(modes, sound=modes.sound | ~is_far)
-        of_median = quantities.log_frequency(np.zeros(len(x)), conditions)[at] + level[at]
-        return _Fitted(
-            at,
-            expected,
-            modes,
-            (off, slopes, variance),
-            float(self.common_sd[n]),
-            float(np.median(self.table[n, at] - of_median)) if len(at) else 0.0,
-        )
-
-
-def _plausible(model: Model, level: FloatArray, planes: IntArray, orders: IntArray) -> FloatArray:
-    """A parameter set near the description at which the median test lies, to take slopes at.
-
-    Frequencies alone leave tension, length and ends to each other: what fits best may be a loose
-    bar with one end free, whose springs move nothing. Both ends are taken as alike, and where a
-    spring is felt.
-    """
-    rng, prior, names = np.random.default_rng(0), model.prior, model.parameter_names
-    best, width = (prior.lower + prior.upper) / 2, (prior.upper - prior.lower) / 2
-    for name, (usual, sd) in _PLAUSIBLE.items():
-        if name in names:
-            best[names.index(name)], width[names.index(name)] = usual, sd
-    springs = [n for n, name in enumerate(names) if name.startswith(_SPRING)]
-    best[springs] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
-    width[springs] = _FELT_SD
-    centre, bounds = best.copy(), (prior.lower, prior.upper)
-    for share in (1.0, *_NARROWER):
-        draws = share * width * rng.standard_normal((_DRAWS // 4, len(names)))
-        draws[:, springs] = _alike_ends(draws[:, springs], [names[n] for n in springs])
-        theta = np.clip(np.vstack([best, best + draws]), *bounds)
-        held = -(((theta - centre) / width) ** 2).sum(axis=1) / 2
-        best, _ = _best(model, theta, level, planes, orders, Conditions(), held)
-    return best
-
-
-def _alike_ends(draws: FloatArray, names: Sequence[str]) -> FloatArray:
-    """Draws (n, springs) where those of one plane go together, as far as their names tell."""
-    pairs = [[n for n, name in enumerate(names) if name[-1] in ends] for ends in _SAME_PLANE]
-    alike = draws.copy()
-    for pair in pairs:
-        alike[:, pair] = draws[:, pair[:1]]
-    return alike
-
-
-class _Quantities:
-    """What tests of one hanger may differ by, and the log frequencies (keys,) that follow."""
-
-    def __init__(self, model: Model, base: FloatArray, planes: IntArray, orders: IntArray):
-        self._model, self._base, self._planes, self._orders = model, base, planes, orders
-        names = model.parameter_names
-        self._tension = names.index("theta_F")
-        self._springs = [n for n, name in enumerate(names) if name.startswith(_SPRING)]
-        self.count = 2 + len(self._springs)
-
-    def log_frequency(self, x: FloatArray, conditions: Conditions) -> FloatArray:
-        return np.asarray(self._predicted(x[None], conditions)[0])
-
-    def slopes(self, x: FloatArray, conditions: Conditions) -> FloatArray:
-        """(keys, q), by central differences."""
-        steps = np.array([1.0, _TENSION_STEP, *[_DECADES_STEP] * len(self._springs)])
-        both = np.vstack([x + np.diag(steps), x - np.diag(steps)])
-        up, down = np.split(self._predicted(both, conditions), 2)
-        return np.asarray(((up - down) / (2 * steps[:, None])).T)
-
-    def _predicted(self, x: FloatArray, conditions: Conditions) -> FloatArray:
-        theta = np.tile(self._base, (len(x), 1))
-        tension = np.clip(x[:, 1], -_FARTHEST_TENSION, _FARTHEST_TENSION)
-        theta[:, self._tension] *= np.exp(tension)
-        prior, springs = self._model.prior, self._springs
-        decades = np.clip(x[:, 2:], -_FARTHEST_DECADES, _FARTHEST_DECADES)
-        theta[:, springs] = np.clip(
-            theta[:, springs] + decades, prior.lower[springs], prior.upper[springs]
-        )
-        found = self._model.frequencies_at(theta, int(self._orders.max()) + 1, conditions)
-        return np.asarray(np.log(found[:, self._planes, self._orders]) + x[:, :1])
-
-
 def _against_each_other(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
-    comparison = _Comparison(tests, model)
+    comparison = Comparison(tests, model)
     if not comparison.keys:
         return BaselineCheck(unchecked="no mode is measured in three of its tests")
     found = comparison.fitted()
@@ -327,12 +57,12 @@ def _against_each_other(tests: Sequence[ModalTest], model: Model) -> BaselineChe
         if test.id not in gone
         for mistaken in _mistaken_modes(test, each, comparison.keys)
     )
-    misfit = _misfit(tests, modes, out) or comparison.off_in_all()
+    misfit = _misfit(tests, modes, out) or _off_in_all(comparison)
     return BaselineCheck(modes, out, misfit)
 
 
 def _mistaken_tests(
-    tests: Sequence[ModalTest], found: Sequence[_Fitted]
+    tests: Sequence[ModalTest], found: Sequence[Fitted]
 ) -> tuple[MistakenTest, ...]:
     if len(tests) < _ENOUGH_OF_TESTS:
         return ()
@@ -341,7 +71,7 @@ def _mistaken_tests(
     for n, (test, each) in enumerate(zip(tests, found, strict=True)):
         others = np.delete(states, n, axis=0)
         shift = float(each.modes.x[1] - np.median(others[:, 1]))
-        common = each.common_shift(_spread(others))
+        common = each.common_shift(spread_of(others))
         if abs(common) > _LEAST_CLOCK:
             percent = 100 * math.expm1(each.off)
             why = (
@@ -362,18 +92,8 @@ def _mistaken_tests(
     return tuple(out)
 
 
-def _spread(states: FloatArray) -> FloatArray:
-    """What tests (n, q) differ by, robustly: at least what they surely may, at most what any do."""
-    q = states.shape[1]
-    least = np.array([_COMMON_SD, _LEAST_TENSION_SD, *[_LEAST_DECADES_SD] * (q - 2)])
-    most = np.array([_COMMON_SD, _TENSION_SD, *[_DECADES_SD] * (q - 2)])
-    found = _MAD * np.median(np.abs(states - np.median(states, axis=0)), axis=0)
-    # Of four tests the spread is hardly known: in one of ten it seems a third of what it is.
-    return np.asarray(np.clip(3 * found, least, most))
-
-
-def _mistaken_modes(test: ModalTest, found: _Fitted, keys: Sequence[Key]) -> list[MistakenMode]:
-    measured = {(mode.plane, mode.order): mode.frequency_hz for mode in _known(test)}
+def _mistaken_modes(test: ModalTest, found: Fitted, keys: Sequence[Key]) -> list[MistakenMode]:
+    measured = {(mode.plane, mode.order): mode.frequency_hz for mode in known_modes(test)}
     rows = zip(found.at.tolist(), found.expected.tolist(), found.modes.sound.tolist(), strict=True)
     wrong = [(*keys[at], expected) for at, expected, sound in rows if not sound]
     return [
@@ -389,33 +109,42 @@ def _misfit(
     if len(out) > MOST_MISTAKEN * len(tests):
         return f"{len(out)} of its {len(tests)} tests do not agree with the others"
     gone = {each.test for each in out}
-    count = sum(len(_known(test)) for test in tests if test.id not in gone)
+    count = sum(len(known_modes(test)) for test in tests if test.id not in gone)
     if len(modes) > MOST_MISTAKEN * count:
         return f"{len(modes)} of its {count} modes do not agree from test to test"
     return ""
 
 
-def _variance_of(mode: Mode) -> float:
-    sd = mode.frequency_sd_hz / mode.frequency_hz
-    return sd**2 if sd > 0 and math.isfinite(sd) else _UNKNOWN_SD**2
-
-
-def _median_or_0(row: FloatArray) -> float:
-    return float(np.nanmedian(row)) if np.isfinite(row).any() else 0.0
-
-
-# ---------------------------------------------------------------- one test by itself
+def _off_in_all(comparison: Comparison) -> str:
+    """Which modes no description allows, though the tests agree on them; empty where none."""
+    planes, orders = places(comparison.keys)
+    level = np.nanmedian(comparison.table, axis=0)
+    _, off = best_of(comparison.model, level, planes, orders, Conditions())
+    odd = [
+        (key, each)
+        for key, each in zip(comparison.keys, off.tolist(), strict=True)
+        if abs(each) > _OFF
+    ]
+    if len(odd) > MOST_MISTAKEN * len(comparison.keys):
+        return f"{len(odd)} of the {len(comparison.keys)} modes of its tests {_FIT_NO_STATE}"
+    if not odd or len(comparison.keys) < _FEWEST:
+        return ""
+    (plane, order), worst = max(odd, key=lambda each: abs(each[1]))
+    return (
+        f"{plane} {order} of all its tests is {100 * math.expm1(worst):+.0f} % off what the "
+        "other modes and the description allow"
+    )
 
 
 def _against_description(test: ModalTest, model: Model) -> BaselineCheck:
-    modes = _known(test)
+    modes = known_modes(test)
     if len(modes) < _FEWEST:
         return BaselineCheck(
             unchecked=f"test {test.id} has {len(modes)} modes, and at least {_FEWEST} are needed"
         )
-    planes, orders = _places([(mode.plane, mode.order) for mode in modes])
+    planes, orders = places([(mode.plane, mode.order) for mode in modes])
     measured = np.log([mode.frequency_hz for mode in modes])
-    _, off = _best_of(model, measured, planes, orders, model.conditions(test))
+    _, off = best_of(model, measured, planes, orders, model.conditions(test))
     is_odd: BoolArray = np.abs(off) > _OFF
     if is_odd.sum() > MOST_MISTAKEN * len(modes):
         return BaselineCheck(
@@ -427,51 +156,3 @@ def _against_description(test: ModalTest, model: Model) -> BaselineCheck:
         if odd
     )
     return BaselineCheck(mistaken)
-
-
-def _best_of(
-    model: Model,
-    measured: FloatArray,
-    planes: IntArray,
-    orders: IntArray,
-    conditions: Conditions,
-) -> tuple[FloatArray, FloatArray]:
-    """The likeliest parameter set of the description, and what the modes (n,) are off from it."""
-    rng = np.random.default_rng(0)
-    lower, upper = model.prior.lower, model.prior.upper
-    theta = lower + (upper - lower) * rng.random((_DRAWS, len(lower)))
-    best, off = _best(model, theta, measured, planes, orders, conditions)
-    for width in _NARROWER:
-        near = best + width * (upper - lower) * rng.uniform(-1, 1, (_DRAWS // 4, len(lower)))
-        theta = np.vstack([best, np.clip(near, lower, upper)])
-        best, off = _best(model, theta, measured, planes, orders, conditions)
-    return best, off
-
-
-def _best(
-    model: Model,
-    theta: FloatArray,
-    measured: FloatArray,
-    planes: IntArray,
-    orders: IntArray,
-    conditions: Conditions,
-    held: FloatArray | float = 0.0,
-) -> tuple[FloatArray, FloatArray]:
-    """The likeliest of parameter sets, a few modes being mistaken, and what it is off by.
-
-    `held` (n,) is the log density of what is known of the sets beforehand.
-    """
-    found = model.frequencies_at(theta, int(orders.max()) + 1, conditions)
-    off = measured - np.log(found[:, planes, orders])
-    total = log_mixture(off, _MODEL_SD**2).sum(axis=1)
-    at = int(np.nanargmax(total + held))
-    return theta[at], off[at]
-
-
-def _places(keys: Sequence[Key]) -> tuple[IntArray, IntArray]:
-    planes = np.array([PLANES.index(plane) for plane, _ in keys])
-    return planes, np.array([order - 1 for _, order in keys])
-
-
-def _known(test: ModalTest) -> list[Mode]:
-    return [mode for mode in test.regular_modes if mode.frequency_hz > 0]

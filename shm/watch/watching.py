@@ -9,7 +9,8 @@ neither of the former rules has (`agreement`). A test that agrees with none befo
 repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
 its probability falls below half that level, and only then can it be told again, so that a
 probability which hovers about the level does not ring every week. A change that was called and then
-passes the threshold is told again, since the owner must now do something else.
+passes the threshold is told again, since the owner must now do something else. A mode that three
+tests in a row have wrong is a notice, once: its number may be.
 
 All is derived from the sequence of tests, so that the same tests give the same alerts.
 """
@@ -17,6 +18,7 @@ All is derived from the sequence of tests, so that the same tests give the same 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
@@ -31,8 +33,10 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
+    Plane,
     Posterior,
     Reading,
+    RepeatedMistake,
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
@@ -83,13 +87,47 @@ def watch_hanger(
     compared with the baseline. Raises BadInput where the baseline's tests hold no mode that its
     class describes.
     """
+    baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = _options_of(hanger, len(baseline_tests), options)
     watch = watched(readings, reader.quantities, reader.columns, hanger, options)
-    return Watched(reader, readings, watch)
+    tests = list(watch.tests)
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    for n in range(len(baseline_tests), len(tests)):
+        mistaken = repeated_mistakes(mistaken, readings[n], reader)
+        tests[n] = replace(tests[n], mistaken=mistaken)
+    return Watched(reader, readings, replace(watch, tests=tuple(tests)))
+
+
+def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest, ...]:
+    """The tests of a baseline without what was left out of it as mistaken."""
+    check = baseline.baseline_check
+    if check is None:
+        return tuple(tests)
+    return tuple((check.kept(test), at) for test, at in tests if not check.leaves_out(test.id))
+
+
+def repeated_mistakes(
+    before: Sequence[RepeatedMistake], reading: Reading, reader: Reader
+) -> tuple[RepeatedMistake, ...]:
+    """The modes that are wrong by a reading, or were in the last test that had them."""
+    if reading.modes is None:
+        return tuple(before)
+    known = {(each.plane, each.order): each for each in before}
+    found = []
+    for key, wrong, variance in zip(
+        reader.modes, reading.modes.mistaken, reading.modes.variances, strict=True
+    ):
+        run = known.get(key)
+        if wrong:
+            since, tests = (run.since, run.tests) if run else (reading.time, 0)
+            found.append(RepeatedMistake(*key, since, tests + 1))
+        elif run and math.isinf(variance):  # this test does not have the mode
+            found.append(run)
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +155,7 @@ def watch_newest(
     then the watch must begin without it. Where the watch itself calls for no alert, the newest may
     yet agree with a test `beside` it.
     """
+    baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = _options_of(hanger, len(baseline_tests), options)
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
@@ -133,7 +172,9 @@ def watch_newest(
         told = AlertState.from_text(state.told)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
-        state, found = watcher.after(state, reader.reading(test, max(time, since)))
+        reading = reader.reading(test, max(time, since))
+        state, found = watcher.after(state, reading)
+        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader))
         told, alert = after(told, found, hanger)
     if alert is None and beside is not None and later:
         alert = agreement(reader, later[-1], beside, hanger, options, told.beyond)
@@ -178,9 +219,40 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    stands = AlertState({**standing.beyond, **beyond}, call, called, odd)
-    alert = _alert(news, change, test, hanger, is_further=is_further)
-    return stands, alert or _of_odd(test, hanger, odd)
+    alert = _alert(news, change, test, hanger, is_further=is_further) or _of_odd(test, hanger, odd)
+    wrong = {(each.plane, each.order) for each in test.mistaken if each.is_notable}
+    noted = told.noted & wrong
+    if alert is None and wrong - noted:
+        alert, noted = _of_modes(test, hanger), frozenset(wrong)
+    beyond = {**standing.beyond, **beyond}
+    return AlertState(beyond, call, called, odd, test.mistaken, noted), alert
+
+
+def _of_modes(test: WatchedTest, hanger: Hanger) -> Alert:
+    """A notice of modes that tests keep having wrong; it waits while there is worse to tell."""
+    kind: AlertKind = "check the modes"
+    notable = [each for each in test.mistaken if each.is_notable]
+    names = "+".join(f"{each.plane}-{each.order}" for each in notable)
+    return Alert(
+        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{names}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=f"Hanger {hanger.id}: {mistakes_words(notable)}",
+        drifts=(),
+        kinds=(kind,),
+    )
+
+
+def mistakes_words(mistaken: Sequence[RepeatedMistake]) -> str:
+    """Of modes that tests keep having wrong: which, since when, what to do, and why."""
+    since, many = min(each.since for each in mistaken), len(mistaken) > 1
+    have, number, them = ("have", "their numbers", "them") if many else ("has", "its number", "it")
+    return (
+        f"{' and '.join(map(str, mistaken))} {have} not fitted the other modes since "
+        f"{since:%Y-%m-%d}. Check {number} at the next planned test. The watch leaves {them} out: "
+        f"another order or a machine's tone may be taken for {them}, or one end alone has loosened."
+    )
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -319,13 +391,16 @@ class AlertState:
     """What stands: when each quantity was told to be beyond its threshold, and when a call was.
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one.
+    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
+    wrong, `noted` those of them that were told.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
     call: datetime | None = None
     called: tuple[Change, ...] = ()
     odd: int = 0
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    noted: frozenset[tuple[Plane, int]] = frozenset()
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -335,6 +410,8 @@ class AlertState:
                 "call": self.call,
                 "called": [asdict(change) for change in self.called],
                 "odd": self.odd,
+                "mistaken": [asdict(each) for each in self.mistaken],
+                "noted": sorted(self.noted),
             },
             default=datetime.isoformat,
         )
@@ -352,6 +429,8 @@ class AlertState:
                 kept["call"] and value_of(datetime, kept["call"]),
                 value_of(tuple[Change, ...], kept["called"]),
                 int(kept["odd"]),
+                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
+                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(
