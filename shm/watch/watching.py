@@ -18,7 +18,6 @@ All is derived from the sequence of tests, so that the same tests give the same 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
@@ -43,6 +42,7 @@ from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_text import message_of, message_of_odd, short_name, suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
+from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
 from shm.watch.watcher import Watch, Watcher, WatchState, watched
 
 DatedTest = tuple[ModalTest, datetime]
@@ -97,7 +97,7 @@ def watch_hanger(
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n in range(len(baseline_tests), len(tests)):
-        mistaken = repeated_mistakes(mistaken, readings[n], reader)
+        mistaken = repeated_mistakes(mistaken, readings[n], reader.modes)
         tests[n] = replace(tests[n], mistaken=mistaken)
     return Watched(reader, readings, replace(watch, tests=tuple(tests)))
 
@@ -108,26 +108,6 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
     if check is None:
         return tuple(tests)
     return tuple((check.kept(test), at) for test, at in tests if not check.leaves_out(test.id))
-
-
-def repeated_mistakes(
-    before: Sequence[RepeatedMistake], reading: Reading, reader: Reader
-) -> tuple[RepeatedMistake, ...]:
-    """The modes that are wrong by a reading, or were in the last test that had them."""
-    if reading.modes is None:
-        return tuple(before)
-    known = {(each.plane, each.order): each for each in before}
-    found = []
-    for key, wrong, variance in zip(
-        reader.modes, reading.modes.mistaken, reading.modes.variances, strict=True
-    ):
-        run = known.get(key)
-        if wrong:
-            since, tests = (run.since, run.tests) if run else (reading.time, 0)
-            found.append(RepeatedMistake(*key, since, tests + 1))
-        elif run and math.isinf(variance):  # this test does not have the mode
-            found.append(run)
-    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +154,7 @@ def watch_newest(
     for test, time in later:
         reading = reader.reading(test, max(time, since))
         state, found = watcher.after(state, reading)
-        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader))
+        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader.modes))
         told, alert = after(told, found, hanger)
     if alert is None and beside is not None and later:
         alert = agreement(reader, later[-1], beside, hanger, options, told.beyond)
@@ -223,36 +203,10 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     wrong = {(each.plane, each.order) for each in test.mistaken if each.is_notable}
     noted = told.noted & wrong
     if alert is None and wrong - noted:
-        alert, noted = _of_modes(test, hanger), frozenset(wrong)
+        # It waits while there is worse to tell.
+        alert, noted = notice_of(test, hanger), frozenset(wrong)
     beyond = {**standing.beyond, **beyond}
     return AlertState(beyond, call, called, odd, test.mistaken, noted), alert
-
-
-def _of_modes(test: WatchedTest, hanger: Hanger) -> Alert:
-    """A notice of modes that tests keep having wrong; it waits while there is worse to tell."""
-    kind: AlertKind = "check the modes"
-    notable = [each for each in test.mistaken if each.is_notable]
-    names = "+".join(f"{each.plane}-{each.order}" for each in notable)
-    return Alert(
-        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{names}:{short_name(test.test)}",
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=f"Hanger {hanger.id}: {mistakes_words(notable)}",
-        drifts=(),
-        kinds=(kind,),
-    )
-
-
-def mistakes_words(mistaken: Sequence[RepeatedMistake]) -> str:
-    """Of modes that tests keep having wrong: which, since when, what to do, and why."""
-    since, many = min(each.since for each in mistaken), len(mistaken) > 1
-    have, number, them = ("have", "their numbers", "them") if many else ("has", "its number", "it")
-    return (
-        f"{' and '.join(map(str, mistaken))} {have} not fitted the other modes since "
-        f"{since:%Y-%m-%d}. Check {number} at the next planned test. The watch leaves {them} out: "
-        f"another order or a machine's tone may be taken for {them}, or one end alone has loosened."
-    )
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
