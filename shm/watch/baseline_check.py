@@ -20,8 +20,7 @@ from shm.watch.baseline_state import Key, best_of, known_modes, places
 from shm.watch.mistaken_modes import MOST_MISTAKEN
 
 _ENOUGH_OF_TESTS = 4  # of three states of a hanger, two alike may be chance
-_LEAST_CLOCK = 0.007  # judgement: below, warmth and sensors do as much
-_MOST_TENSION = 0.25  # judgement: no bridge is tested across such a change within one baseline
+_MOST_TENSION = 0.35  # judgement: twice 15 %, which tests of one baseline may lie apart
 _OFF = 0.04  # judgement: no bar as made is as far off its class in one mode alone
 _FIT_NO_STATE = "fit no tension and no end stiffness that the description allows"
 _FEWEST = 5  # modes of a test: fewer leave nothing to tell the odd one by
@@ -71,8 +70,7 @@ def _mistaken_tests(
     for n, (test, each) in enumerate(zip(tests, found, strict=True)):
         others = np.delete(states, n, axis=0)
         shift = float(each.modes.x[1] - np.median(others[:, 1]))
-        common = each.common_shift(spread_of(others))
-        if abs(common) > _LEAST_CLOCK:
+        if each.common_shift(spread_of(others)):
             percent = 100 * math.expm1(each.off)
             why = (
                 f"all its frequencies are off the other tests' alike, by {percent:+.1f} %: another "

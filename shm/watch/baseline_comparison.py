@@ -40,6 +40,7 @@ _COMMON_SD, _PER_KELVIN, _UNKNOWN_KELVIN = 1e-3, 1.5e-4, 10.0
 # A whole test is another hanger's, or by a wrong clock: by this all its modes may be off alike.
 _WRONG_CLOCK_SD = 0.05
 _LEAST_TENSION_SD, _LEAST_DECADES_SD = 0.01, 0.03  # judgement: a day's traffic and warmth do it
+_LEAST_CLOCK = 0.007  # judgement: below, warmth and sensors do as much
 _WRONG_TEST = 0.003  # of tests, judgement: a wrong hanger or clock
 ENOUGH = 3
 """Tests from which on the odd one can be told: of two that differ, neither is."""
@@ -50,31 +51,40 @@ class Fitted:
     """One test: its modes' places among the keys, what of them is sound, and by what it differs.
 
     `expected` (modes,) are log frequencies by the sound ones; `modes.x` (q,) is what the test
-    differs by from the median one: in common, in log tension, and in decades of each spring; `off`
-    is what its log frequencies are off that one in the median.
+    differs by from the median one: in common, in log tension, and in decades of each spring.
+    `linear` are log frequencies (modes,), slopes (modes, q) and variance (modes,) about there,
+    `of_median` the same about the median test.
     """
 
     at: IntArray
     expected: FloatArray
     modes: SoundModes
-    linear: tuple[FloatArray, FloatArray, FloatArray]  # log frequencies, slopes, variance
+    linear: tuple[FloatArray, FloatArray, FloatArray]
+    of_median: tuple[FloatArray, FloatArray, FloatArray]
     common_sd: float
-    off: float
+
+    @property
+    def off(self) -> float:
+        """By what its log frequencies are off the median test's, in the median."""
+        return float(np.median(self.of_median[0])) if len(self.at) else 0.0
 
     def common_shift(self, spread: FloatArray) -> float:
         """By what all log frequencies are off alike, 0 where the tension explains it as well.
 
         `spread` (q,) is what the other tests differ by among themselves: where their ends keep
-        still, an odd test is not explained by its ends.
+        still, an odd test is not explained by its ends; where their tensions do not, a little that
+        is common to all frequencies may be theirs, too.
         """
-        off, slopes, variance = self.linear
         tension, clock = spread.copy(), spread.copy()
         tension[:2], clock[0] = (self.common_sd, _TENSION_SD), _WRONG_CLOCK_SD
-        by_tension = sound_modes(off, slopes, variance, 1 / tension**2)
-        by_clock = sound_modes(off, slopes, variance, 1 / clock**2)
+        by_tension = sound_modes(*self.linear, 1 / tension**2)
+        by_clock = sound_modes(*self.of_median, 1 / clock**2)
         odds = math.log(_WRONG_TEST / (1 - _WRONG_TEST))
         likelier = by_clock.log_evidence + odds > by_tension.log_evidence
-        return float(by_clock.x[0]) if likelier else 0.0
+        by_spread = float(np.median(self.of_median[1][:, 1])) * spread[1] if len(self.at) else 0.0
+        least = max(_LEAST_CLOCK, by_spread)
+        common = float(by_clock.x[0])
+        return common if likelier and abs(common) > least else 0.0
 
 
 class Comparison:
@@ -170,14 +180,16 @@ class Comparison:
         expected = here + slopes @ (modes.x - x)
         is_far = np.abs(self.table[n, at] - expected) > _LEAST
         modes = replace(modes, sound=modes.sound | ~is_far)
-        of_median = quantities.log_frequency(np.zeros(len(x)), conditions)[at] + level[at]
+        still = np.zeros(len(x))
+        median = quantities.log_frequency(still, conditions)[at] + level[at]
+        of_median = self.table[n, at] - median, quantities.slopes(still, conditions)[at]
         return Fitted(
             at,
             expected,
             modes,
             (off, slopes, variance),
+            (*of_median, variance),
             float(self.common_sd[n]),
-            float(np.median(self.table[n, at] - of_median)) if len(at) else 0.0,
         )
 
 
