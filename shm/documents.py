@@ -261,6 +261,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "description_off_sd": posterior.description_off_sd,
         "reading_off_sd": posterior.reading_off_sd,
         "caveats": list(posterior.caveats),
+        "baseline_check": posterior.baseline_check and asdict(posterior.baseline_check),
     }
 
 

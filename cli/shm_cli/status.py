@@ -19,6 +19,7 @@ from shm.documents import creep_document
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
+from shm.pipeline.open_warnings import warnings_of
 from shm.report.formatting import model_class
 from shm.store import (
     ENDED,
@@ -70,6 +71,11 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
             click.echo(f"hanger {row['hanger']}: {row['creep_per_year']['words']}")
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
+        for said in row["warnings"]:
+            click.echo(paragraph(f"hanger {row['hanger']}: check baseline: {said}"))
+        if row["left_out"]:
+            said = "; ".join(row["left_out"])
+            click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
         if row["damage"] is not None:
             click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
 
@@ -226,6 +232,7 @@ def _hangers(
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
     damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
     watches = of_readable(store.watch.latest, {})
+    warnings = warnings_of(workspace, store, workspace.bridge.hangers)
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
@@ -236,6 +243,7 @@ def _hangers(
             watch = _gap_watch(store, hanger.id) if adopted else None
         except DamagedRow as error:
             damage[hanger.id] = str(error)
+        check = baseline.posterior.baseline_check if baseline else None
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
@@ -252,6 +260,8 @@ def _hangers(
                 ),
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
+                "warnings": list(warnings.get(hanger.id, ())),
+                "left_out": list(check.left_out) if check else [],
                 "gap": _gap(watch),
                 "damage": damage.get(hanger.id),
             }

@@ -42,7 +42,7 @@ from shm.store import (
     StoredTest,
     Workspace,
 )
-from shm.values import Cause, EffectEstimate, Hanger
+from shm.values import BaselineCheck, Cause, EffectEstimate, Hanger
 from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown
 
@@ -119,7 +119,8 @@ def adopt(
     _refuse_second(store, hanger, str(name))
     chosen = [test for test in tests if test.test.id in baseline.posterior.tests]
     terms, lineage = update_terms(hanger, [str(name)], chosen, workspace.settings)
-    measured = [test.test for test in chosen]
+    check = baseline.posterior.baseline_check or BaselineCheck()
+    measured = check.kept_of([test.test for test in chosen])
     posterior = update(
         measured,
         build(str(name), hanger, terms.priors),
@@ -127,6 +128,7 @@ def adopt(
         progress,
         warm_start=baseline.posterior,
     )
+    posterior = replace(posterior, baseline_check=baseline.posterior.baseline_check)
     gaps = gap_percent(baseline.posterior), gap_percent(posterior)
     adoption = _adoption(name, hanger, wish, gaps, diagnosis.id if diagnosis else None)
     competing = [*before.selection.posteriors, posterior]

@@ -11,6 +11,7 @@ from datetime import datetime
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
+from shm.pipeline.open_warnings import warnings_of
 from shm.report.contents import BridgeReport, Course, HangerLine, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period
@@ -61,7 +62,7 @@ def bridge_report(
 def hanger_lines(workspace: Workspace, store: Store) -> tuple[HangerLine, ...]:
     """Each hanger in a line, in their order along the bridge, without samples."""
     hangers = workspace.bridge.hangers
-    kept = _Kept.of(store, hangers)
+    kept = _Kept.of(workspace, store, hangers)
     return tuple(kept.line(hanger) for hanger in hangers)
 
 
@@ -75,9 +76,10 @@ class _Kept:
     called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
     damaged: Mapping[int, DamagedRow]
+    warnings: Mapping[int, tuple[str, ...]]
 
     @classmethod
-    def of(cls, store: Store, hangers: Sequence[Hanger]) -> _Kept:
+    def of(cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger]) -> _Kept:
         damaged = {row.hanger: row for row in store.upkeep.known_damage() if row.hanger is not None}
         return cls(
             store.posteriors.latest_trends(hangers),
@@ -86,6 +88,7 @@ class _Kept:
             of_readable(store.watch.detected_changes, damaged),
             store.alerts.open_counts(),
             damaged,
+            warnings_of(workspace, store, hangers),
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
@@ -96,7 +99,7 @@ class _Kept:
             return HangerLine(hanger, None, open_alerts=opened)
         baseline = self.baselines.get(hanger.id)
         drifts = self.watches[hanger.id].watched.drifts if hanger.id in self.watches else ()
-        called = self.called.get(hanger.id, ())
+        called, warnings = self.called.get(hanger.id, ()), self.warnings.get(hanger.id, ())
         return HangerLine(
             hanger,
             status_of(
@@ -104,6 +107,7 @@ class _Kept:
                 hanger,
                 is_first=baseline is None or point.test in baseline.tests,
                 is_called=bool(called),
+                warnings=warnings,
             ),
             point.time,
             Interval.of_averaged(point.averaged),
@@ -114,6 +118,7 @@ class _Kept:
             point.model,
             baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
             averaged=point.averaged,
+            warnings=warnings,
         )
 
 

@@ -7,17 +7,20 @@ not its tape: their own scatter about the one that was weighed is taken for a th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from shm.inference import UpdateOptions
 from shm.inference.priors import Calibration, calibration_of
-from shm.models import DESCRIPTION
+from shm.models import DESCRIPTION, described
 from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
 from shm.pipeline.lineage import Taught, Terms
-from shm.values import Hanger, Posterior
+from shm.values import BaselineCheck, Hanger, ModalTest, Posterior
+from shm.watch.baseline_check import check_baseline
 
+_CHECKED_BY = "beam2"  # fast, and any bar is such a beam as far as a mistaken mode goes
 _SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery
 _UNSTATED_BENDING_SD = 0.3  # judgement: a strand's wires slip by layers (DESIGN: 0.3 to 1)
 
@@ -26,6 +29,11 @@ def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
     """The terms of an update as its options."""
     learnt = calibration(terms.taught, hanger)
     return UpdateOptions(samples=terms.samples, seed=terms.seed, calibration=learnt)
+
+
+def checked(tests: Sequence[ModalTest], hanger: Hanger, terms: Terms) -> BaselineCheck:
+    """What is mistaken among the tests of a baseline, by a beam on springs whatever competes."""
+    return check_baseline(tests, described(_CHECKED_BY, hanger, terms.priors))
 
 
 def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:

@@ -7,14 +7,14 @@ tests after that are watched against the result. What was compared with the old 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from shm.errors import NothingThere
 from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
-from shm.pipeline.calibrating import options_of
+from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import update_terms
 from shm.store import Baseline, Stage, Store, StoredTest, Workspace
 from shm.values import Change, Hanger
@@ -57,13 +57,16 @@ def rebaseline(
     chosen = _since(store, hanger, order.since)
     model = before.posterior.model
     terms, lineage = update_terms(hanger, [model], chosen, workspace.settings)
+    measured = [test.test for test in chosen]
+    check = checked(measured, hanger, terms)
     posterior = update(
-        [test.test for test in chosen],
+        check.kept_of(measured),
         build(model, hanger, terms.priors),
         options_of(terms, hanger),
         progress,
         warm_start=before.posterior,
     )
+    posterior = replace(posterior, baseline_check=check)
     why = f"{order.kind.name}: {order.why}" if order.kind else order.why
     record, explained = (order.who, why, order.since), None
     if order.kind is not None:

@@ -18,6 +18,7 @@ from shm.pipeline.lineage import (
     settings_words,
     test_lineage,
 )
+from shm.pipeline.open_warnings import warnings_of
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
@@ -102,6 +103,7 @@ def hanger_now(
         settings=settings_words(workspace.settings),
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of(store, in_force),
+        warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
     )
 
 
@@ -125,7 +127,15 @@ def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
     if baseline is None:
         return {}
     tests = ", ".join(baseline.posterior.tests)
-    return {"baseline": f"{tests}; set {baseline.set_at:%Y-%m-%d} by {baseline.who}"}
+    told = {"baseline": f"{tests}; set {baseline.set_at:%Y-%m-%d} by {baseline.who}"}
+    check = baseline.posterior.baseline_check
+    if check is None:
+        return {**told, "baseline_check": "not made: the baseline is of a former version"}
+    if check.left_out:
+        told["left_out_of_the_baseline"] = "; ".join(check.left_out)
+    if check.unchecked:
+        told["baseline_check"] = f"could not be made: {check.unchecked}"
+    return told
 
 
 def _drifts(watched: Sequence[WatchedTest], test: str) -> tuple[Drift, ...]:

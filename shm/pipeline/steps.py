@@ -13,7 +13,7 @@ from shm.identify import IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.inference import refresh, select, update
 from shm.models import build
-from shm.pipeline.calibrating import options_of
+from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import Terms, competing, identify_settings, read_limits
 from shm.pipeline.remote_file import Opens
 from shm.plausibility import fingerprint_of
@@ -110,9 +110,12 @@ def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
 def select_model(
     tests: Sequence[ModalTest], hanger: Hanger, names: Sequence[str], terms: Terms
 ) -> Selection:
-    """The competing classes of a hanger, compared on its first tests."""
+    """The competing classes of a hanger, compared on its first tests, their mistakes left out."""
     models = [build(name, hanger, terms.priors) for name in names]
-    return select(tests, models, options_of(terms, hanger))
+    check = checked(tests, hanger, terms)
+    found = select(check.kept_of(tests), models, options_of(terms, hanger))
+    posteriors = tuple(replace(each, baseline_check=check) for each in found.posteriors)
+    return replace(found, posteriors=posteriors)
 
 
 def update_test(

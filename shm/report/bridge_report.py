@@ -87,6 +87,7 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
         found.append(f"Repeat the test of {named(alert)} within days, and inspect what stays.")
     if watch:
         found.append(f"Test {named(watch)} again soon.")
+    found += [each for line in data.hangers for each in line.warnings]
     if opened:
         found.append(f"Take note of the open alerts of {named(opened)} (shm alerts ack).")
     if wide := [line for line in data.hangers if line.is_hardly_known]:
@@ -115,7 +116,7 @@ def _counts(lines: Sequence[HangerLine]) -> str:
         found = of_status(lines, status)
         if found:
             which = f" ({formatting.listed([str(line.hanger.id) for line in found])})"
-            shown = which if status in (Status.ALERT, Status.WATCH) else ""
+            shown = which if status in (Status.ALERT, Status.WATCH, Status.CHECK) else ""
             told.append(f"{status.value}: {formatting.counted(len(found), 'hanger')}{shown}")
     missing = of_status(lines, None)
     told += [f"without a test: {formatting.counted(len(missing), 'hanger')}"] if missing else []
@@ -327,6 +328,7 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
                 "hanger": line.hanger.id,
                 "name": line.hanger.name,
                 "status": line.status.name.lower() if line.status else None,
+                "warnings": list(line.warnings),
                 "latest": line.latest,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,
                 "averaged": averaged_document(line.averaged) if line.averaged else None,

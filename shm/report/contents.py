@@ -116,7 +116,7 @@ class HangerReport:
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
     hanger's description has changed since the baseline, where that moves results; `discarded` names
-    the tests of the baseline that count no more.
+    the tests of the baseline that count no more. `warnings` are the open ones.
     """
 
     bridge: str
@@ -145,6 +145,7 @@ class HangerReport:
     settings: Mapping[str, str] = field(default_factory=dict)
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def latest(self) -> ModalTest:
@@ -198,6 +199,7 @@ class Status(Enum):
 
     ALERT = "Alert"
     WATCH = "Watch"
+    CHECK = "Check baseline"
     STEADY = "No change"
     FIRST = "First test"
 
@@ -209,18 +211,29 @@ def status(data: HangerReport) -> Status:
         data.hanger,
         is_first=data.baseline_tension_n is None,
         is_called=data.is_called,
+        warnings=data.warnings,
     )
 
 
 def status_of(
-    drifts: Sequence[Drift], hanger: Hanger, *, is_first: bool, is_called: bool
+    drifts: Sequence[Drift],
+    hanger: Hanger,
+    *,
+    is_first: bool,
+    is_called: bool,
+    warnings: Sequence[str] = (),
 ) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was called."""
+    """The state that the drifts of the latest test give, and whether a change was called.
+
+    With open `warnings` no hanger is quiet: what it is compared with may be wrong.
+    """
     highest = max((drift.probability for drift in drifts), default=math.nan)
     if highest >= hanger.thresholds.alert_probability:
         return Status.ALERT
     if highest >= _WATCH_PROBABILITY or is_called:
         return Status.WATCH
+    if warnings:
+        return Status.CHECK
     return Status.FIRST if is_first else Status.STEADY
 
 
@@ -259,7 +272,7 @@ class HangerLine:
     `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
     it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
     says in a few words what was called since; `open_alerts` counts those that nobody took note of.
-    `course` is None without a period.
+    `course` is None without a period; `warnings` are the open ones.
     """
 
     hanger: Hanger
@@ -274,6 +287,7 @@ class HangerLine:
     course: Course | None = None
     baseline_tension_n: Interval | None = None
     averaged: Averaged | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def of_nominal(self) -> Interval | None:

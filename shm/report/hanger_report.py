@@ -168,6 +168,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
         "creep_per_year": documents.creep_document(data.creep),
+        "warnings": list(data.warnings),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),
         "temperature_coefficients": temperature_documents(data.states),

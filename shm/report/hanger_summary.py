@@ -28,6 +28,7 @@ _MOST_NAMED = 3
 def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
+        *data.warnings,
         redescribed(data),
         discarded(data),
         *data.averaged.caveats,
@@ -314,6 +315,8 @@ def _urgent(data: HangerReport) -> str:
             )
         case Status.WATCH:
             return "Test this hanger again within a week: a shift is likelier than not."
+        case Status.CHECK:
+            return "Do what the first sentences ask for before you rely on the comparison."
         case Status.FIRST:
             return "Repeat the test at another temperature to make the baseline firm."
         case Status.STEADY:

@@ -19,6 +19,7 @@ from shm.values import (
     FrequencyResponse,
     ModalTest,
     Posterior,
+    RepeatedMistake,
     ResponsePoint,
     WatchedTest,
 )
@@ -112,6 +113,7 @@ def watch_document(watched: WatchedTest) -> dict[str, Any]:
         "temperature_c": watched.temperature_c,
         "change": asdict(watched.change),
         "creep_per_year": creep and asdict(creep),
+        "mistaken": [asdict(each) for each in watched.mistaken],
     }
 
 
@@ -122,7 +124,10 @@ def watch_from(
     temperature_c = number(document["temperature_c"])
     kept = document.get("creep_per_year")
     creep = value_of(CreepRate, kept) if kept else None
-    return WatchedTest(test, time, temperature_c, tuple(drifts), change_from(document), creep)
+    # Documents of former versions tell nothing of mistaken modes.
+    mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
+    change = change_from(document)
+    return WatchedTest(test, time, temperature_c, tuple(drifts), change, creep, mistaken)
 
 
 def change_from(document: Mapping[str, Any]) -> Change:

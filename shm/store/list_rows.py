@@ -8,7 +8,7 @@ from datetime import datetime
 from enum import StrEnum
 
 from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, Stage
-from shm.values import Averaged, Summary
+from shm.values import Averaged, BaselineCheck, Summary
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,8 @@ class TrendPoint(Numbers):
 class BaselineGlance(Numbers):
     """A baseline in force with its posterior in numbers; see `Baseline`.
 
-    `temperature_c` is the mean of its tests, NaN where none has one.
+    `temperature_c` is the mean of its tests, NaN where none has one; `check` is None of a baseline
+    that a former version made.
     """
 
     id: int
@@ -103,6 +104,7 @@ class BaselineGlance(Numbers):
     model: str
     tests: tuple[str, ...]
     temperature_c: float
+    check: BaselineCheck | None = None
 
 
 @dataclass(frozen=True)

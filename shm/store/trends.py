@@ -24,7 +24,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import averaged_document, number, value_of
 from shm.errors import UsageError
-from shm.store.checksums import checksum_of, readable
+from shm.store.checksums import checksum_of, loads, readable
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
 from shm.store.list_rows import BaselineGlance, Numbers, TrendPoint
@@ -36,7 +36,7 @@ from shm.store.queries import (
     selection_of,
 )
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
-from shm.values import NAN, Averaged, Hanger, Posterior, Selection, Summary
+from shm.values import NAN, Averaged, BaselineCheck, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
 
 log = logging.getLogger(__name__)
@@ -156,7 +156,7 @@ def baselines_in_numbers(
     known = {hanger.id: hanger for hanger in hangers}
     now = baselines_now(next(iter(known)) if len(known) == 1 else None)
     query = (
-        sa.select(baselines, posteriors.c.model, *_SUMMARY)
+        sa.select(baselines, posteriors.c.model, posteriors.c.document, *_SUMMARY)
         .join(posteriors, posteriors.c.id == baselines.c.posterior_id)
         .outerjoin(summaries, summaries.c.posterior_id == posteriors.c.id)
         .where(baselines.c.id.in_(now))
@@ -334,5 +334,15 @@ def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> B
         model=row.model,
         tests=tuple(each.name for each in made_of),
         temperature_c=fmean(temperatures_c) if temperatures_c else NAN,
+        check=_check(row.document),
         **vars(numbers),
     )
+
+
+def _check(document: str) -> BaselineCheck | None:
+    """What was found of the baseline's tests; None of a damaged document."""
+    try:
+        found = loads(document).get("baseline_check")
+        return None if found is None else value_of(BaselineCheck, found)
+    except ValueError:
+        return None

@@ -7,6 +7,7 @@ end (0) to the arch end (its length).
 
 from __future__ import annotations
 
+from shm.values.baseline_check import BaselineCheck, MistakenMode, MistakenTest
 from shm.values.diagnosis import (
     Cause,
     Diagnosis,
@@ -34,6 +35,7 @@ from shm.values.drift import (
     ModeReading,
     Moved,
     Reading,
+    RepeatedMistake,
     TemperatureCoefficient,
     WatchedQuantity,
     WatchedTest,
@@ -122,6 +124,7 @@ __all__ = [
     "AlertKind",
     "Answer",
     "Averaged",
+    "BaselineCheck",
     "Beside",
     "Bin",
     "BoolArray",
@@ -151,6 +154,8 @@ __all__ = [
     "Limits",
     "Mark",
     "MarkName",
+    "MistakenMode",
+    "MistakenTest",
     "ModalTest",
     "Mode",
     "ModeReading",
@@ -166,6 +171,7 @@ __all__ = [
     "Quantity",
     "Reading",
     "Recording",
+    "RepeatedMistake",
     "Residual",
     "ResponsePoint",
     "Richness",

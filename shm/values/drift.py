@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 End = Literal["deck", "arch"]
 
 TENSION = "tension"
+ENOUGH_MISTAKES = 3
+"""Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -190,12 +192,31 @@ class CreepRate:
         return f"Tension {verb} by {rounded_percent(abs(self.mean), half)} a year."
 
 
+@dataclass(frozen=True)
+class RepeatedMistake:
+    """A mode that was taken for a mistaken one in the last `tests` tests that have it, `since`."""
+
+    plane: Plane
+    order: int
+    since: datetime
+    tests: int
+
+    def __str__(self) -> str:
+        return f"{self.plane} {self.order}"
+
+    @property
+    def is_notable(self) -> bool:
+        """Whether it is no single slip any more, but numbered wrongly each time, or true."""
+        return self.tests >= ENOUGH_MISTAKES
+
+
 @dataclass(frozen=True, eq=False)
 class WatchedTest:
     """The watch after one test: shifts of all quantities and what the sequential test says.
 
     `creep_per_year` is None where it is not known: a change that may have come is not told from it,
     and former versions did not keep it.
+    `mistaken` are the modes that this test, and maybe those before it, have wrong.
     """
 
     test: str
@@ -204,6 +225,7 @@ class WatchedTest:
     drifts: tuple[Drift, ...]
     change: Change
     creep_per_year: CreepRate | None = None
+    mistaken: tuple[RepeatedMistake, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -231,6 +253,7 @@ AlertKind = Literal[
     "beyond threshold",
     "repeat the test",
     "tests disagree",
+    "check the modes",
     "gap",
     "held",
     "test",

@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from shm.values.baseline_check import BaselineCheck
 from shm.values.force_units import force_unit
 from shm.values.hanger import Limits
 from shm.values.kinds import NAN, FloatArray, Plane
@@ -91,6 +92,8 @@ class Posterior:
     modes that are all numbered one higher or one lower, nearer to the nominal tension.
     `description_off_sd` is by how many of its standard deviations the description would be off,
     `reading_off_sd` by how many a tension that was read is off what the frequencies say.
+    `baseline_check` is what was found of the tests of a baseline before it was made of them; None
+    of any other posterior, and of a baseline by a former version.
     """
 
     model: str
@@ -119,6 +122,7 @@ class Posterior:
     tension_of_other_orders_n: float = NAN
     description_off_sd: float = NAN
     reading_off_sd: float = NAN
+    baseline_check: BaselineCheck | None = None
 
     @property
     def caveats(self) -> tuple[str, ...]:

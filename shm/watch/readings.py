@@ -48,6 +48,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.causes import columns_of
+from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
     MeasuredMode,
     base_point,
@@ -79,15 +80,15 @@ _SELDOM = 1e-3
 # How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
 _BEYOND = 0.05
 
-# Of routine modes so many are mistaken: another order, the other plane's, a machine's tone.
-_MISTAKEN = 0.04
-# What a mistaken one may be off by, in log frequency: two neighbouring orders of a low mode.
-_MISTAKEN_RANGE = 0.7
 # Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
 # joint that gives. Judgement, the better end of what repeated tests of real hangers show.
 _MODE_SCATTER = 1e-3
 _SENSOR_KG = 0.3  # judgement: two accelerometers with magnets and cable
-_MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the test that does not
+_UNEVEN_DECADES = 0.5  # technical: of a joint that loosens at one end alone
+_UNEVEN_SD = 3.0  # judgement, in units of that: it goes with the square
+_UNEVEN = 0.5  # of tests with a mode that seems mistaken, judgement: an end has moved alone
+# Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
+_LEAST_MISTAKE = 0.006
 _ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
 _PRIOR_FREEDOM = 4.0  # judgement: stated sds are off by a factor of up to two
 
@@ -182,6 +183,7 @@ class Reader:
         self._per_kelvin = self._softening(hanger)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
+        self._uneven = self._unevenness()
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
@@ -238,44 +240,53 @@ class Reader:
     def _sound(self, seen: _Seen) -> BoolArray:
         """Which modes (n,) are not mistaken: likelier good than off by anything.
 
-        Each is good with its error and scatter or, seldom, anywhere; the state that makes all
-        together likeliest is looked for from what each mode alone says of the tension.
+        Each is good with its error and scatter or, seldom, anywhere. Which are mistaken is asked
+        anew about the state that the others give, for only near it are frequencies linear: once
+        springs have moved, what looked mistaken from the baseline may be none.
         """
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        variance = seen.variance + self._scatter**2
-        wide = replace(seen, variance=variance)
-        x = self._likeliest_start(wide)
-        good = np.ones(len(seen.own))
+        plain = self._sound_by(seen, self._uneven[:, :0])
+        if plain.sound.all():
+            return every
+        found = plain
+        if self._uneven.size:
+            uneven = self._sound_by(seen, self._uneven)
+            if uneven.log_evidence + math.log(_UNEVEN) > plain.log_evidence:
+                found = uneven
+        return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
+
+    def _sound_by(self, seen: _Seen, more: FloatArray) -> SoundModes:
+        """Which modes are sound where the quantities, and `more` (modes, k), may have moved."""
+        variance, more = seen.variance + self._scatter**2, more[seen.own]
+        wide, sd = replace(seen, variance=variance), np.sqrt(variance)
+        pull = np.append(self._pull, np.full(more.shape[1], 1 / _UNEVEN_SD**2))
+        x = np.zeros(len(self.quantities))
         for _ in range(_ROUNDS):
             linear = self._linear(x, wide)
-            for _ in range(_ROUNDS):
-                off = linear.residual + linear.slopes @ (linear.x - x)
-                good = _good(off, variance)
-                x = self._weighed(linear, good)
-            x = np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
-        sound = good > 0.5
-        return sound if (~sound).sum() <= _MOST_MISTAKEN * len(sound) else every
+            off = sd * (linear.residual + linear.slopes @ x)
+            slopes = np.hstack([sd[:, None] * linear.slopes, more])
+            found = sound_modes(off, slopes, variance, pull)
+            x = np.clip(found.x[: len(x)], self._lowest - _BEYOND, self._highest + _BEYOND)
+        is_near = np.abs(off - slopes @ found.x) < _LEAST_MISTAKE
+        return replace(found, sound=found.sound | is_near)
 
-    def _likeliest_start(self, seen: _Seen) -> FloatArray:
-        """Of no shift and the tensions that the modes give one by one, the likeliest start."""
-        base = self._linear(np.zeros(len(self.quantities)), seen)
-        alone = base.residual / np.where(base.slopes[:, 0] == 0, np.inf, base.slopes[:, 0])
-        starts = np.zeros((len(alone) + 1, len(base.x)))
-        starts[1:, 0] = np.clip(alone, self._lowest[0], self._highest[0])
-        off = base.residual - starts @ base.slopes.T
-        density = _log_mixture(off, seen.variance).sum(axis=1) - starts**2 @ base.pull / 2
-        return np.asarray(starts[int(density.argmax())])
-
-    def _weighed(self, linear: _Linear, weight: FloatArray) -> FloatArray:
-        """Where the cost is least, were it all linear, each mode counting for its `weight`."""
-        slopes = linear.slopes * weight[:, None]
-        pull = np.maximum(linear.pull, 1e-9)
-        target = linear.residual + linear.slopes @ linear.x
-        return np.asarray(
-            np.linalg.solve(slopes.T @ linear.slopes + np.diag(pull), slopes.T @ target)
+    def _unevenness(self) -> FloatArray:
+        """What log frequencies (modes, pairs) do as one of two springs that move together softens
+        and the other stiffens: no quantity, but no mistake either.
+        """
+        pairs = [columns for columns in self._columns if len(columns) > 1]
+        theta = np.tile(self._base, (1 + len(pairs), 1))
+        prior = self._model.prior
+        for row, (soft, *others) in zip(theta[1:], pairs, strict=True):
+            row[soft] -= _UNEVEN_DECADES
+            row[others] += _UNEVEN_DECADES
+        theta = np.clip(
+            theta, np.minimum(prior.lower, self._base), np.maximum(prior.upper, self._base)
         )
+        found = log_frequencies(self._model, theta, self.modes)
+        return np.asarray((found[1:] - found[0]).T)
 
     def _is_warmth_known(self, test: ModalTest) -> bool:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
@@ -405,18 +416,6 @@ class Reader:
         highest = max(order for _, order in self.modes)
         found = self._model.frequencies_at(theta, highest, seen.conditions)
         return np.asarray(np.log(found[:, seen.plane, seen.order]))
-
-
-def _log_mixture(off: FloatArray, variance: FloatArray) -> FloatArray:
-    """Log density of modes `off` (..., n), over sd, of which a few are mistaken."""
-    good = math.log(1 - _MISTAKEN) - off**2 / 2 - np.log(2 * np.pi * variance) / 2
-    return np.asarray(np.logaddexp(good, math.log(_MISTAKEN / _MISTAKEN_RANGE)))
-
-
-def _good(off: FloatArray, variance: FloatArray) -> FloatArray:
-    """Probability (n,) of each mode `off` (n,), over sd, being no mistaken one."""
-    good = math.log(1 - _MISTAKEN) - off**2 / 2 - np.log(2 * np.pi * variance) / 2
-    return np.exp(good - np.logaddexp(good, math.log(_MISTAKEN / _MISTAKEN_RANGE)))
 
 
 def _credible_share(misfit: FloatArray, fitted: int) -> float:

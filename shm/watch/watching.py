@@ -9,7 +9,8 @@ neither of the former rules has (`agreement`). A test that agrees with none befo
 repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
 its probability falls below half that level, and only then can it be told again, so that a
 probability which hovers about the level does not ring every week. A change that was called and then
-passes the threshold is told again, since the owner must now do something else.
+passes the threshold is told again, since the owner must now do something else. A mode that three
+tests in a row have wrong is a notice, once: its number may be.
 
 All is derived from the sequence of tests, so that the same tests give the same alerts.
 """
@@ -31,8 +32,10 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
+    Plane,
     Posterior,
     Reading,
+    RepeatedMistake,
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
@@ -40,6 +43,7 @@ from shm.watch.alert_text import message_of, message_of_odd, short_name
 from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
+from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
 from shm.watch.watcher import Watch, Watcher, WatchState, watched
 
 DatedTest = tuple[ModalTest, datetime]
@@ -85,13 +89,27 @@ def watch_hanger(
     compared with the baseline. Raises BadInput where the baseline's tests hold no mode that its
     class describes.
     """
+    baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = _options_of(hanger, len(baseline_tests), options)
     watch = watched(readings, reader.quantities, reader.columns, hanger, options)
-    return Watched(reader, readings, watch)
+    tests = list(watch.tests)
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    for n in range(len(baseline_tests), len(tests)):
+        mistaken = repeated_mistakes(mistaken, readings[n], reader.modes)
+        tests[n] = replace(tests[n], mistaken=mistaken)
+    return Watched(reader, readings, replace(watch, tests=tuple(tests)))
+
+
+def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest, ...]:
+    """The tests of a baseline without what was left out of it as mistaken."""
+    check = baseline.baseline_check
+    if check is None:
+        return tuple(tests)
+    return tuple((check.kept(test), at) for test, at in tests if not check.leaves_out(test.id))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +137,7 @@ def watch_newest(
     then the watch must begin without it. Where the watch itself calls for no alert, the newest may
     yet agree with a test `beside` it.
     """
+    baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
     options = _options_of(hanger, len(baseline_tests), options)
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
@@ -135,7 +154,9 @@ def watch_newest(
         told = AlertState.from_text(state.told)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
-        state, found = watcher.after(state, reader.reading(test, max(time, since)))
+        reading = reader.reading(test, max(time, since))
+        state, found = watcher.after(state, reading)
+        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader.modes))
         told, alert = after(told, found, hanger)
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
@@ -182,11 +203,21 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
+    alert = _alert(news, change, test, hanger, is_further=is_further) or _of_odd(test, hanger, odd)
+    wrong = {(each.plane, each.order) for each in test.mistaken if each.is_notable}
+    noted = told.noted & wrong
+    if alert is None and wrong - noted:
+        # It waits while there is worse to tell.
+        alert, noted = notice_of(test, hanger), frozenset(wrong)
     stands = replace(
-        _with_beyond(standing, news.beyond, test.time), call=call, called=called, odd=odd
+        _with_beyond(standing, news.beyond, test.time),
+        call=call,
+        called=called,
+        odd=odd,
+        mistaken=test.mistaken,
+        noted=noted,
     )
-    alert = _alert(news, change, test, hanger, is_further=is_further)
-    return stands, alert or _of_odd(test, hanger, odd)
+    return stands, alert
 
 
 def _with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
@@ -331,13 +362,16 @@ class AlertState:
     """What stands: when each quantity was told to be beyond its threshold, and when a call was.
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one.
+    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
+    wrong, `noted` those of them that were told.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
     call: datetime | None = None
     called: tuple[Change, ...] = ()
     odd: int = 0
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    noted: frozenset[tuple[Plane, int]] = frozenset()
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -347,6 +381,8 @@ class AlertState:
                 "call": self.call,
                 "called": [asdict(change) for change in self.called],
                 "odd": self.odd,
+                "mistaken": [asdict(each) for each in self.mistaken],
+                "noted": sorted(self.noted),
             },
             default=datetime.isoformat,
         )
@@ -364,6 +400,8 @@ class AlertState:
                 kept["call"] and value_of(datetime, kept["call"]),
                 value_of(tuple[Change, ...], kept["called"]),
                 int(kept["odd"]),
+                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
+                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(

@@ -155,7 +155,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
                 {
                     "at": by_id[a.test], "kinds": list(a.kinds),
                     "moved": [] if a.change is None else [
-                        [m.quantity, round(m.probability, 3), m.shift_mean, list(m.alike), list(m.together)]
+                        [m.quantity, round(m.probability, 3), m.shift_mean, list(m.alike)]
                         for m in a.change.moved[:6]
                     ],
                     "message": a.message,
@@ -191,12 +191,15 @@ def true_shift(season: Any, number: int) -> float:
     return float(lasting[-1] / lasting[0] - 1)
 
 
+FIRST = ("transverse", 1)
+
+
 def rivals(
     tests: Sequence[ModalTest], days: np.ndarray, baseline_tests: int
 ) -> dict[str, list[float]]:
     """CUSUM and EWMA on the first frequency, cleared of its line in the temperature, clipped."""
     first = np.array([
-        next((np.log(m.frequency_hz) for m in t.modes if m.plane == "transverse" and m.order == 1), np.nan)
+        next((np.log(m.frequency_hz) for m in t.modes if (m.plane, m.order) == FIRST), np.nan)
         for t in tests
     ])  # fmt: skip
     warmth = np.array([t.temperature_c for t in tests])
@@ -230,7 +233,8 @@ def share(hits: int, count: int) -> str:
 def rate(hits: int, years: float) -> str:
     """Events a year with a 90 % interval (Garwood)."""
     low = gamma.ppf(0.05, hits) / years if hits else 0.0
-    return f"{hits} in {years:.0f}: {hits / years:.3f} ({low:.3f} to {gamma.ppf(0.95, hits + 1) / years:.3f})"
+    high = gamma.ppf(0.95, hits + 1) / years
+    return f"{hits} in {years:.0f}: {hits / years:.3f} ({low:.3f} to {high:.3f})"
 
 
 def is_alert(alert: dict[str, Any]) -> bool:
@@ -263,7 +267,8 @@ def told(scenario: str, rows: Sequence[dict[str, Any]]) -> str:
             years += (end - r["days"][b - 1]) / DAYS_A_YEAR
             false += bool(firsts)
             notices += sum(not is_alert(a) for a in r["alerts"])
-        return f"{scenario}: first false alarms {rate(false, years)}; notices {notices / years:.2f} a year"
+        often = f"notices {notices / years:.2f} a year"
+        return f"{scenario}: first false alarms {rate(false, years)}; {often}"
     delays, early, named, today = [], 0, {}, 0
     for r in rows:
         begun = next((n for n, d in enumerate(r["days"]) if d >= BEGINS), None)
@@ -285,8 +290,9 @@ def told(scenario: str, rows: Sequence[dict[str, Any]]) -> str:
     q = np.quantile(delays, [0.5, 0.9, 0.95], method="higher") if len(delays) else [np.nan] * 3
     cover = [abs(r["true_shift"] - r["shift"][0]) <= 1.645 * r["shift"][1] for r in rows]
     return (
-        f"{scenario}: n {len(delays)}, early {early}, tests {q[0]} / {q[1]} / {q[2]} (50/90/95 %), never "
-        f"{int(np.isinf(delays).sum())}; named {named}; today {today}; covers {np.mean(cover):.2f}"
+        f"{scenario}: n {len(delays)}, early {early}, tests {q[0]} / {q[1]} / {q[2]} (50/90/95 %), "
+        f"never {int(np.isinf(delays).sum())}; named {named}; today {today}; "
+        f"covers {np.mean(cover):.2f}"
     )
 
 

@@ -304,6 +304,30 @@ def test_a_mode_taken_for_another_is_left_out_and_moves_nothing(
     assert misled.modes.variances == pytest.approx(lacking.modes.variances)
 
 
+@pytest.mark.parametrize(
+    "theta",
+    [
+        changed(transverse=-0.5, longitudinal=-0.5),
+        changed(transverse=-1.0, longitudinal=-1.0),
+        changed(tension=0.9, transverse=-0.7),
+        (*SPRUNG[:2], SPRUNG[2] - 0.7, *SPRUNG[3:]),
+    ],
+    ids=["springs", "springs by a decade", "tension and springs", "one spring alone"],
+)
+def test_a_mistaken_mode_is_found_though_the_springs_have_moved(
+    reader: Reader, theta: tuple[float, ...]
+) -> None:
+    frequency_hz = frequencies(theta)
+    good = reader.reading(measured(frequency_hz), WHEN)
+    frequency_hz[0, 2] *= 1.04
+    misled = reader.reading(measured(frequency_hz), WHEN)
+
+    assert good.modes is not None
+    assert misled.modes is not None
+    assert not good.modes.mistaken.any()
+    assert [reader.modes[n] for n in np.flatnonzero(misled.modes.mistaken)] == [(PLANES[0], 3)]
+
+
 def test_where_most_modes_fit_no_state_the_test_says_little(reader: Reader) -> None:
     frequency_hz = frequencies(SPRUNG)
     wild = frequency_hz * np.exp(np.random.default_rng(3).normal(0, 0.1, frequency_hz.shape))

@@ -292,7 +292,7 @@ class HangerAtAGlance(BaseModel):
     name: str
     length_m: float
     nominal_tension_n: float
-    status: Literal["alert", "watch", "steady", "first"] | None
+    status: Literal["alert", "watch", "check", "steady", "first"] | None
     tests: int
     latest_test: str | None
     latest_test_at: datetime | None
@@ -304,13 +304,14 @@ class HangerAtAGlance(BaseModel):
     )
     called: str = Field(description="Changes called since the baseline; empty where none was.")
     open_alerts: int
+    warnings: list[str] = Field(description="What is wrong with what the hanger is compared with.")
 
 
 class BridgeState(BaseModel):
     """The whole bridge: `status` is that of the hanger that is worst off."""
 
     bridge: str
-    status: Literal["alert", "watch", "steady", "first"] | None
+    status: Literal["alert", "watch", "check", "steady", "first"] | None
     hangers: list[HangerAtAGlance]
 
 

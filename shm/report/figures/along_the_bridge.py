@@ -211,6 +211,7 @@ SHIFTS = Member(
 _MARKS = {
     Status.ALERT: (colours.RED, "v"),
     Status.WATCH: (colours.ORANGE, "D"),
+    Status.CHECK: (colours.ORANGE, "X"),
     Status.STEADY: (colours.GREEN, "o"),
     Status.FIRST: (colours.BLUE, "s"),
 }

@@ -61,6 +61,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
         moved=found.sentence if found else None,
         unit=unit.name,
+        warnings=[said for each in bridge.hangers for said in each.line.warnings],
         rows=[_row(each, unit, now) for each in bridge.hangers],
     )
 
@@ -177,6 +178,7 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
         "shift": _interval(each.shift),
         "called": line.called,
         "open_alerts": line.open_alerts,
+        "warnings": list(line.warnings),
     }
 
 

@@ -1,0 +1,33 @@
+"""The open warnings of the hangers of a workspace, from what its store says.
+
+Nothing here imports what computes: `shm status` asks it, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shm.report.open_warnings import open_warnings, standing_out
+from shm.store import Store, Workspace
+from shm.store.checksums import of_readable
+from shm.values import Hanger
+
+
+def warnings_of(
+    workspace: Workspace, store: Store, hangers: Sequence[Hanger]
+) -> dict[int, tuple[str, ...]]:
+    """The open warnings of each of `hangers` that has a baseline, by hanger."""
+    every = workspace.bridge.hangers
+    baselines = store.watch.baselines_in_force(every)
+    tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
+    latest = of_readable(store.watch.latest, {})
+    return {
+        hanger.id: open_warnings(
+            hanger,
+            baselines[hanger.id].check,
+            standing_out(hanger, every, tensions),
+            latest[hanger.id].watched.mistaken if hanger.id in latest else (),
+        )
+        for hanger in hangers
+        if hanger.id in baselines
+    }

@@ -1,0 +1,92 @@
+"""What is wrong with what a hanger is compared with: said first wherever its state is said.
+
+A watch that compares with a wrong baseline is quiet for years. So a baseline that does not fit, or
+that stands out among its neighbours, and a mode that tests keep having wrong are never "No change".
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Mapping, Sequence
+
+from shm.report.formatting import listed
+from shm.values import BaselineCheck, Hanger, RepeatedMistake, Summary
+
+# Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
+_OFF_NOMINAL = 0.25
+_NEIGHBOURS = 4  # nearest of its kind: judgement, two each way; loads of a bridge vary along it
+_FEWEST_NEIGHBOURS = 2  # of one neighbour nobody can say which of the two stands out
+
+
+def open_warnings(
+    hanger: Hanger,
+    check: BaselineCheck | None,
+    neighbours: str = "",
+    mistaken: Sequence[RepeatedMistake] = (),
+) -> tuple[str, ...]:
+    """Each a state, what to do, and why; empty where nothing is wrong.
+
+    `check` is that of the baseline, `neighbours` what `standing_out` says of it, `mistaken` the
+    modes that the latest test has wrong.
+    """
+    found = []
+    if check is not None and check.misfit:
+        found.append(
+            f"The baseline of hanger {hanger.id} does not fit: {check.misfit}. Check the "
+            "description and the numbers of the modes, and repeat the test within a week."
+        )
+    if check is not None and check.tests:
+        many = len(check.tests) > 1
+        names = listed([each.test for each in check.tests])
+        found.append(
+            f"The baseline of hanger {hanger.id} is made without test{'s' * many} {names}: "
+            f"{check.tests[0].why}. Find out which hanger was hit, and check the logger's clock."
+        )
+    if neighbours:
+        found.append(neighbours)
+    notable = [each for each in mistaken if each.is_notable]
+    if notable:
+        since = min(each.since for each in notable)
+        many = len(notable) > 1
+        found.append(
+            f"{listed([str(each) for each in notable]).capitalize()} of hanger {hanger.id} "
+            f"{'have' if many else 'has'} not fitted the other modes since {since:%Y-%m-%d}. "
+            f"Check {'their numbers' if many else 'its number'} at the next planned test."
+        )
+    return tuple(found)
+
+
+def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[int, Summary]) -> str:
+    """That a baseline's tension is far off its nominal one, and its neighbours' are not; or "".
+
+    `hangers` stand in the order of the bridge; `tensions` are those of their baselines.
+    """
+    share = _share(hanger, tensions)
+    if share is None:
+        return ""
+    kind = [each for each in hangers if each.family == hanger.family]
+    at = [each.id for each in kind].index(hanger.id)
+    near = sorted(range(len(kind)), key=lambda n: abs(n - at))[1:]
+    others = [each for n in near if (each := _share(kind[n], tensions)) is not None]
+    others = others[:_NEIGHBOURS]
+    if len(others) < _FEWEST_NEIGHBOURS:
+        return ""
+    of_others = statistics.median(mean for mean, _, _ in others)
+    mean, low, high = share
+    # The near end of the interval: a tension that is hardly known stands out by nothing.
+    off = low - 1 if mean > 1 else 1 - high
+    if off < _OFF_NOMINAL or abs(of_others - 1) > _OFF_NOMINAL:
+        return ""
+    return (
+        f"The baseline of hanger {hanger.id} stands out: its tension is {100 * (mean - 1):+.0f} % "
+        "off the nominal one, and that of its neighbours is not. Check its length, its section and "
+        "the numbers of its modes within a week."
+    )
+
+
+def _share(hanger: Hanger, tensions: Mapping[int, Summary]) -> tuple[float, float, float] | None:
+    """Mean and 90 % interval of the baseline's tension over the nominal one."""
+    found, nominal_n = tensions.get(hanger.id), hanger.nominal_tension_n
+    if found is None or not nominal_n > 0:
+        return None
+    return found.mean / nominal_n, found.q05 / nominal_n, found.q95 / nominal_n

@@ -1,0 +1,72 @@
+"""A baseline in doubt is said by status, report and dashboard alike, and first."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.documents import dump
+from shm.modes_document import modes_document
+from shm.pipeline.reporting import hanger_report
+from shm.report.as_text import as_text
+from shm.report.hanger_report import hanger_paper
+from shm.store import Workspace
+from tests.cli.conftest import Shm
+from tests.helpers.flows import ingest
+from tests.helpers.web_servers import served
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put
+
+SAID = "The baseline of hanger 3 does not fit: "
+
+
+@pytest.fixture(scope="module")
+def doubted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Hanger 3 with two tests, most modes of the first of which are another thing."""
+    workspace = make_workspace(tmp_path_factory.mktemp("doubted") / "bridge")
+    hanger = workspace.bridge.hangers[0]
+    wild = np.random.default_rng(3).uniform(0.75, 1.3, 12).tolist()
+    first = modelled_test("t0", hanger)
+    modes = tuple(
+        replace(mode, frequency_hz=mode.frequency_hz * factor)
+        for mode, factor in zip(first.modes, wild, strict=True)
+    )
+    tests = [replace(first, modes=modes), modelled_test("t1", hanger, day=30)]
+    for test in tests:
+        put(workspace.spool / f"{test.id}.modes.json", dump(modes_document([test])))
+    ingest(workspace)
+    with workspace.store() as store:
+        for hold in store.recordings.list_holds():
+            store.recordings.confirm(hold.recording_id, "Ann", "as measured", START)
+    ingest(workspace)
+    return workspace
+
+
+def test_status_says_it_in_words_and_as_a_document(shm: Shm, doubted: Workspace) -> None:
+    told = shm("--workspace", doubted.folder, "status")
+    assert f"hanger 3: check baseline: {SAID}" in " ".join(told.out.split())
+    (row,) = json.loads(shm("--workspace", doubted.folder, "status", "--json").out)["hangers"]
+    assert row["warnings"][0].startswith(SAID)
+    assert row["left_out"] == []
+
+
+def test_the_report_begins_with_it(doubted: Workspace) -> None:
+    with doubted.store() as store:
+        data = hanger_report(doubted, store, 3, START)
+    text = " ".join(as_text(hanger_paper(data)).split())
+    assert SAID in text
+    assert text.index(SAID) < text.index("carries")
+    assert "No change" not in text[: text.index("carries")]
+
+
+def test_the_dashboard_says_it_on_the_page_of_the_bridge_and_of_the_hanger(
+    doubted: Workspace,
+) -> None:
+    with served(doubted) as site, site.client(site.read_token) as client:
+        (hanger,) = client.get("/api/bridge").json()["hangers"]
+        assert hanger["warnings"][0].startswith(SAID)
+        assert hanger["status"] in ("alert", "watch", "check")
+        for address in ("/", "/hangers/3"):
+            assert SAID in client.get(address).text

@@ -1,0 +1,184 @@
+"""Mistakes among the tests of a baseline: left out of it and of the watch, said everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shm.documents import dump
+from shm.inference import UpdateOptions
+from shm.models import Model
+from shm.modes_document import modes_document
+from shm.pipeline import rebaselining
+from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.rebaselining import Order, rebaseline
+from shm.pipeline.reporting import hanger_report
+from shm.report.contents import Status, status
+from shm.report.hanger_summary import summary
+from shm.store import Workspace
+from shm.values import ModalTest, Plane, Posterior
+from tests.helpers import quick_update
+from tests.helpers.flows import Clock, ingest
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return make_workspace(tmp_path / "bridge", settings={"baseline_tests": 4})
+
+
+def spool(workspace: Workspace, number: int, change: Any = None, tension: float = 1.0) -> ModalTest:
+    hanger = workspace.bridge.hangers[0]
+    test = modelled_test(f"t{number}", hanger, day=number, tension=tension)
+    test = change(test) if change else test
+    put(workspace.spool / f"t{number}.modes.json", dump(modes_document([test])))
+    return test
+
+
+def times(factor: float) -> Any:
+    """All frequencies of a test, as by a wrong clock."""
+
+    def changed(test: ModalTest) -> ModalTest:
+        return replace(
+            test,
+            modes=tuple(
+                replace(mode, frequency_hz=factor * mode.frequency_hz) for mode in test.modes
+            ),
+        )
+
+    return changed
+
+
+def misnamed(plane: Plane, order: int) -> Any:
+    """The mode above is taken for this one."""
+
+    def changed(test: ModalTest) -> ModalTest:
+        known = {(mode.plane, mode.order): mode.frequency_hz for mode in test.modes}
+        modes = tuple(
+            replace(mode, frequency_hz=known[plane, order + 1])
+            if (mode.plane, mode.order) == (plane, order)
+            else mode
+            for mode in test.modes
+        )
+        return replace(test, modes=modes)
+
+    return changed
+
+
+@pytest.fixture
+def updated_from(monkeypatch: pytest.MonkeyPatch) -> list[list[ModalTest]]:
+    """The tests that each selection was made from."""
+    from shm.pipeline import steps
+
+    seen: list[list[ModalTest]] = []
+
+    def select(tests: Sequence[ModalTest], models: Sequence[Model], options: UpdateOptions) -> Any:
+        seen.append(list(tests))
+        return quick_update.select(tests, models, options)
+
+    monkeypatch.setattr(steps, "select", select)
+    return seen
+
+
+def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_origin_names_it(
+    workspace: Workspace, updated_from: list[list[ModalTest]]
+) -> None:
+    for number in range(4):
+        spool(workspace, number, misnamed("transverse", 2) if number == 2 else None)
+    spool(workspace, 9)
+    ingest(workspace)
+
+    (tests,) = updated_from
+    assert [len(test.modes) for test in tests] == [12, 12, 11, 12]
+    with workspace.store() as store:
+        baseline = store.watch.baseline(3)
+        assert baseline is not None
+        check = baseline.posterior.baseline_check
+        assert check is not None
+        assert [(each.test, each.plane, each.order) for each in check.modes] == [
+            ("t2", "transverse", 2)
+        ]
+        report = hanger_report(workspace, store, 3, Clock().now)
+        (line,) = hanger_lines(workspace, store)
+    said = report.lineage["left_out_of_the_baseline"]
+    (mode,) = check.modes
+    assert said == (
+        f"transverse 2 of test t2: measured {mode.measured_hz:.4g} Hz, expected "
+        f"{mode.expected_hz:.4g} Hz"
+    )
+    assert mode.expected_hz < 0.8 * mode.measured_hz
+    assert report.warnings == line.warnings == ()
+    assert status(report) is line.status is Status.STEADY
+
+
+def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
+    workspace: Workspace, updated_from: list[list[ModalTest]]
+) -> None:
+    for number in range(4):
+        spool(workspace, number, times(1.015) if number == 1 else None)
+    spool(workspace, 9)
+    ingest(workspace)
+
+    assert [test.id for test in updated_from[0]] == ["t0", "t2", "t3"]
+    with workspace.store() as store:
+        report = hanger_report(workspace, store, 3, Clock().now)
+        (line,) = hanger_lines(workspace, store)
+    assert summary(report).startswith("The baseline of hanger 3 is made without test t1: ")
+    assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
+    assert line.warnings == report.warnings
+    assert status(report) is line.status is Status.CHECK
+
+
+def test_a_new_baseline_is_checked_as_the_first_one_was(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def quick(
+        tests: Sequence[ModalTest],
+        model: Model,
+        options: UpdateOptions,
+        *_: Any,
+        warm_start: Posterior,
+    ) -> Posterior:
+        return quick_update.update(tests, model, options)
+
+    monkeypatch.setattr(rebaselining, "update", quick)
+    for number in range(8):
+        spool(workspace, number, misnamed("longitudinal", 3) if number == 6 else None)
+    ingest(workspace)
+    order = Order(START + timedelta(days=3.5), "a new pin", "engineer")
+    with workspace.store() as store:
+        made = rebaseline(workspace, store, workspace.bridge.hangers[0], order, Clock().now)
+        again = store.watch.baseline(3)
+    check = made.posterior.baseline_check
+    assert check is not None
+    assert [(each.test, each.plane, each.order) for each in check.modes] == [
+        ("t6", "longitudinal", 3)
+    ]
+    assert again is not None
+    assert again.posterior.baseline_check == check
+
+
+def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(
+    workspace: Workspace,
+) -> None:
+    for number in range(8):
+        spool(workspace, number, misnamed("transverse", 3) if number > 3 else None)
+    ingest(workspace)
+    with workspace.store() as store:
+        alerts = [each.alert for each in store.alerts.list_all(3)]
+        report = hanger_report(workspace, store, 3, Clock().now)
+        (line,) = hanger_lines(workspace, store)
+    (alert,) = [each for each in alerts if "check the modes" in each.kinds]
+    assert alert.test == "t6"
+    assert alert.message.startswith(
+        f"Hanger 3: transverse 3 has not fitted the other modes since "
+        f"{START + timedelta(days=4):%Y-%m-%d}. Check its number"
+    )
+    assert report.warnings == line.warnings
+    assert report.warnings[0].startswith("Transverse 3 of hanger 3 has not fitted")
+    assert line.status is not Status.STEADY

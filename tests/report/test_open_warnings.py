@@ -1,0 +1,84 @@
+"""A wrong baseline is said first, and no hanger with one is quiet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pytest
+
+from shm.report.contents import Status, status_of
+from shm.report.open_warnings import open_warnings, standing_out
+from shm.values import BaselineCheck, MistakenMode, MistakenTest, RepeatedMistake, Summary
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.nouns import a_drift
+
+SINCE = datetime(2026, 5, 1, tzinfo=UTC)
+MODE = MistakenMode("t1", "transverse", 2, 21.3, 14.2)
+
+
+def tension(share: float, half_width: float = 0.02) -> Summary:
+    ends = share - half_width, share, share + half_width
+    return Summary(*(each * HANGER_3.nominal_tension_n for each in (share, 0.01, *ends)))
+
+
+def row(*shares: float, families: str = "") -> str:
+    """What is said of the third of hangers with such tensions, over the nominal one."""
+    families = families or "a" * len(shares)
+    hangers = [replace(HANGER_3, id=n, family=f) for n, f in enumerate(families)]
+    return standing_out(hangers[2], hangers, {n: tension(each) for n, each in enumerate(shares)})
+
+
+def test_a_mode_left_out_of_a_baseline_that_fits_is_no_warning() -> None:
+    assert open_warnings(HANGER_3, BaselineCheck(modes=(MODE,))) == ()
+    assert open_warnings(HANGER_3, BaselineCheck()) == ()
+    assert open_warnings(HANGER_3, None) == ()
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        (BaselineCheck(misfit="5 of 12 modes fit nothing"), "does not fit: 5 of 12 modes"),
+        (BaselineCheck(tests=(MistakenTest("t4", "a wrong clock"),)), "without test t4: a wrong"),
+    ],
+)
+def test_a_baseline_that_does_not_fit_is_a_warning(check: BaselineCheck, said: str) -> None:
+    (warning,) = open_warnings(HANGER_3, check)
+    assert warning.startswith("The baseline of hanger 3 ")
+    assert said in warning
+
+
+def test_a_mode_is_a_warning_from_the_third_test_on_that_has_it_wrong() -> None:
+    twice = RepeatedMistake("transverse", 3, SINCE, 2)
+    assert open_warnings(HANGER_3, None, mistaken=[twice]) == ()
+    (warning,) = open_warnings(HANGER_3, None, mistaken=[replace(twice, tests=3)])
+    assert warning == (
+        "Transverse 3 of hanger 3 has not fitted the other modes since 2026-05-01. Check its "
+        "number at the next planned test."
+    )
+
+
+def test_a_tension_far_off_the_nominal_one_stands_out_only_beside_neighbours_that_are_not() -> None:
+    assert "its tension is +41 % off" in row(1.05, 0.97, 1.41, 1.0, 1.02)
+    assert "its tension is -38 % off" in row(1.05, 0.97, 0.62, 1.0, 1.02)
+    assert row(1.05, 0.97, 1.2, 1.0, 1.02) == ""
+    assert row(1.4, 1.5, 1.41, 1.38, 1.45) == "", "all are off: the nominal tensions are"
+    assert row(1.05, 0.97, 1.41, 1.0, families="abaa") != ""
+    assert row(1.05, 0.97, 1.41, 1.0, families="bbab") == "", "none is of its kind"
+
+
+def test_a_tension_that_is_hardly_known_stands_out_by_nothing() -> None:
+    hangers = [replace(HANGER_3, id=n) for n in range(4)]
+    known = {0: tension(1.0), 1: tension(1.02), 3: tension(0.98)}
+    assert standing_out(hangers[2], hangers, {**known, 2: tension(1.4)}) != ""
+    assert standing_out(hangers[2], hangers, {**known, 2: tension(1.4, 0.3)}) == ""
+    assert standing_out(hangers[2], hangers, known) == ""
+
+
+def test_with_an_open_warning_no_hanger_is_quiet_and_an_alert_stays_one() -> None:
+    quiet, loud = [a_drift(probability=0.01)], [a_drift(probability=0.99)]
+    for is_first in (True, False):
+        given = {"is_first": is_first, "is_called": False}
+        assert status_of(quiet, HANGER_3, **given, warnings=["x"]) is Status.CHECK
+        assert status_of(quiet, HANGER_3, **given) in (Status.FIRST, Status.STEADY)
+        assert status_of(loud, HANGER_3, **given, warnings=["x"]) is Status.ALERT
