@@ -16,8 +16,8 @@ class WatchOptions:
     tension, and shares of a spring's `step_sd`; which pair of them holds is learnt.
     Temperature coefficients have mean 0 and the sds given, of the tension a fraction per kelvin, of
     a spring a share of its `step_sd` per kelvin. The first `baseline_tests` readings are taken to
-    precede every change. `beginnings` is how many possible beginnings of a change are kept. `most_of_one_test` is
-    the share of the limit that no test exceeds by itself, however wild.
+    precede every change. `beginnings` is how many possible beginnings of a change are kept.
+    `most_of_one_test` is the share of the limit that no test exceeds by itself, however wild.
     """
 
     limit_years: float = 100.0

@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from shm.models import build  # noqa: E402
 from shm.modes_document import parse_modes  # noqa: E402
 from shm.values import TENSION, Hanger, ModalTest, Posterior  # noqa: E402
 from shm.watch import WatchOptions, watch_hanger  # noqa: E402
-from shm.watch.baseline_check import without_mistaken  # noqa: E402
+from shm.watch.baseline_check import check_baseline  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.drift.rivals import cusum, sound, without_swing  # noqa: E402
 
@@ -133,9 +134,11 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         if len(tests) < baseline_tests + 6:
             continue
         hanger = hanger_of(described.description, number)
-        first, mistaken = without_mistaken(tests[:baseline_tests], build("beam2", hanger))
-        posterior = baseline_of(first, hanger)
-        dated = [(test, test.time) for test in [*first, *tests[baseline_tests:]]]
+        first = tests[:baseline_tests]
+        check = check_baseline(first, build("beam2", hanger))
+        posterior = baseline_of(check.kept_of(first), hanger)
+        posterior = replace(posterior, baseline_check=check)
+        dated = [(test, test.time) for test in tests]
         started = time.process_time()
         watched = watch_hanger(
             posterior, dated[:baseline_tests], dated[baseline_tests:], hanger,
@@ -147,6 +150,7 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         zero = described_day(season, number, tests)
         alerts = alerts_of(watched.watch.tests, hanger)
         by_id = {test.id: n for n, test in enumerate(tests)}
+        watched_at = [by_id[each.test] for each in watched.watch.tests]
         drift = {d.quantity: d for d in watched.latest.drifts}[TENSION]
         found.append({
             "world": world, "scenario": scenario, "seed": seed, "hanger": number,
@@ -162,12 +166,15 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
                 }
                 for a in alerts
             ],
+            "watched_at": watched_at,
             "evidence": [float(f"{t.change.evidence_years:.3g}") for t in watched.watch.tests],
             "outlier": [round(t.change.outlier_probability, 3) for t in watched.watch.tests],
             "shift": [drift.shift_mean, drift.shift_sd],
             "true_shift": true_shift(season, number),
             "rivals": rivals(tests, np.array(days), baseline_tests),
-            "mistaken_in_baseline": [str(m) for m in mistaken],
+            "mistaken_in_baseline": [str(each) for each in (*check.modes, *check.tests)],
+            "misfit": check.misfit,
+            "left_out": len(check.tests),
             "seconds": seconds / max(len(tests), 1),
         })  # fmt: skip
     return found
