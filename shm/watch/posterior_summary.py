@@ -32,7 +32,7 @@ from shm.watch.quantities import coordinate_of, shift_of, value_at
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
-_MOST = 120  # technical: changes that a mixture is made of, the likeliest
+_MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,8 +257,8 @@ def drifted(
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
     threshold is averaged over all; where springs trade with the tension, and no frequency moves by
-    more than what is to be told (`effects`), nothing is beyond. As long as no test since the baseline
-    says anything, a shift is as open as before any.
+    more than what is to be told (`effects`), nothing is beyond. As long as no test since the
+    baseline says anything, a shift is as open as before any.
     """
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
