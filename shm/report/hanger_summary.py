@@ -16,7 +16,7 @@ from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
-from shm.watch.alert_text import action_words
+from shm.watch.alert_action import action_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.

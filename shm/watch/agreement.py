@@ -22,9 +22,10 @@ import numpy as np
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
-from shm.watch.posterior_summary import beyond, shift_of_mixture, threshold_of
+from shm.watch.posterior_summary import threshold_of
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
+from shm.watch.shift_mixture import beyond, shift_of_mixture
 
 _CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
