@@ -1,4 +1,4 @@
-"""What the tests of a watch's state are to the evidence: columns, scatter, doubt, and their sums."""
+"""What the tests of a state are to the evidence: columns, scatter, doubt, and their sums."""
 
 from __future__ import annotations
 
