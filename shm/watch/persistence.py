@@ -60,8 +60,9 @@ class Stays:
     against_baseline: int = 0
 
 
-def what_stays(evidence: Evidence, course: Course) -> Stays:
-    """Of the likeliest changes."""
+def what_stays(evidence: Evidence, course: Course, limit_years: float) -> Stays:
+    """Of the likeliest changes; a baseline stands alone only where a normal law would call it."""
+    is_clear = evidence.log_evidence > math.log(limit_years)
     found, against = -math.inf, 0
     leading = float(evidence.log_mass.max(initial=-math.inf))
     for n, index in enumerate(_likeliest(evidence)):
@@ -70,7 +71,7 @@ def what_stays(evidence: Evidence, course: Course) -> Stays:
             break
         log_years, is_of_those_before, showing = _of_change(evidence, course, index)
         found = max(found, min(mass, log_years))
-        if n == 0 and is_of_those_before:
+        if n == 0 and is_of_those_before and is_clear:
             against = showing
     return Stays(found, against)
 

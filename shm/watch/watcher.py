@@ -239,7 +239,9 @@ class Watcher:
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-            stays = what_stays(causes, self._course(state, rows, causes.called))
+            stays = what_stays(
+                causes, self._course(state, rows, causes.called), self.options.limit_years
+            )
             evidence = replace(evidence, log_most=stays.log_years)
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)

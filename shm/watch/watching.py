@@ -381,7 +381,8 @@ class AlertState:
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
     of a further change, no longer of that one. `mistaken` are the modes that the last tests have
-    wrong, `noted` those of them that were told, `alone` whether it was told that a baseline stands alone.
+    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
+    stands alone.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
