@@ -20,14 +20,16 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
     that was detected below the threshold has ended once less than half of it is left, by the same
     level. Where no change is behind it, as of two tests that agree while their clocks left the
     watch no time for a change, the probability was low all along: the shift must have come back,
-    too. A held test ends by a decision, never here; a
-    mode that does not fit, once it does.
+    too. A held test ends by a decision, never here; a mode that does not fit, once it does; a
+    baseline that stands alone, once another is set.
     """
     if test.time <= alert.time or "held" in alert.kinds:
         return ""
     if "check the modes" in alert.kinds and not alert.drifts:
         stands = any(each.is_notable for each in test.mistaken)
         return "" if stands else f"all modes of test {test.test} fit again"
+    if "check the baseline" in alert.kinds and not test.change.is_baseline_alone:
+        return f"test {test.test} does not speak against the baseline any more"
     if "gap" in alert.kinds and gap_stands:
         return ""
     if "gap" not in alert.kinds and not alert.drifts:

@@ -20,6 +20,7 @@ End = Literal["deck", "arch"]
 TENSION = "tension"
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
+_ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -146,6 +147,8 @@ class Change:
     `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
     of this test's reading being a blunder. `material_probability` is that the change moves a first
     frequency, or the mean of all, by more than the watch is asked to tell; less is not called.
+    `against_baseline` tests agree with each other and not with a baseline of so few tests that it
+    may be the odd one; 0 where it is not so.
     """
 
     evidence_years: float
@@ -157,6 +160,12 @@ class Change:
     moved: tuple[Moved, ...]
     outlier_probability: float = NAN
     material_probability: float = 1.0
+    against_baseline: int = 0
+
+    @property
+    def is_baseline_alone(self) -> bool:
+        """Whether it is the baseline that does not fit, as far as anybody can say."""
+        return self.against_baseline >= _ENOUGH_AGAINST and not self.called
 
     @property
     def called(self) -> bool:
@@ -254,6 +263,7 @@ AlertKind = Literal[
     "repeat the test",
     "tests disagree",
     "check the modes",
+    "check the baseline",
     "gap",
     "held",
     "test",

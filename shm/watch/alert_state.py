@@ -19,7 +19,8 @@ class AlertState:
 
     `called` are the changes that were called, told or not: after a call the sequential test speaks
     of a further change, no longer of that one. `mistaken` are the modes that the last tests have
-    wrong, `noted` those of them that were told.
+    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
+    stands alone.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
@@ -28,6 +29,7 @@ class AlertState:
     odd: int = 0
     mistaken: tuple[RepeatedMistake, ...] = ()
     noted: frozenset[tuple[Plane, int]] = frozenset()
+    alone: bool = False
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -39,6 +41,7 @@ class AlertState:
                 "odd": self.odd,
                 "mistaken": [asdict(each) for each in self.mistaken],
                 "noted": sorted(self.noted),
+                "alone": self.alone,
             },
             default=datetime.isoformat,
         )
@@ -58,6 +61,7 @@ class AlertState:
                 int(kept["odd"]),
                 value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
                 frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
+                bool(kept["alone"]),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(

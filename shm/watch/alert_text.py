@@ -107,6 +107,24 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     )
 
 
+def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
+    """Of a baseline that agrees with none of the tests since."""
+    return (
+        f"Hanger {hanger.id}: {against_baseline_words(test.change)} Find out what was different on "
+        "the day of the baseline, and set another within a month (`shm drift rebaseline`). Either "
+        "the baseline was disturbed, by a load on the deck for one, or the hanger changed right "
+        "after it; no test tells which."
+    )
+
+
+def against_baseline_words(change: Change) -> str:
+    """That the baseline is the odd one."""
+    return (
+        f"the {change.against_baseline} tests since the baseline agree with each other and not "
+        "with it."
+    )
+
+
 def short_name(test: str) -> str:
     """A test's name as far as a key has room for it; names that begin alike stay apart."""
     if len(test) <= _LONGEST_TEST:

@@ -66,6 +66,8 @@ def changed(
     before: float,
     outlier: float,
     effects: FloatArray,
+    *,
+    against_baseline: int,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
     `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is
@@ -83,6 +85,7 @@ def changed(
         moved=_moved(subject.quantities, causes),
         outlier_probability=outlier,
         material_probability=_material(subject, causes, effects),
+        against_baseline=against_baseline,
     )
 
 

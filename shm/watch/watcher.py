@@ -40,7 +40,7 @@ from shm.watch.conditions import (
 )
 from shm.watch.isolated_tests import counted, outlier_probability
 from shm.watch.options import WatchOptions
-from shm.watch.persistence import most_evidence
+from shm.watch.persistence import Stays, what_stays
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
 from shm.watch.state_sums import StateSums
 from shm.watch.watch_state import WatchState
@@ -160,15 +160,18 @@ class Watcher:
                 remedy="Sort the tests by time.",
             )
         state = self._with(state, reading)
-        state = self._bounded(state)
+        state, evidence = self._bounded(state)
         rows = _counting(state)
-        evidence = self._evidence(state, rows)
-        causes = evidence
+        if not state.counted[-1]:
+            evidence = self._evidence(state, rows)
+        causes, stays = evidence, Stays(math.inf)
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-            stays = most_evidence(causes, self.sums.course(state, rows, causes.called))
-            evidence = replace(evidence, log_most=stays)
+            stays = what_stays(
+                causes, self.sums.course(state, rows, causes.called), self.options.limit_years
+            )
+            evidence = replace(evidence, log_most=stays.log_years)
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
         last, effects = state.tests - 1, self.sums.effects(state)
@@ -193,6 +196,7 @@ class Watcher:
                 1 - state.still_same,
                 outlier,
                 effects,
+                against_baseline=stays.against_baseline,
             ),
             creep_per_year=self._creep(evidence),
         )
@@ -205,20 +209,23 @@ class Watcher:
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
 
-    def _bounded(self, state: WatchState) -> WatchState:
+    def _bounded(self, state: WatchState) -> tuple[WatchState, Evidence]:
         """The newest visit with what is left of its weight: alone it speaks for no change by more
-        than it may, whether it counts by now or only once another agrees with it."""
+        than it may, whether it counts by now or only once another agrees with it. And the evidence
+        as if it counted."""
         visit = state.years >= state.years[-1] - OF_ONE_VISIT_YEARS
         rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
         most = math.log(self.options.most_of_one_test * self.options.limit_years)
+        evidence = self._evidence(state, rows)
         for _ in range(_MOST_REPEATS):
-            factor, mass = self._evidence(state, rows).of_last_visit
+            factor, mass = evidence.of_last_visit
             if mass <= most + _NEARLY:
                 break
             weight = state.weight.copy()
             weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
             state = replace(state, weight=weight)
-        return state
+            evidence = self._evidence(state, rows)
+        return state, evidence
 
     def _with(self, state: WatchState, reading: Reading) -> WatchState:
         """The state with one more test in it, and who counts now."""

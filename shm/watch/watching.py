@@ -36,7 +36,7 @@ from shm.values import (
 )
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState
-from shm.watch.alert_text import message_of, message_of_odd, short_name
+from shm.watch.alert_text import message_of, message_of_baseline, message_of_odd, short_name
 from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
@@ -207,6 +207,9 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     if alert is None and wrong - noted:
         # It waits while there is worse to tell.
         alert, noted = notice_of(test, hanger), frozenset(wrong)
+    alone = told.alone
+    if alert is None and test.change.is_baseline_alone and not alone:
+        alert, alone = _of_baseline(test, hanger), True
     stands = replace(
         _with_beyond(standing, news.beyond, test.time),
         call=call,
@@ -214,6 +217,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         odd=odd,
         mistaken=test.mistaken,
         noted=noted,
+        alone=alone,
     )
     return stands, alert
 
@@ -240,6 +244,20 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     )
 
 
+def _of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
+    """A notice of a baseline that stands alone against the tests since."""
+    kind: AlertKind = "check the baseline"
+    return Alert(
+        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message_of_baseline(test, hanger),
+        drifts=(),
+        kinds=(kind,),
+    )
+
+
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
     """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
     told, alerts = AlertState(), []
@@ -259,7 +277,7 @@ def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd)
+        return AlertState(beyond, odd=told.odd, alone=told.alone)
     return replace(told, beyond=beyond)
 
 

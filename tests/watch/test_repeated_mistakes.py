@@ -59,7 +59,7 @@ def watched(number: int, tests: int) -> WatchedTest:
     mistaken = (RepeatedMistake("transverse", 3, START, tests),) if tests else ()
     still = a_change(probability=0.01, evidence_years=1.0)
     time = START + timedelta(days=number)
-    return WatchedTest(f"t{number}", time, 10.0, (), still, mistaken)
+    return WatchedTest(f"t{number}", time, 10.0, (), still, mistaken=mistaken)
 
 
 def test_a_notice_is_given_once_and_again_only_after_the_mode_has_fitted() -> None:

@@ -150,7 +150,7 @@ def test_a_called_step_is_called_once_and_a_second_one_anew() -> None:
     assert len(alone.calls) == 1
     assert 8 <= alone.calls[0].index < 11
     assert len(both.calls) == 2
-    assert 20 <= both.calls[1].index < 23
+    assert 20 <= both.calls[1].index < 24
     assert both.calls[1].change.began_after == readings[19].time
     expected = math.expm1(math.log(0.95) + 0.03)
     assert last(both.tests).drifts[0].shift_mean == pytest.approx(expected, abs=0.004)
