@@ -35,7 +35,7 @@ def test_a_sound_store_and_archive_pass(shm: Shm, copied: Workspace) -> None:
     assert ended.code == 0
     assert ended.document["troubles"] == []
     rows = {each["table"]: each["rows"] for each in ended.document["tables"]}
-    assert (rows["recordings"], rows["tests"], rows["alerts"]) == (3, 3, 1)
+    assert (rows["recordings"], rows["tests"], rows["alerts"]) == (3, 3, 2)
     assert ended.document["archive"]["whole"] == 3
 
 

@@ -62,8 +62,8 @@ def test_status_shows_the_daemon_the_queue_and_what_is_open(shm: Shm, empty: Wor
 
 def test_status_counts_open_alerts_of_each_hanger(shm: Shm, bridge: Workspace) -> None:
     document = shm("--workspace", bridge.folder, "status", "--json").document
-    assert document["open_alerts"] == 1
-    assert [row["open_alerts"] for row in document["hangers"]] == [1, 0]
+    assert document["open_alerts"] == 2
+    assert [row["open_alerts"] for row in document["hangers"]] == [2, 0]
     assert document["hangers"][0]["baseline_since"] is not None
 
 

@@ -57,7 +57,10 @@ def test_ingest_does_the_whole_job_and_reports_each_file(
         ("c.modes.json", "taken in", "done"),
         ("empty.csv", "refused", "refused"),
     ]
-    assert [alert["test"] for alert in document["alerts"]] == ["c"]
+    assert [(alert["test"], alert["kinds"]) for alert in document["alerts"]] == [
+        ("b", ["repeat the test"]),
+        ("c", ["beyond threshold"]),
+    ]
 
 
 def test_a_refused_file_makes_exit_code_3_and_is_given_its_reason(

@@ -14,6 +14,8 @@ import xarray
 
 from shm.store import Workspace
 from tests.cli.conftest import Shm
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import SLOW_LOSS, write_slow_loss
 
 
 def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -> None:
@@ -58,7 +60,7 @@ def test_a_workspace_is_not_made_twice(shm: Shm, empty: Workspace) -> None:
 def test_status_counts_tests_and_alerts_of_each_hanger(shm: Shm, bridge: Workspace) -> None:
     document = shm("--workspace", bridge.folder, "status", "--json").document
     assert document["recordings"]["done"] == 3
-    assert document["alerts"] == 1
+    assert document["alerts"] == 2  # that t1 is to be repeated, and what t2 found
     three, four = document["hangers"]
     assert (three["hanger"], three["tests"], three["model"]) == (3, 3, "beam1")
     assert three["latest_test"] == "2026-06-30T10:00:00Z"
@@ -112,19 +114,23 @@ def test_a_hanger_without_tests_has_nothing_yet(
     assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
 
 
-def test_drift_shows_the_latest_shift_or_all(shm: Shm, bridge: Workspace) -> None:
-    call = ("--workspace", bridge.folder, "drift", "--hanger", 3)
+def test_drift_shows_the_latest_shift_or_all(shm: Shm, empty: Workspace) -> None:
+    write_slow_loss(empty.spool, empty)
+    ingest(empty)
+    call = ("--workspace", empty.folder, "drift", "--hanger", 3)
     (latest,) = shm(*call, "--json").document["drifts"]
-    assert (latest["test"], latest["quantity"]) == ("t2", "tension")
-    assert latest["shift_mean"] == pytest.approx(-0.2, abs=0.1)
+    assert (latest["test"], latest["quantity"]) == ("t6", "tension")
+    assert latest["shift_mean"] == pytest.approx(SLOW_LOSS[-1] - 1, abs=0.02)
     assert latest["probability"] > 0.95
-    assert [row["test"] for row in shm(*call, "--all", "--json").document["drifts"]] == ["t1", "t2"]
+    rows = shm(*call, "--all", "--json").document["drifts"]
+    assert [row["test"] for row in rows] == [f"t{number}" for number in range(1, 7)]
     assert "probability beyond" in shm(*call).out
 
 
 def test_alerts_are_listed_with_what_the_hooks_got(shm: Shm, bridge: Workspace) -> None:
     call = ("--workspace", bridge.folder, "alerts")
-    (row,) = shm(*call, "--json").document["alerts"]
+    notice, row = shm(*call, "--json").document["alerts"]
+    assert (notice["alert"]["test"], notice["alert"]["kinds"]) == ("t1", ["repeat the test"])
     assert row["alert"]["schema"] == "shm.alert/1"
     assert (row["alert"]["test"], row["deliveries"]) == ("t2", [])
     assert "tension fell by" in shm(*call, "--hanger", 3).out.replace("\n", " ")

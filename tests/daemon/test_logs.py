@@ -19,7 +19,7 @@ from shm_daemon import run
 from shm_daemon.logs import begin_logging, formatter
 from tests.helpers import quick_update
 from tests.helpers.flows import threads
-from tests.helpers.workspaces import make_workspace, put, write_loss
+from tests.helpers.workspaces import make_workspace, put, write_slow_loss
 
 
 @pytest.fixture(autouse=True)
@@ -143,7 +143,7 @@ def test_a_run_can_be_followed_by_recording_hanger_test_stage_and_hook(
         monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
     workspace = _with_a_hook(tmp_path)
     begin_logging(Settings(log_format="json"), tmp_path / "shm.log")
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     put(workspace.spool / "bad.csv", "no recording")
     run(workspace, once=True, make_executor=threads)
     told = [json.loads(line) for line in (tmp_path / "shm.log").read_text().splitlines()]
@@ -153,7 +153,7 @@ def test_a_run_can_be_followed_by_recording_hanger_test_stage_and_hook(
     refused = _first(told, "bad.csv is refused")
     assert (refused["file"], refused["stage"]) == ("bad.csv", "identify")
     alert = _first(told, "alert ")
-    assert (alert["hanger"], alert["test"], alert["level"]) == (3, "t2", "warning")
+    assert (alert["hanger"], alert["test"], alert["level"]) == (3, "t6", "warning")
     assert _first(told, "deliver 1: done")["hook"] == "siren"
 
 

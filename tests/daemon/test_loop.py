@@ -24,7 +24,7 @@ from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
 from tests.helpers.footprint import open_files
-from tests.helpers.workspaces import make_workspace, put, write_loss, write_test
+from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_loss, write_test
 
 
 @pytest.fixture(autouse=True)
@@ -192,7 +192,7 @@ def test_a_turn_that_fails_is_shown_until_one_goes_well(
 def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:
     hook = ["sh", "-c", "cat > told.json"]
     workspace = make_workspace(tmp_path / "told", hooks={"mail": hook})
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     run_once(workspace)
     assert "tension fell by" in (workspace.folder / "told.json").read_text()
 
@@ -201,12 +201,12 @@ def test_a_hook_that_hangs_does_not_hold_up_the_files(
     tmp_path: Path, serve: Callable[..., Wakeup]
 ) -> None:
     workspace = make_workspace(tmp_path / "hangs", hooks={"mail": ["sleep", "600"]})
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     wakeup = serve(workspace)
-    until(lambda: counts(workspace) == {Stage.DONE: 3})
+    until(lambda: counts(workspace) == {Stage.DONE: len(SLOW_LOSS)})
     until(lambda: len(deliveries(workspace)) == 1)
     write_test(workspace.spool / "later.modes.json", workspace, day=90)
-    until(lambda: counts(workspace) == {Stage.DONE: 4})
+    until(lambda: counts(workspace) == {Stage.DONE: len(SLOW_LOSS) + 1})
     assert [each.state for each in deliveries(workspace)] == [DeliveryState.WAITING]
     wakeup.stop()  # ends the hook too; the fixture checks that the daemon ends soon
 
@@ -325,7 +325,7 @@ def test_deliveries_put_off_do_not_keep_it_from_ending(tmp_path: Path) -> None:
     workspace = make_workspace(
         tmp_path / "later", hooks={"mail": ["true"]}, settings={"hook_backoff_seconds": 3600.0}
     )
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     run_once(workspace, notifier=Postman(failures=9))
     with workspace.store() as store:
         assert [each.attempts for each in store.alerts.list_deliveries()] == [1]

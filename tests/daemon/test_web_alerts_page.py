@@ -16,7 +16,7 @@ from shm_daemon.web.access import COOKIE
 from shm_daemon.web.pages import alerts as alerts_page
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import make_workspace, write_loss
+from tests.helpers.workspaces import make_workspace, write_slow_loss
 
 BROWSER = {"Accept": "text/html"}
 FAILING = {"siren": (sys.executable, "-c", "import sys; sys.exit('no power')")}
@@ -26,7 +26,7 @@ FAILING = {"siren": (sys.executable, "-c", "import sys; sys.exit('no power')")}
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has lost tension; the hook that should tell somebody fails."""
     workspace = make_workspace(tmp_path_factory.mktemp("alerts") / "bridge", hooks=FAILING)
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
     return workspace
 

@@ -38,6 +38,8 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
         hangers=(3, 4),
         settings={"models": "beam1,beam2"},
     )
+    for name, day in (("s1", 10), ("s2", 20)):  # a loss is detected against more tests than one
+        write_test(workspace.spool / f"{name}.modes.json", workspace, day=day)
     write_loss(workspace.spool, workspace, lost=2)
     write_test(
         workspace.spool / "od d%3F.modes.json", workspace, day=75, tension=0.8, name="a/b ü?"
@@ -169,13 +171,13 @@ def test_the_trend_is_there_before_the_state_over_time_is_worked_out(
     assert "Retry-After" not in second.headers
     assert "state, 90 % band" in names_in(second.json()) - names_in(first.json())
     tension = next(each for each in states if each["quantity"] == "tension")
-    assert len(tension["times"]) == len(tension["q50"]) == 4
+    assert len(tension["times"]) == len(tension["q50"]) == 6
     assert tension["q05"][-1] < tension["q50"][-1] < tension["q95"][-1]
 
 
 def test_the_trend_is_there_in_numbers(client: httpx.Client) -> None:
     found = client.get("/api/hangers/3/trend").json()
-    assert [point["test"] for point in found["points"]] == ["t0", "t1", "t2", "a/b ü?"]
+    assert [point["test"] for point in found["points"]] == ["t0", "s1", "s2", "t1", "t2", "a/b ü?"]
     assert {event["kind"] for event in found["events"]} >= {"baseline", "alert"}
     assert found["changes"][0]["words"].startswith("sudden")
     since = client.get("/api/hangers/3/trend", params={"since": "2026-06-20T00:00:00Z"}).json()
@@ -188,7 +190,7 @@ def test_tests_are_listed_newest_first_and_paged(client: httpx.Client) -> None:
         "/api/hangers/3/tests", params={"limit": 3, "before": first["next_before"]}
     ).json()
     assert [each["test"] for each in first["tests"]] == ["a/b ü?", "t2", "t1"]
-    assert [each["test"] for each in rest["tests"]] == ["t0"]
+    assert [each["test"] for each in rest["tests"]] == ["s2", "s1", "t0"]
     assert rest["next_before"] is None
     assert first["tests"][0]["tension_n"]["mean"] == pytest.approx(0.8 * 711e3, rel=0.05)
 

@@ -14,14 +14,14 @@ from shm.store import Workspace
 from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import make_workspace, put, write_loss
+from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_loss
 
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """Hanger 3 has three tests, the last two with a fifth less tension; hanger 4 has none."""
+    """Hanger 3 has lost a twelfth of its tension, which its last test shows; hanger 4 has no tests."""
     workspace = make_workspace(tmp_path_factory.mktemp("web") / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
     return workspace
 
@@ -50,8 +50,8 @@ def test_a_hanger_tells_its_tension_with_its_interval(client: httpx.Client) -> N
     state = client.get("/api/hangers/3").json()
     tension = state["tension_n"]
     assert tension["q05"] < tension["q50"] < tension["q95"]
-    assert tension["mean"] == pytest.approx(0.8 * state["nominal_tension_n"], rel=0.03)
-    assert state["tests"] == 3
+    assert tension["mean"] == pytest.approx(SLOW_LOSS[-1] * state["nominal_tension_n"], rel=0.03)
+    assert state["tests"] == len(SLOW_LOSS)
     assert state["open_alerts"] >= 0
     assert {shift["quantity"] for shift in state["shifts"]} >= {"tension"}
 
@@ -93,7 +93,7 @@ def test_an_alert_is_listed_and_acknowledged_once(site: Served) -> None:
 def test_the_status_counts_what_is_there(client: httpx.Client, bridge: Workspace) -> None:
     (bridge.folder / HEARTBEAT).touch()
     status = client.get("/api/status").json()
-    assert status["recordings"]["done"] == 3
+    assert status["recordings"]["done"] == len(SLOW_LOSS)
     assert (status["spool"], status["quarantine"]) == (0, 0)
     assert status["daemon_seen_seconds_ago"] < 60
 
@@ -120,7 +120,7 @@ def test_metrics_follow_the_queue(client: httpx.Client, bridge: Workspace) -> No
     path.unlink()
     assert seen["shm_queue_length"] == seen["shm_spool_files"] == 1
     assert 500 <= seen["shm_queue_oldest_seconds"] < 520
-    assert seen['shm_recordings{stage="done"}'] == 3
+    assert seen['shm_recordings{stage="done"}'] == len(SLOW_LOSS)
     assert seen["shm_store_up"] == 1
     assert seen["shm_disk_free_bytes"] > 0
     assert seen['shm_deliveries{state="given up"}'] == 0
