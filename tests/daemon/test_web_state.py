@@ -19,7 +19,7 @@ from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """Hanger 3 has lost a twelfth of its tension, which its last test shows; hanger 4 has no tests."""
+    """Hanger 3 has lost a twelfth of its tension, as its last test shows; 4 has no tests."""
     workspace = make_workspace(tmp_path_factory.mktemp("web") / "bridge", hangers=(3, 4))
     write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
