@@ -12,11 +12,12 @@ from shm.report.contents import HangerReport, Status, status
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
 from shm.report.intervals import Interval
+from shm.report.outdated_baseline import discarded, redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
-from shm.watch.alert_text import action_words
+from shm.watch.alert_action import action_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -367,35 +368,3 @@ def _thermometer(data: HangerReport) -> str:
     if math.isfinite(data.latest.temperature_c):
         return ""
     return "Record the temperature with the next test: it moves the tension."
-
-
-_MOST_CHANGES = 3  # what a sentence bears
-
-
-def redescribed(data: HangerReport) -> str:
-    """That the description has changed since the baseline, and what to do; empty where not."""
-    if not data.redescribed:
-        return ""
-    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
-    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
-    number = data.hanger.id
-    return (
-        f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"{_anew(number)} "
-        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
-    )
-
-
-def discarded(data: HangerReport) -> str:
-    """That tests of the baseline count no more, and what to do; empty where all do."""
-    if not data.discarded:
-        return ""
-    names, number = ", ".join(data.discarded), data.hanger.id
-    return (
-        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
-        f"change stands on what counts no more. {_anew(number)}"
-    )
-
-
-def _anew(number: int) -> str:
-    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."

@@ -277,12 +277,14 @@ class Beside:
     as they are `dated`.
 
     Those that came may be `held` (their names) for their clock alone: what they measured counts.
-    Tests that are not watched yet are left out; each is asked of in its turn.
+    Tests that are not watched yet are left out; each is asked of in its turn. Those `of_works`
+    (their names) were passed over within a maintenance window, and so have told nothing.
     """
 
     came: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
     dated: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
     held: Collection[str] = ()
+    of_works: Collection[str] = ()
 
 
 @dataclass(frozen=True)

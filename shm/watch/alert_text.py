@@ -10,15 +10,14 @@ import hashlib
 import math
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Literal
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
-    ends_words,
     factor,
     group_words,
     is_stiffness,
@@ -28,8 +27,6 @@ from shm.watch.change_words import (
     suspects,
     threshold_words,
 )
-
-Urgency = Literal["next_test", "week", "today"]
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
@@ -147,7 +144,7 @@ def watch_words(watched: Sequence[WatchedTest]) -> str:
 def _detected_words(watched: Sequence[WatchedTest]) -> str:
     detected = [each.change for each in watched if each.change.called]
     if detected:
-        each_one = (f"{_sentence(_changed(each))} {_when(each)}" for each in detected)
+        each_one = (f"{as_sentence(_changed(each))} {_when(each)}" for each in detected)
         return f"Detected since the baseline: {' Then: '.join(each_one)}"
     latest = watched[-1].change
     share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
@@ -166,7 +163,7 @@ def _state(
     """The state in a sentence of at most 25 words, with one number and its interval."""
     name = f"Hanger {hanger.id}"
     if beyond:
-        lead = _gravest(beyond)
+        lead = gravest(beyond)
         places = {
             each.quantity: (each.end, each.plane) for each in (change.moved if change else ())
         }
@@ -176,11 +173,6 @@ def _state(
     if change is None:
         return f"{name} changed{again}; its tests do not show what."
     return f"{name}{' changed again' if again else ''}: {_changed(change)}."
-
-
-def _gravest(beyond: Sequence[Drift]) -> Drift:
-    """A loss before a gain, the tension before the ends."""
-    return min(beyond, key=lambda each: (each.shift_mean > 0, each.quantity != TENSION))
 
 
 def _changed(change: Change) -> str:
@@ -243,86 +235,6 @@ def _way(group: Sequence[Moved]) -> str:
     springs = [each for each in group if len(group) == 1 or each.quantity != TENSION]
     ways = {each.shift_mean > 0 for each in springs}
     return "changed" if len(ways) > 1 else "rose" if ways.pop() else "fell"
-
-
-# ---------------------------------------------------------------- what to do, and how soon
-
-
-def urgency_of(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
-) -> Urgency:
-    """How soon: today for a loss beyond its threshold as surely as the owner asked to be told.
-
-    A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
-    then the next planned test is soon enough to see where it goes.
-    """
-    if _losses(hanger, beyond):
-        return "today"
-    slow = change is not None and change.sudden < 0.5
-    near = any(each.probability > 0.5 for each in drifts)
-    return "next_test" if slow and not beyond and not near else "week"
-
-
-def _losses(hanger: Hanger, beyond: Sequence[Drift]) -> list[Drift]:
-    """Lost tension or loosened ends that are probable, for which alone traffic is named."""
-    level = hanger.thresholds.alert_probability
-    return [each for each in beyond if each.shift_mean < 0 and each.probability >= level]
-
-
-def action_words(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
-) -> str:
-    """What to do and how soon, in a sentence."""
-    urgency = urgency_of(hanger, change, beyond, drifts)
-    if urgency == "today":
-        look = _look(_gravest(beyond), change)
-        return f"Repeat the hammer test today and decide on traffic until then; {look}."
-    groups = probable_groups(change) if change else []
-    if len(groups) > 1 and not beyond:
-        return _tell_apart(groups, urgency)
-    lead = _gravest(beyond) if beyond else groups[0][0] if groups else None
-    when = "within a week" if urgency == "week" else "at the next planned date"
-    if lead is None:
-        return f"Repeat the hammer test {when}, with more modes."
-    if lead.quantity in CAUSES:
-        check = CAUSES[lead.quantity].check
-        return _sentence(f"{_before(urgency)}, {check}, then test again")
-    return f"Repeat the hammer test {when}; {_look(lead, change)}."
-
-
-def _before(urgency: Urgency) -> str:
-    return "within a week" if urgency == "week" else "before the next planned test"
-
-
-def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
-    """What shows which of several causes it was."""
-    causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
-    if not causes:
-        with_what = "a sensor near each end and more modes"
-        return f"Repeat the hammer test {_before(urgency)} with {with_what}, to see what changed."
-    check, apart_by = causes[0].check, causes[0].apart_by
-    return _sentence(f"{_before(urgency)}, {check}; then test with {apart_by}, to tell them apart")
-
-
-def _look(lead: Moved | Drift, change: Change | None) -> str:
-    """Where to look if a change of tension or of an end stays."""
-    lost = lead.shift_mean < 0
-    if lead.quantity == TENSION:
-        beside = "compare the hangers beside it (`shm drift bridge`)"
-        look = f"inspect its anchorages and the rod, and {beside}" if lost else beside
-        return f"if the {'loss' if lost else 'gain'} stays, {look}"
-    moved = {each.quantity: each for each in (change.moved if change else ())}
-    own = moved.get(lead.quantity)
-    ends = {moved[n].end for n in (lead.quantity, *own.together) if n in moved} if own else {None}
-    end = "both ends" if None in ends else ends_words(ends)
-    found = "a worn pin, a cracked plate or loose bolts" if lost else "a pin seized by rust or dirt"
-    return f"if the change stays, inspect {end} for {found}"
 
 
 # ---------------------------------------------------------------- why, and details
@@ -443,7 +355,3 @@ def _false_alarms(change: Change | None) -> str:
     if change is None:
         return ""
     return f"mean time between false alarms at least {change.limit_years:.3g} years"
-
-
-def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."

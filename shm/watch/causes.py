@@ -20,7 +20,7 @@ from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
 from shm.models.turnbuckles import coupled_bar
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, WatchedQuantity
-from shm.watch.change_point import Direction, Layout
+from shm.watch.change_layout import Direction, Layout
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
 

@@ -6,13 +6,10 @@ After a call the called change is part of what is known, and a further one is lo
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import math
-import zipfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from datetime import datetime
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,8 +17,6 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.values import (
-    TENSION,
-    BoolArray,
     Change,
     CreepRate,
     FloatArray,
@@ -32,26 +27,23 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch.causes import Columns, Structure, structure_of
+from shm.watch.change_layout import Told
 from shm.watch.change_point import (
     SIZES,
     Evidence,
-    Sums,
-    Told,
     evidence_of,
-    sums_of,
 )
 from shm.watch.conditions import (
     OF_ONE_VISIT_YEARS,
-    Warmth,
     reference_of,
-    warmth_of,
     years_between,
 )
-from shm.watch.isolated_tests import Seen, counted, outlier_probability
+from shm.watch.isolated_tests import counted, outlier_probability
 from shm.watch.options import WatchOptions
-from shm.watch.persistence import Course, Stays, what_stays
+from shm.watch.persistence import Stays, what_stays
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
-from shm.watch.scatter import differences, learnt
+from shm.watch.state_sums import StateSums
+from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 4
@@ -75,74 +67,6 @@ class Watch:
 
     tests: tuple[WatchedTest, ...]
     calls: tuple[Call, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class WatchState:
-    """All that the next result rests on, of T tests so far, in plain arrays.
-
-    It goes on only where `key` is that of the watch which is to go on. `told` is text that goes
-    with it, `still_same` the probability that nothing had changed before the last call.
-    `weight` (T,) is what is left of tests that alone would say more than one test may.
-    `called` (calls, 3) are the first test, years, and whether it is a ramp, `called_precision`
-    (calls, n + q, n + q) what called it. `scatter_variance` is what tests scatter by.
-    """
-
-    key: str
-    start: datetime
-    last_time: datetime
-    reference_c: float
-    values: FloatArray
-    variances: FloatArray
-    slopes: FloatArray
-    per_kelvin: FloatArray
-    coordinates: FloatArray
-    years: FloatArray
-    temperature_c: FloatArray
-    log_amplitude: FloatArray
-    weight: FloatArray
-    counted: BoolArray
-    coefficients: FloatArray
-    coefficient_sd: FloatArray
-    scatter_variance: FloatArray
-    called: FloatArray
-    called_precision: FloatArray
-    still_same: float = 1.0
-    told: str = ""
-
-    @property
-    def tests(self) -> int:
-        return len(self.years)
-
-    def to_bytes(self) -> bytes:
-        """The state as a file of numpy arrays, without any pickled object."""
-        kept = io.BytesIO()
-        plain: dict[str, Any] = {
-            each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
-            for each in fields(self)
-            for value in [getattr(self, each.name)]
-        }
-        np.savez_compressed(kept, **plain)
-        return kept.getvalue()
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> WatchState:
-        """The state back; raises BadInput where the content is no such state."""
-        try:
-            with np.load(io.BytesIO(content), allow_pickle=False) as kept:
-                found = dict(kept)
-            for name in ("key", "told"):
-                found[name] = str(found[name])
-            for name in ("start", "last_time"):
-                found[name] = datetime.fromisoformat(str(found[name]))
-            for name in ("reference_c", "still_same"):
-                found[name] = float(found[name])
-            return cls(**found)
-        except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
-            raise BadInput(
-                f"A kept state of the watch cannot be read: {error}.",
-                remedy="Drop it: the watch then goes over all tests again.",
-            ) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +95,11 @@ class Watcher:
     def structure(self) -> Structure:
         """The hypotheses."""
         return structure_of(self.quantities, self.columns, self.options)
+
+    @cached_property
+    def sums(self) -> StateSums:
+        """What the tests of a state are to the evidence."""
+        return StateSums(self.quantities, self.columns.modes, self.structure, self.options)
 
     def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
         """The state after the readings of the baseline, by time, and a result for each of them.
@@ -239,13 +168,12 @@ class Watcher:
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-            stays = what_stays(
-                causes, self._course(state, rows, causes.called), self.options.limit_years
-            )
+            course = self.sums.course(state, rows, causes.called)
+            stays = what_stays(causes, course, self.options.limit_years)
             evidence = replace(evidence, log_most=stays.log_years)
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
-        last, effects = state.tests - 1, self._effects(state)
+        last, effects = state.tests - 1, self.sums.effects(state)
         outlier = self._outlier(state, last)
         found = WatchedTest(
             test=reading.test,
@@ -328,120 +256,9 @@ class Watcher:
         }
         reference_c = known[0] if known else math.nan
         later = replace(state, last_time=reading.time, reference_c=reference_c, **grown)
-        counts = counted(self._seen(later), state.counted, self.options.baseline_tests)
+        counts = counted(self.sums.seen(later), state.counted, self.options.baseline_tests)
         later = replace(later, counted=counts)
-        return replace(later, scatter_variance=self._scatter(later))
-
-    def _factors(self, state: WatchState) -> FloatArray:
-        """Along what each test scatters (T, n, q + c)."""
-        fixed = np.broadcast_to(
-            self.structure.scattering, (state.tests, *self.structure.scattering.shape)
-        )
-        return np.concatenate([state.slopes, fixed], axis=2)
-
-    def _warmth(self, state: WatchState) -> Warmth:
-        return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
-
-    def _doubt(self, state: WatchState, kelvin_sd: FloatArray) -> FloatArray:
-        """Factors (T, n, 1 + q) of what a temperature that is not known, or not well, leaves open:
-        what a kelvin does as far as that is known, and as far as it is not."""
-        known = state.per_kelvin + state.slopes @ state.coefficients
-        unknown = state.slopes * state.coefficient_sd
-        per_kelvin = np.concatenate([known[:, :, None], unknown], axis=2)
-        return np.asarray(kelvin_sd[:, None, None] * per_kelvin)
-
-    def _seen(self, state: WatchState) -> Seen:
-        """All tests so far, their swing with the temperature taken off as far as it is known."""
-        factors, warmth = self._factors(state), self._warmth(state)
-        measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
-        variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
-        return Seen(
-            values=self._at_rest(state, warmth),
-            variances=state.variances,
-            doubt=self._doubt(state, warmth.sd),
-            factors=factors[measured[-1]] if len(measured) else factors[-1],
-            sds=np.sqrt(variance),
-        )
-
-    def _at_rest(self, state: WatchState, warmth: Warmth) -> FloatArray:
-        swing = warmth.kelvin[:, None] * (state.per_kelvin + state.slopes @ state.coefficients)
-        return np.asarray(state.values - swing)
-
-    def _scatter(self, state: WatchState) -> FloatArray:
-        """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
-        rows = np.flatnonzero(state.counted)
-        rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
-        warmth = self._warmth(state)
-        found = differences(
-            self._at_rest(state, warmth)[rows],
-            state.variances[rows],
-            self._factors(state)[rows],
-            self._doubt(state, warmth.sd)[rows],
-        )
-        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
-
-    def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
-        """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
-        layout, warmth = self.structure.layout, self._warmth(state)
-        slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
-        tension = [each.name == TENSION for each in self.quantities]
-        return np.concatenate(
-            [
-                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
-                slopes,
-                slopes * warmth.kelvin[rows, None, None],
-                slopes * np.nan_to_num(level)[:, None, None],
-                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
-            ],
-            axis=2,
-        )
-
-    def _softened(self, state: WatchState, rows: IntArray) -> FloatArray:
-        """Log frequencies (T, n) less what a softer steel does."""
-        kelvin = self._warmth(state).kelvin
-        return np.asarray(state.values[rows] - kelvin[rows, None] * state.per_kelvin[rows])
-
-    def _sums(self, state: WatchState, rows: IntArray) -> Sums:
-        """Of the tests `rows`; those of one day scatter together, and say no more than one."""
-        structure, layout = self.structure, self.structure.layout
-        warmth, years = self._warmth(state), state.years[rows]
-        of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
-        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
-        unknown = state.slopes[rows] * (self.options.unknown_log_amplitude_sd * of_level)
-        unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
-        doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
-        open_left = np.concatenate([unknown, doubt], axis=2)
-        common = open_left @ np.swapaxes(open_left, 1, 2)
-        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
-        spread = factors @ np.swapaxes(factors, 1, 2)
-        scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
-        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
-        wider = 1 / state.weight[rows]
-        return sums_of(
-            self._columns(state, rows),
-            self._softened(state, rows),
-            wider[:, None] * state.variances[rows],
-            wider[:, None, None, None] * covariance,
-        )
-
-    def _course(self, state: WatchState, rows: IntArray, called: Sequence[Told]) -> Course:
-        """The tests `rows` with what the null says of each, called changes included."""
-        layout = self.structure.layout
-        columns = self._columns(state, rows)
-        changing, years = columns[:, :, layout.change], state.years[rows]
-        parts = [columns[:, :, layout.null]]
-        for each in called:
-            since = np.where(np.arange(len(rows)) >= each.first, 1.0, 0.0)
-            for _ in range(2 if each.is_ramp else 1):
-                parts.append(changing * since[:, None, None])
-                since = since * (years - each.years)
-        own = self.options.mode_scatter**2
-        return Course(
-            np.concatenate(parts, axis=2),
-            changing,
-            self._softened(state, rows),
-            state.variances[rows] + own,
-        )
+        return replace(later, scatter_variance=self.sums.scatter(later))
 
     def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
         """Of the tests `rows`."""
@@ -453,7 +270,7 @@ class Watcher:
         ]
         first = int((rows < self.options.baseline_tests).sum())
         return evidence_of(
-            self._sums(state, rows),
+            self.sums.sums(state, rows),
             state.years[rows],
             max(first, 1),
             self.structure.layout,
@@ -461,16 +278,6 @@ class Watcher:
             called,
             self.options.beginnings,
         )
-
-    def _effects(self, state: WatchState) -> FloatArray:
-        """What a change does to each plane's first frequency and to the mean (r, n + q)."""
-        measured = np.isfinite(state.variances)
-        count = np.maximum(measured.sum(axis=0), 1)[:, None]
-        slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
-        of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
-        planes = [plane for plane, _ in self.columns.modes]
-        firsts = [planes.index(plane) for plane in dict.fromkeys(planes)]
-        return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
 
     def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
         """How far each quantity goes with a kelvin (q,) and its sd, by the likeliest scatter."""
@@ -494,7 +301,7 @@ class Watcher:
 
     def _outlier(self, state: WatchState, test: int) -> float:
         prior = self.options.outlier_probability
-        return outlier_probability(self._seen(state), state.counted, test, prior)
+        return outlier_probability(self.sums.seen(state), state.counted, test, prior)
 
 
 def watched(
@@ -520,12 +327,6 @@ def watched(
         tests.append(found)
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
-
-
-def _levels(log_amplitude: FloatArray) -> FloatArray:
-    """Over the usual one, NaN where unknown."""
-    known = np.isfinite(log_amplitude)
-    return log_amplitude - (float(np.median(log_amplitude[known])) if known.any() else 0.0)
 
 
 def _counting(state: WatchState) -> IntArray:

@@ -17,13 +17,10 @@ All is derived from the sequence of tests, so that the same tests give the same 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
-from shm.documents import value_of
-from shm.errors import BadInput
 from shm.values import (
     Alert,
     AlertKind,
@@ -32,19 +29,20 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
-    Plane,
     Posterior,
     Reading,
     RepeatedMistake,
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
+from shm.watch.alert_state import AlertState
 from shm.watch.alert_text import message_of, message_of_baseline, message_of_odd, short_name
 from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
-from shm.watch.watcher import Watch, Watcher, WatchState, watched
+from shm.watch.watch_state import WatchState
+from shm.watch.watcher import Watch, Watcher, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -373,60 +371,3 @@ def _first_moved(news: _News, test: WatchedTest) -> str:
         first = test.change.moved[0]
         return f"{first.quantity}-{way_of(first.shift_mean)}"
     return "unknown"
-
-
-@dataclass(frozen=True)
-class AlertState:
-    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
-
-    `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
-    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
-    stands alone.
-    """
-
-    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
-    call: datetime | None = None
-    called: tuple[Change, ...] = ()
-    odd: int = 0
-    mistaken: tuple[RepeatedMistake, ...] = ()
-    noted: frozenset[tuple[Plane, int]] = frozenset()
-    alone: bool = False
-
-    def to_text(self) -> str:
-        """JSON, from which `from_text` makes an equal one."""
-        return json.dumps(
-            {
-                "beyond": [[*condition, at] for condition, at in self.beyond.items()],
-                "call": self.call,
-                "called": [asdict(change) for change in self.called],
-                "odd": self.odd,
-                "mistaken": [asdict(each) for each in self.mistaken],
-                "noted": sorted(self.noted),
-                "alone": self.alone,
-            },
-            default=datetime.isoformat,
-        )
-
-    @classmethod
-    def from_text(cls, text: str) -> AlertState:
-        """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
-        if not text:
-            return cls()
-        try:
-            kept = json.loads(text)
-            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
-            return cls(
-                {(quantity, way): at for quantity, way, at in beyond},
-                kept["call"] and value_of(datetime, kept["call"]),
-                value_of(tuple[Change, ...], kept["called"]),
-                int(kept["odd"]),
-                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
-                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
-                bool(kept["alone"]),
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"what was told of a hanger cannot be read: {error!r}.",
-                remedy="Go over the hanger's tests from its baseline on.",
-            ) from error
