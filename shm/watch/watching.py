@@ -273,12 +273,17 @@ def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
-        if _probability(drift, way) < end
+        if _probability(drift, way) < end and not _is_left(drift, way)
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
         return AlertState(beyond, odd=told.odd, alone=told.alone)
     return replace(told, beyond=beyond)
+
+
+def _is_left(drift: Drift, way: Way) -> bool:
+    """Whether half of a threshold is still there: what two tests told the watch may yet doubt."""
+    return way_of(drift.shift_mean) == way and 2 * abs(drift.shift_mean) >= drift.threshold
 
 
 def _probability(drift: Drift, way: Way) -> float:
