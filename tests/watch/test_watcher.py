@@ -391,7 +391,7 @@ def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
 
 def test_a_clock_that_is_off_is_named_and_a_trifle_is_not_called() -> None:
     steady = WatchOptions(tension_scatter=3e-4, bending_scatter=3e-4, mode_scatter=2e-4)
-    impatient = replace(steady, limit_years=1.0)
+    impatient = replace(steady, limit_years=0.1)
     history = History(
         tests=18, change_at=CHANGE_AT, outliers=0, scatter=2e-4, seasons_k=0, days_k=1
     )
