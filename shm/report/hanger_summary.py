@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.report import formatting
-from shm.report.contents import HangerReport, Status, status
+from shm.report.contents import HangerReport, status
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
+from shm.report.hanger_status import WATCH_PROBABILITY, Status
 from shm.report.intervals import Interval
 from shm.report.outdated_baseline import discarded, redescribed
 from shm.report.shifts import shift_cells, threshold_cell
@@ -303,7 +304,12 @@ def _chosen(data: HangerReport) -> str:
 def _urgent(data: HangerReport) -> str:
     """The same action and urgency as in the alert."""
     level = data.hanger.thresholds.alert_probability
-    beyond = [drift for drift in data.drifts if drift.probability >= level]
+    beyond = [drift for drift in data.drifts if drift.probability >= level] or [
+        drift
+        for alert in data.standing
+        if "beyond threshold" in alert.kinds
+        for drift in alert.drifts
+    ]
     change = next((each.change for each in reversed(data.alerts) if each.change), None)
     match status(data):
         case Status.ALERT:
@@ -314,6 +320,9 @@ def _urgent(data: HangerReport) -> str:
                 f"{action_words(data.hanger, change, beyond, data.drifts)} Once it is explained, "
                 "set a new baseline (shm drift rebaseline)."
             )
+        case Status.WATCH if not any(each.probability >= WATCH_PROBABILITY for each in data.drifts):
+            tests = formatting.listed(list(dict.fromkeys(each.test for each in data.standing)))
+            return f"The alert of test {tests} still stands: do what it asks for."
         case Status.WATCH:
             return "Test this hanger again within a week: a shift is likelier than not."
         case Status.CHECK:

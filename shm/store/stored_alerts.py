@@ -99,13 +99,16 @@ class Alerts(Repository):
             raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
         return found[0]
 
-    def list_standing(self, hanger: int, baseline_id: int) -> tuple[StoredAlert, ...]:
-        """Alerts of a hanger against a baseline whose condition has not ended, the oldest first."""
-        query = stored_alerts.where(
-            alerts.c.hanger == hanger,
-            alerts.c.baseline_id == baseline_id,
-            resolutions.c.id.is_(None),
-        )
+    def list_standing(
+        self, hanger: int | None = None, baseline_id: int | None = None
+    ) -> tuple[StoredAlert, ...]:
+        """Alerts whose condition has not ended, the oldest first; of a hanger, against a baseline
+        where these are named."""
+        query = stored_alerts.where(resolutions.c.id.is_(None))
+        if hanger is not None:
+            query = query.where(alerts.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(alerts.c.baseline_id == baseline_id)
         with self.reading() as connection:
             return tuple(
                 stored_alert(row) for row in connection.execute(query.order_by(alerts.c.id))

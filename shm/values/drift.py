@@ -114,6 +114,11 @@ class Drift:
     threshold: float
     probability: float
 
+    def may_be_beyond(self, way: float) -> bool:
+        """Whether the 90 % interval reaches beyond the threshold, to the side of the sign `way`."""
+        shift = math.copysign(1, way) * self.shift_mean
+        return shift + NINETY_PERCENT * self.shift_sd >= self.threshold
+
 
 @dataclass(frozen=True)
 class Moved:

@@ -20,7 +20,8 @@ class AlertState:
     `called` are the changes that were called, told or not: after a call the sequential test speaks
     of a further change, no longer of that one. `mistaken` are the modes that the last tests have
     wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
-    stands alone.
+    stands alone. `agreed` are those of `beyond` that two tests told which agree: to the watch they
+    were improbable all along.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
@@ -30,6 +31,7 @@ class AlertState:
     mistaken: tuple[RepeatedMistake, ...] = ()
     noted: frozenset[tuple[Plane, int]] = frozenset()
     alone: bool = False
+    agreed: frozenset[tuple[str, Way]] = frozenset()
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -42,6 +44,7 @@ class AlertState:
                 "mistaken": [asdict(each) for each in self.mistaken],
                 "noted": sorted(self.noted),
                 "alone": self.alone,
+                "agreed": sorted(self.agreed),
             },
             default=datetime.isoformat,
         )
@@ -62,6 +65,7 @@ class AlertState:
                 value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
                 frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
                 bool(kept["alone"]),
+                frozenset(value_of(tuple[tuple[str, Way], ...], kept["agreed"])),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(

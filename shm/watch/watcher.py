@@ -171,11 +171,30 @@ class Watcher:
             course = self.sums.course(state, rows, causes.called)
             stays = what_stays(causes, course, self.options.limit_years)
             evidence = replace(evidence, log_most=stays.log_years)
+        found = self._said(state, reading, evidence, causes, stays.against_baseline)
+        coefficients, coefficient_sd = self._coefficients(evidence)
+        if found.change.called and state.counted[-1]:
+            still = state.still_same * (1 - probability_of_change(evidence, self.options))
+            begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
+            sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
+            state = replace(state, called=begun, called_precision=sizes, still_same=still)
+        state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
+        return state, found
+
+    def _said(
+        self,
+        state: WatchState,
+        reading: Reading,
+        evidence: Evidence,
+        causes: Evidence,
+        against_baseline: int,
+    ) -> WatchedTest:
+        """What people are told after the newest test."""
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
         last, effects = state.tests - 1, self.sums.effects(state)
         outlier = self._outlier(state, last)
-        found = WatchedTest(
+        return WatchedTest(
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
@@ -195,18 +214,10 @@ class Watcher:
                 1 - state.still_same,
                 outlier,
                 effects,
-                against_baseline=stays.against_baseline,
+                against_baseline=against_baseline,
             ),
             creep_per_year=self._creep(evidence),
         )
-        coefficients, coefficient_sd = self._coefficients(evidence)
-        if found.change.called and state.counted[-1]:
-            still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
-            sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
-            state = replace(state, called=begun, called_precision=sizes, still_same=still)
-        state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
-        return state, found
 
     def _bounded(self, state: WatchState) -> tuple[WatchState, Evidence]:
         """The newest visit with what is left of its weight: alone it speaks for no change by more

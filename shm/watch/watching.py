@@ -160,7 +160,9 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
         if agreed is not None:
+            two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
+            told = replace(told, agreed=told.agreed | two_told)
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
@@ -268,17 +270,29 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
 
 
 def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """What still stands at a test, its probability not below `end`; unknown ones end nothing."""
+    """What still stands at a test, its probability not below `end`; unknown ones end nothing.
+
+    What two tests that agree have told was improbable to the watch all along: it ends once the
+    shift has come back, too.
+    """
     ended = {
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
+<<<<<<< HEAD
         if _probability(drift, way) < end and not _is_left(drift, way)
+=======
+        if _probability(drift, way) < end
+        and not (
+            (drift.quantity, way) in told.agreed
+            and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
+        )
+>>>>>>> watchtests
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd, alone=told.alone)
-    return replace(told, beyond=beyond)
+        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=told.agreed - ended)
+    return replace(told, beyond=beyond, agreed=told.agreed - ended)
 
 
 def _is_left(drift: Drift, way: Way) -> bool:

@@ -38,8 +38,9 @@ from shm.bridge import load_hanger  # noqa: E402
 from shm.inference import UpdateOptions, update  # noqa: E402
 from shm.models import build  # noqa: E402
 from shm.modes_document import parse_modes  # noqa: E402
-from shm.values import TENSION, Hanger, ModalTest, Posterior  # noqa: E402
-from shm.watch import WatchOptions, watch_hanger  # noqa: E402
+from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # noqa: E402
+from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
+from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
@@ -148,7 +149,11 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         start = tests[0].time
         days = [(t.time - start).total_seconds() / 86400 for t in tests]
         zero = described_day(season, number, tests)
-        alerts = alerts_of(watched.watch.tests, hanger)
+        alerts = [
+            *alerts_of(watched.watch.tests, hanger),
+            *agreeing(watched, dated, baseline_tests, hanger),
+        ]
+        alerts.sort(key=lambda alert: alert.time)
         by_id = {test.id: n for n, test in enumerate(tests)}
         watched_at = [by_id[each.test] for each in watched.watch.tests]
         drift = {d.quantity: d for d in watched.latest.drifts}[TENSION]
@@ -178,6 +183,21 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
             "seconds": seconds / max(len(tests), 1),
         })  # fmt: skip
     return found
+
+
+def agreeing(
+    watched: Watched, dated: Sequence[DatedTest], first: int, hanger: Hanger
+) -> list[Alert]:
+    """What the daemon adds where two tests agree, next to each other and after the `first`
+    ones, the baseline's: the first such alert."""
+    for n in range(first + 1, len(dated)):
+        before = [test for test, _ in reversed(dated[first:n])]
+        found = agreement(
+            watched.reader, dated[n], Beside(came=(before[:3], ())), hanger, WatchOptions(), ()
+        )
+        if found is not None:
+            return [found]
+    return []
 
 
 def described_day(season: Any, number: int, tests: Sequence[ModalTest]) -> float:
