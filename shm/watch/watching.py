@@ -279,25 +279,16 @@ def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
-<<<<<<< HEAD
-        if _probability(drift, way) < end and not _is_left(drift, way)
-=======
         if _probability(drift, way) < end
         and not (
             (drift.quantity, way) in told.agreed
             and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
         )
->>>>>>> watchtests
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
         return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=told.agreed - ended)
     return replace(told, beyond=beyond, agreed=told.agreed - ended)
-
-
-def _is_left(drift: Drift, way: Way) -> bool:
-    """Whether half of a threshold is still there: what two tests told the watch may yet doubt."""
-    return way_of(drift.shift_mean) == way and 2 * abs(drift.shift_mean) >= drift.threshold
 
 
 def _probability(drift: Drift, way: Way) -> float:

@@ -235,9 +235,7 @@ def test_nothing_is_said_to_move_together_with_itself() -> None:
         assert each.quantity not in {*each.together, *each.alike}
 
 
-def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_by_their_fifth_test() -> (
-    None
-):
+def test_springs_that_loosen_while_a_part_is_read_as_tension_are_called_in_five_tests() -> None:
     pairs = tuple(
         each if each.name == "tension" else replace(each, parameters=("one", "other"))
         for each in PLANES_ALONE
