@@ -151,7 +151,7 @@ class Change:
     ramp, given a change. `began_after` and `began_by` hold the beginning with 90 % probability.
     `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
     of this test's reading being a blunder. `material_probability` is that the change moves a first
-    frequency, or the mean of all, by more than the watch is asked to tell; less is not called.
+    frequency, or the mean of a plane, by more than the watch is asked to tell; less is not called.
     `against_baseline` tests agree with each other and not with a baseline of so few tests that it
     may be the odd one; 0 where it is not so.
     """

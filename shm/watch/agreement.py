@@ -1,9 +1,11 @@
 """Two tests that agree, whatever their clocks say and in whatever order they came.
 
-The sequential test counts its evidence in years: a change has had time to come only between two
-tests, and only tests dated before another speak for it there. A clock that hardly moves, or files
-that come in another order, would take the evidence away. So two tests next to each other, as they
-came in or by their clocks, that each read beyond the threshold to one side are told by themselves.
+The watch counts visits: a change has had time to come only between two, and only tests dated
+before another speak for it there. A clock that hardly moves, or files that come in another order,
+would take the evidence away. So where the clocks of two tests next to each other, as they came in
+or as they are dated, say that the second was no later visit, two that each read beyond the
+threshold to one side are told by themselves. Tests of two visits are the watch's to judge: it knows
+how often tests of this hanger do so without a change.
 
 One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
 thousand, and few of these read beyond a threshold, to one side and alike.
@@ -14,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import partial
 from typing import Literal
 
@@ -38,15 +40,23 @@ _PULL_STEPS = 10.0
 _SCATTER, _SCATTER_OF_STEP = 0.01, 0.2
 """Of a test beyond its errors, of the tension and of a spring's step: the most that is usual."""
 
+_APART = timedelta(days=3)
+"""Tests that far apart by their clocks are two visits."""
+
+_LEAST = 0.01
+"""Of a frequency, in the mean: decades of an end that is as good as clamped move nothing."""
+
 Way = Literal["up", "down"]
 
 
 @dataclass(frozen=True)
 class _Shown:
-    """What one test says of one quantity by itself: its coordinate, and the variance of that."""
+    """What one test says of one quantity by itself: its coordinate, the variance of that, and what
+    it moves the mean log frequency by."""
 
     mean: float
     variance: float
+    moves: float
 
 
 def agreement(
@@ -59,8 +69,8 @@ def agreement(
 ) -> Alert | None:
     """The alert of a test that is the second to show a shift beyond its threshold.
 
-    None where it shows none, no test beside it agrees, two that agree were there before it, or the
-    shift is `told` already.
+    None where it shows none, no test beside it agrees, two that agree were there before it, the
+    clocks say that it was a later visit, or the shift is `told` already.
     """
     own = _shown(reader, newest[0], hanger, options)
     if not any(own):
@@ -74,12 +84,23 @@ def agreement(
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
         runs = [_run(tests, mine, j) for tests in near]
-        others = [run[0] for run in runs if run]
+        others = [
+            run[0]
+            for run in runs
+            if run and (run[0][0].id in beside.held or not _is_later(newest[0], run[0][0]))
+        ]
         if others and not any(map(partial(_have_told, beside), runs, are_later)):
             other, shown = others[0]
             drift = _drift(quantity, newest, (mine, shown), hanger)
             return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
     return None
+
+
+def _is_later(newest: ModalTest, other: ModalTest) -> bool:
+    """Whether the newest was a later visit than the other, by their own clocks."""
+    return (
+        newest.time is not None and other.time is not None and newest.time - other.time >= _APART
+    )
 
 
 def way_of(shift: float) -> Way:
@@ -121,7 +142,8 @@ def _shown(
     for quantity, each in zip(reader.quantities, _read(reader, test, options), strict=True):
         is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity, hanger)
         is_clear = abs(each.mean) >= _CLEAR * math.sqrt(each.variance)
-        found.append(each if is_beyond and is_clear else None)
+        is_felt = each.moves >= _LEAST
+        found.append(each if is_beyond and is_clear and is_felt else None)
     return found
 
 
@@ -134,6 +156,9 @@ def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown
     if not math.isfinite(kelvin):
         kelvin = options.unknown_temperature_sd_k
     found = []
+    slopes = np.zeros(len(reader.quantities))
+    if reading.modes is not None:
+        slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
         if quantity.name == TENSION:
             scatter, per_kelvin = _SCATTER, options.tension_per_kelvin_sd
@@ -142,7 +167,8 @@ def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown
             per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
         of_both = 2 * scatter**2  # a baseline of one test scatters as much
         variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
-        found.append(_Shown(float(reading.mean[j]), variance))
+        mean = float(reading.mean[j])
+        found.append(_Shown(mean, variance, abs(mean * float(slopes[j]))))
     return found
 
 

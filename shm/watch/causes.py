@@ -134,6 +134,7 @@ class Structure:
     directions: tuple[Direction, ...]
     quantities: tuple[WatchedQuantity, ...]
     scattering: FloatArray
+    stiffening: FloatArray
     scatter_variance: FloatArray
     scales: FloatArray
 
@@ -160,7 +161,14 @@ def structure_of(
         options.spring_per_amplitude_sd_of_step * steps,
     )
     prior_sd = np.concatenate(
-        [np.ones(n), steps, per_kelvin, per_amplitude, [options.creep_per_year_sd]]
+        [
+            np.ones(n),
+            steps,
+            per_kelvin,
+            per_amplitude,
+            [options.bending_per_amplitude_sd],
+            [options.creep_per_year_sd],
+        ]
     )
     strength, axes = np.linalg.eigh(columns.sensors)
     kept = strength > _SEEN_OF_SENSORS * strength[-1]
@@ -185,6 +193,7 @@ def structure_of(
         directions=tuple(_directions(quantities, columns)),
         quantities=tuple(quantities),
         scattering=scattering,
+        stiffening=columns.by_cause[BENDING_STIFFNESS][0] / _STIFFER,
         scatter_variance=sds**2,
         scales=np.array(options.scatter_scales),
     )

@@ -88,6 +88,7 @@ class StateSums:
                 slopes,
                 slopes * warmth.kelvin[rows, None, None],
                 slopes * np.nan_to_num(level)[:, None, None],
+                self.structure.stiffening[:, None] * np.nan_to_num(level)[:, None, None],
                 slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
             ],
             axis=2,
@@ -103,8 +104,10 @@ class StateSums:
         structure, layout = self.structure, self.structure.layout
         warmth, years = self._warmth(state), state.years[rows]
         of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
-        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
-        unknown = state.slopes[rows] * (self.options.unknown_log_amplitude_sd * of_level)
+        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q + 1]
+        stiffening = np.broadcast_to(structure.stiffening[:, None], (len(rows), layout.n, 1))
+        moving = np.concatenate([state.slopes[rows], stiffening], axis=2)
+        unknown = moving * (self.options.unknown_log_amplitude_sd * of_level)
         unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
         doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
         open_left = np.concatenate([unknown, doubt], axis=2)
@@ -138,17 +141,18 @@ class StateSums:
             changing,
             self._softened(state, rows),
             state.variances[rows] + own,
+            max(int((rows < self.options.baseline_tests).sum()), 1),
         )
 
     def effects(self, state: WatchState) -> FloatArray:
-        """What a change does to each plane's first frequency and to the mean (r, n + q)."""
+        """What a change does to each plane's first frequency and to its mean (r, n + q)."""
         measured = np.isfinite(state.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
         of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
-        planes = [plane for plane, _ in self.modes]
-        firsts = [planes.index(plane) for plane in dict.fromkeys(planes)]
-        return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
+        planes = np.array([plane for plane, _ in self.modes])
+        of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
+        return np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
 
 
 def _levels(log_amplitude: FloatArray) -> FloatArray:

@@ -168,9 +168,8 @@ class Watcher:
         if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
             # How sure it is that anything changed is bounded; which cause it was is for all to say.
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-            stays = what_stays(
-                causes, self.sums.course(state, rows, causes.called), self.options.limit_years
-            )
+            course = self.sums.course(state, rows, causes.called)
+            stays = what_stays(causes, course, self.options.limit_years)
             evidence = replace(evidence, log_most=stays.log_years)
         found = self._said(state, reading, evidence, causes, stays.against_baseline)
         coefficients, coefficient_sd = self._coefficients(evidence)

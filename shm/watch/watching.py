@@ -210,7 +210,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         # It waits while there is worse to tell.
         alert, noted = notice_of(test, hanger), frozenset(wrong)
     alone = told.alone
-    if alert is None and test.change.is_baseline_alone and not alone:
+    if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
         alert, alone = _of_baseline(test, hanger), True
     stands = replace(
         _with_beyond(standing, news.beyond, test.time),

@@ -80,7 +80,7 @@ def test_a_loss_of_tension_is_told_at_its_third_test_and_what_it_is() -> None:
 
 def test_a_pin_that_loosens_is_told_as_stiffness_of_its_plane() -> None:
     loose = (*SOUND[:2], 6.5, *SOUND[3:])
-    found = _watched(SOUND, SOUND, loose, loose, loose, loose)
+    found = _watched(SOUND, SOUND, *[loose] * 6)
     alerts = alerts_of(found.watch.tests, HANGER_3)
     assert [alert.kinds for alert in alerts][-1] == ("sudden change",)
     change = alerts[-1].change
