@@ -4,8 +4,9 @@ The watch counts visits: a change has had time to come only between two, and onl
 before another speak for it there. A clock that hardly moves, or files that come in another order,
 would take the evidence away. So where the clocks of two tests next to each other, as they came in
 or as they are dated, say that the second was no later visit, two that each read beyond the
-threshold to one side are told by themselves. Tests of two visits are the watch's to judge: it knows
-how often tests of this hanger do so without a change.
+threshold to one side are told by themselves; so are those of which one is none that the watch has
+counted, being held or of planned works. Tests of two visits are the watch's to judge: it knows how
+often tests of this hanger do so without a change.
 
 One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
 thousand, and few of these read beyond a threshold, to one side and alike.
@@ -73,6 +74,7 @@ def agreement(
     clocks say that it was a later visit, or the shift is `told` already.
     """
     own = _shown(reader, newest[0], hanger, options)
+    unwatched = {*beside.held, *beside.of_works}
     if not any(own):
         return None
     near = [
@@ -87,7 +89,7 @@ def agreement(
         others = [
             run[0]
             for run in runs
-            if run and (run[0][0].id in beside.held or not _is_later(newest[0], run[0][0]))
+            if run and (run[0][0].id in unwatched or not _is_later(newest[0], run[0][0]))
         ]
         if others and not any(map(partial(_have_told, beside), runs, are_later)):
             other, shown = others[0]
