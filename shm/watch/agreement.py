@@ -100,9 +100,7 @@ def agreement(
 
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:
     """Whether the newest was a later visit than the other, by their own clocks."""
-    return (
-        newest.time is not None and other.time is not None and newest.time - other.time >= _APART
-    )
+    return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
 
 
 def way_of(shift: float) -> Way:

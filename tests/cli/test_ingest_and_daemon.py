@@ -35,7 +35,7 @@ def taken_in(
     folder = tmp_path_factory.mktemp("ingest")
     workspace = make_workspace(folder / "bridge")
     write_test(folder / "a.modes.json", workspace)
-    write_test(folder / "b.modes.json", workspace, day=30, tension=0.8)
+    write_test(folder / "b.modes.json", workspace, day=59, tension=0.8)
     write_test(folder / "c.modes.json", workspace, day=60, tension=0.8)
     (folder / "empty.csv").write_text("")
     shutil.copy(folder / "a.modes.json", folder / "again.modes.json")

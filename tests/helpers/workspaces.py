@@ -89,14 +89,15 @@ def modelled_test(name: str, hanger: Hanger, day: float = 0.0, tension: float = 
 
 
 def write_loss(folder: Path, workspace: Workspace, lost: int = 2) -> None:
-    """Writes `t0`, and of each month after it a test with a fifth less tension.
+    """Writes `t0`, and of the days up to so many months later tests with a fifth less tension.
 
-    `t1` is to be repeated, since it may be a blunder; `t2` agrees with it, which is an alert. That
-    the watch detects a change takes more than one test before it: see `write_slow_loss`.
+    `t1` is to be repeated, since it may be a blunder; `t2`, a day later, agrees with it, which is
+    an alert. That the watch detects a change takes more tests before it and later visits: see
+    `write_slow_loss`.
     """
     for number in range(1 + lost):
-        path = folder / f"t{number}.modes.json"
-        write_test(path, workspace, day=30 * number, tension=0.8 if number else 1.0)
+        path, day = folder / f"t{number}.modes.json", 29 * lost + number if number else 0
+        write_test(path, workspace, day=day, tension=0.8 if number else 1.0)
 
 
 SLOW_LOSS = (1.0, 1.0, 1.0, 1.0, 0.96, 0.92, 0.92)

@@ -210,7 +210,7 @@ def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
     adopted(begun, "point_mass")
     monkeypatch.setattr(steps, "watch_gap", lambda *a, **k: _gap_alert(*a, **k))
     for number in (2, 3):
-        spool(begun, f"t{number}", day=30 * number, tension=0.8)
+        spool(begun, f"t{number}", day=60 + number, tension=0.8)
     ingest(begun)
     with begun.store() as store:
         notice, stored = store.alerts.list_all()

@@ -120,7 +120,7 @@ def test_tests_are_watched_in_the_order_of_their_times(
 
     monkeypatch.setattr(steps, "refresh", refresh)
     for number in (1, 2, 3):
-        spool(workspace, f"t{number}", day=30 * number, tension=0.8)
+        spool(workspace, f"t{number}", day=30 + number, tension=0.8)
     ingest(workspace, lanes=3)
     with workspace.store() as store:
         assert [drift.test for drift in store.watch.list_drifts(3)] == ["t1", "t2", "t3"]
