@@ -13,7 +13,7 @@ from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_of
 from shm.report.contents import BridgeReport, Course, HangerLine
-from shm.report.hanger_status import standing_at, status_of
+from shm.report.hanger_status import findings, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
@@ -111,9 +111,8 @@ class _Kept:
                 is_first=baseline is None or point.test in baseline.tests,
                 is_called=bool(called),
                 warnings=warnings,
-                standing=standing_at(
-                    (each.alert for each in self.standing if each.alert.hanger == hanger.id),
-                    point.test,
+                standing=findings(
+                    each.alert for each in self.standing if each.alert.hanger == hanger.id
                 ),
             ),
             point.time,

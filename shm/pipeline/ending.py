@@ -20,7 +20,8 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
     level. Where no change is behind it, as of two tests that agree while their clocks left the
     watch no time for a change, the probability was low all along: the shift must have come back,
     too. A held test ends by a decision, never here; a mode that does not fit, once it does; a
-    baseline that stands alone, once another is set.
+    baseline that stands alone, once another is set. That a test is to be repeated ends with one
+    that agrees with those before and does not clearly read beyond a threshold, as it did.
     """
     if test.time <= alert.time or "held" in alert.kinds:
         return ""
@@ -29,6 +30,10 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
         return "" if stands else f"all modes of test {test.test} fit again"
     if "check the baseline" in alert.kinds and not test.change.is_baseline_alone:
         return f"test {test.test} does not speak against the baseline any more"
+    if alert.kinds in (("repeat the test",), ("tests disagree",)):
+        is_odd = test.change.outlier_probability > 0.5
+        stands = is_odd or any(each.is_clearly_beyond for each in test.drifts)
+        return "" if stands else f"test {test.test} agrees with those before it"
     if "gap" in alert.kinds and gap_stands:
         return ""
     if "gap" not in alert.kinds and not alert.drifts:

@@ -117,7 +117,7 @@ class HangerReport:
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
     hanger's description has changed since the baseline, where that moves results; `discarded` names
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
-    alerts whose condition has not ended, as far as they speak of the latest test.
+    alerts whose condition has not ended.
     """
 
     bridge: str

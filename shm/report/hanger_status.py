@@ -24,16 +24,9 @@ class Status(Enum):
     FIRST = "First test"
 
 
-def standing_at(alerts: Iterable[Alert], latest: str) -> tuple[Alert, ...]:
-    """Of alerts whose condition has not ended those that speak of the `latest` test of a hanger.
-
-    That a test was to be repeated is over once another came; a trial of the hooks says nothing.
-    """
-    return tuple(
-        each
-        for each in alerts
-        if each.kinds != ("test",) and (each.kinds != ("repeat the test",) or each.test == latest)
-    )
+def findings(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
+    """Alerts but for trials of the hooks, which say nothing of a hanger."""
+    return tuple(each for each in alerts if each.kinds != ("test",))
 
 
 def status_of(

@@ -119,6 +119,11 @@ class Drift:
         shift = math.copysign(1, way) * self.shift_mean
         return shift + NINETY_PERCENT * self.shift_sd >= self.threshold
 
+    @property
+    def is_clearly_beyond(self) -> bool:
+        """Whether all of the 90 % interval lies beyond the threshold, if anything changed."""
+        return abs(self.shift_mean) - NINETY_PERCENT * self.shift_sd >= self.threshold
+
 
 @dataclass(frozen=True)
 class Moved:

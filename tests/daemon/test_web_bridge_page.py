@@ -25,7 +25,7 @@ from shm_daemon.web.pages.bridge import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import START, make_workspace, write_loss
+from tests.helpers.workspaces import START, make_workspace, write_test
 
 
 def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlance:
@@ -44,7 +44,9 @@ def never_tested(hanger: Hanger) -> HangerGlance:
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has lost a fifth of its tension; hanger 4 was never tested."""
     workspace = make_workspace(tmp_path_factory.mktemp("page") / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
+    for day, tension in ((0, 1.0), (10, 1.0), (20, 1.0), (40, 0.8), (50, 0.8), (60, 0.8)):
+        path = workspace.spool / f"d{day}.modes.json"
+        write_test(path, workspace, day=day, tension=tension)
     ingest(workspace)
     return workspace
 

@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import steps
+from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.ending import why_over
+from shm.report.hanger_status import Status
 from shm.store import Stage, Workspace
 from shm.store.missing import missing_rows
 from shm.values import Alert
@@ -122,3 +124,21 @@ def test_a_shift_has_ended_below_half_the_level_and_never_where_that_is_unknown(
     assert bool(why_over(alert, later, hanger, gap_stands=False)) is is_over
     assert not why_over(alert, replace(later, time=NOW), hanger, gap_stands=False)
     assert not why_over(replace(alert, drifts=()), later, hanger, gap_stands=False)
+
+
+def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same(
+    bridge: Workspace,
+) -> None:
+    postman = Postman()
+    for day, tension in ((0, 1.0), (30, 0.8), (60, 0.8)):
+        take(bridge, postman, day, tension)
+    with bridge.store() as store:
+        (notice,) = store.alerts.list_all()
+        assert notice.alert.kinds == ("repeat the test",)
+        assert notice.resolution is None, "the repeated test shows what the first has shown"
+        assert hanger_lines(bridge, store)[0].status is Status.WATCH
+    for day in (65, 90):
+        take(bridge, postman, day, 1.0)
+    with bridge.store() as store:
+        assert store.alerts.list_all()[0].resolution is not None
+        assert hanger_lines(bridge, store)[0].status is Status.STEADY

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from shm.report.hanger_status import Status, standing_at, status_of
+from shm.report.hanger_status import Status, findings, status_of
 from shm.report.open_warnings import open_warnings, standing_out
 from shm.values import (
     Alert,
@@ -127,6 +127,7 @@ def test_with_an_open_warning_no_hanger_is_quiet_and_an_alert_stays_one() -> Non
         (("tests disagree",), Status.WATCH),
         (("gap",), Status.WATCH),
         (("held",), Status.WATCH),
+        (("repeat the test",), Status.WATCH),
         ((), Status.WATCH),  # what the row said is lost
         (("check the modes",), Status.CHECK),
         (("check the baseline",), Status.CHECK),
@@ -138,12 +139,10 @@ def test_beside_an_alert_that_stands_no_hanger_is_quiet(
     alert = Alert("k", 3, "t2", SINCE, "fell", (), kinds)
     quiet = [a_drift(probability=0.04)]
     for is_first in (True, False):
-        given = {"is_first": is_first, "is_called": False, "standing": standing_at([alert], "t5")}
+        given = {"is_first": is_first, "is_called": False, "standing": findings([alert])}
         assert status_of(quiet, HANGER_3, **given) is expected
 
 
-def test_that_a_test_was_to_be_repeated_stands_until_another_comes() -> None:
+def test_a_trial_of_the_hooks_says_nothing_of_a_hanger() -> None:
     notice = Alert("k", 3, "t2", SINCE, "repeat it", (), ("repeat the test",))
-    trial = Alert("k", 3, "t2", SINCE, "a trial", (), ("test",))
-    assert standing_at([notice, trial], "t2") == (notice,)
-    assert standing_at([notice, trial], "t3") == ()
+    assert findings([notice, replace(notice, kinds=("test",))]) == (notice,)
