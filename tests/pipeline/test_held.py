@@ -204,9 +204,9 @@ def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) ->
 
 @pytest.fixture
 def counting(workspace: Workspace) -> Workspace:
-    """Three good tests and a loss, each of a month: recordings 1 to 4."""
-    for number, tension in enumerate((1.0, 1.0, 0.8, 0.8)):
-        spool(workspace, f"t{number}", day(30 * number), tension)
+    """Three good tests and two of a loss, twenty days apart: recordings 1 to 5."""
+    for number, tension in enumerate((1.0, 1.0, 1.0, 0.8, 0.8)):
+        spool(workspace, f"t{number}", day(20 * number), tension)
         ingest(workspace)
     return workspace
 
@@ -215,41 +215,42 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
     """Nobody could take out the part that had come before its whole."""
     with a_flow(counting) as flow:
         store = flow.store
-        made = store.recordings.withdraw(3, "Ann", "of hanger 4", flow.clock())
+        made = store.recordings.withdraw(4, "Ann", "of hanger 4", flow.clock())
         assert (made.hold.decision, made.of_baseline, made.watched_again) == (
             Decision.WITHDRAWN,
             (),
             1,
         )
         flow.drain()
-        assert counted(store) == ["t0", "t1", "t3"]
-        assert [watch.watched.test for watch in store.watch.list_all(3)] == ["t1", "t3"]
-        assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [False, False]
-        assert {drift.test for drift in store.watch.list_drifts(3)} == {"t1", "t3"}
-        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t0", "t1", "t3"]
+        assert counted(store) == ["t0", "t1", "t2", "t4"]
+        assert [watch.watched.test for watch in store.watch.list_all(3)] == ["t1", "t2", "t4"]
+        assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [False] * 3
+        assert {drift.test for drift in store.watch.list_drifts(3)} == {"t1", "t2", "t4"}
+        assert [test.test.id for test, _ in store.posteriors.history(3)] == ["t0", "t1", "t2", "t4"]
         assert (
             len(store.posteriors.list_all(3))
             == len(store.posteriors.trend(counting.bridge.hanger(3)))
-            == 3
+            == 4
         )
         with pytest.raises(NothingThere):
-            store.posteriors.get(3, "t2")
-        recording = store.recordings.get(3)
+            store.posteriors.get(3, "t3")
+        recording = store.recordings.get(4)
         assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
         assert check_store(store, quiet).troubles == ()
         with pytest.raises(UsageError, match="does not count: it was discarded"):
-            store.recordings.withdraw(3, "Ann", "", flow.clock())
-        store.recordings.reinstate(3, "Ann", "it was of 3", flow.clock())
+            store.recordings.withdraw(4, "Ann", "", flow.clock())
+        store.recordings.reinstate(4, "Ann", "it was of 3", flow.clock())
         flow.drain()
-        assert counted(store) == ["t0", "t1", "t2", "t3"]
+        assert counted(store) == ["t0", "t1", "t2", "t3", "t4"]
         assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [
+            False,
             False,
             False,
             True,
         ]
         assert check_store(store, quiet).troubles == ()
-        with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
-            store.recordings.reinstate(3, "Ann", "", flow.clock())
+        with pytest.raises(UsageError, match="nothing of recording 4 is held or discarded"):
+            store.recordings.reinstate(4, "Ann", "", flow.clock())
 
 
 def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_shown(
@@ -257,9 +258,9 @@ def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_show
 ) -> None:
     with counting.store() as store:
         made = store.recordings.withdraw(1, "Ann", "a part", START)
-        assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 3)
+        assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 4)
         assert store.watch.baseline(3) is not None
-        assert len(store.posteriors.list_all(3)) == 3
+        assert len(store.posteriors.list_all(3)) == 4
 
 
 def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace) -> None:
