@@ -20,7 +20,6 @@ import numpy as np
 
 from shm.errors import BadInput, UsageError
 from shm.values import (
-    TENSION,
     BoolArray,
     Change,
     CreepRate,
@@ -30,6 +29,7 @@ from shm.values import (
     Reading,
     WatchedQuantity,
     WatchedTest,
+    is_ratio,
 )
 from shm.watch.causes import Columns, Structure, structure_of
 from shm.watch.change_point import (
@@ -199,8 +199,8 @@ class Watcher:
             log_amplitude=np.zeros(0),
             weight=np.zeros(0),
             counted=np.zeros(0, bool),
-            coefficients=np.zeros(q),
-            coefficient_sd=self.structure.layout.prior_sd[n + q : n + 2 * q],
+            coefficients=np.zeros(q * self.structure.thermal_laws),
+            coefficient_sd=self._prior_of_coefficients,
             scatter_variance=self.structure.scatter_variance,
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),
@@ -335,56 +335,79 @@ class Watcher:
     def _warmth(self, state: WatchState) -> Warmth:
         return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
 
-    def _doubt(self, state: WatchState, kelvin_sd: FloatArray) -> FloatArray:
-        """Factors (T, n, 1 + q) of what a temperature that is not known, or not well, leaves open:
-        what a kelvin does as far as that is known, and as far as it is not."""
-        known = state.per_kelvin + state.slopes @ state.coefficients
-        unknown = state.slopes * state.coefficient_sd
-        per_kelvin = np.concatenate([known[:, :, None], unknown], axis=2)
-        return np.asarray(kelvin_sd[:, None, None] * per_kelvin)
+    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
+        """What quantities go with, each with a coefficient of its own: kelvin, as many laws as the
+        structure has."""
+        return (self._warmth(state),)
+
+    @property
+    def _prior_of_coefficients(self) -> FloatArray:
+        first = self.structure.layout.n + self.structure.layout.q
+        count = self.structure.layout.q * self.structure.thermal_laws
+        return self.structure.layout.prior_sd[first : first + count]
+
+    def _doubt(self, state: WatchState, *, of_season: bool = False) -> FloatArray:
+        """Factors (T, n, laws (1 + q)) of what a temperature that is not known, or not well, leaves
+        open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
+        share what they miss."""
+        laws, q = self._thermal(state), self.structure.layout.q
+        parts = []
+        for law, own in enumerate(laws):
+            chosen = slice(law * q, (law + 1) * q)
+            known = state.slopes @ state.coefficients[chosen]
+            if law == 0:
+                known = state.per_kelvin + known
+            unknown = state.slopes * state.coefficient_sd[chosen]
+            per_kelvin = np.concatenate([known[:, :, None], unknown], axis=2)
+            sd = own.sd * np.sqrt(own.shared) if of_season else own.sd
+            parts.append(sd[:, None, None] * per_kelvin)
+        return np.concatenate(parts, axis=2)
 
     def _seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
-        factors, warmth = self._factors(state), self._warmth(state)
+        factors = self._factors(state)
         measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
         variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
-            values=self._at_rest(state, warmth),
+            values=self._at_rest(state),
             variances=state.variances,
-            doubt=self._doubt(state, warmth.sd),
+            doubt=self._doubt(state),
             factors=factors[measured[-1]] if len(measured) else factors[-1],
             sds=np.sqrt(variance),
         )
 
-    def _at_rest(self, state: WatchState, warmth: Warmth) -> FloatArray:
-        swing = warmth.kelvin[:, None] * (state.per_kelvin + state.slopes @ state.coefficients)
+    def _at_rest(self, state: WatchState) -> FloatArray:
+        laws, q = self._thermal(state), self.structure.layout.q
+        swing = laws[0].kelvin[:, None] * state.per_kelvin
+        for law, own in enumerate(laws):
+            coefficients = state.coefficients[law * q : (law + 1) * q]
+            swing = swing + own.kelvin[:, None] * (state.slopes @ coefficients)
         return np.asarray(state.values - swing)
 
     def _scatter(self, state: WatchState) -> FloatArray:
         """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
         rows = np.flatnonzero(state.counted)
         rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
-        warmth = self._warmth(state)
         found = differences(
-            self._at_rest(state, warmth)[rows],
+            self._at_rest(state)[rows],
             state.variances[rows],
             self._factors(state)[rows],
-            self._doubt(state, warmth.sd)[rows],
+            self._doubt(state)[rows],
         )
         return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
-        layout, warmth = self.structure.layout, self._warmth(state)
+        layout = self.structure.layout
         slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
-        tension = [each.name == TENSION for each in self.quantities]
+        creeping = [is_ratio(each.name) for each in self.quantities]
         return np.concatenate(
             [
                 np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
                 slopes,
-                slopes * warmth.kelvin[rows, None, None],
+                *(slopes * each.kelvin[rows, None, None] for each in self._thermal(state)),
                 slopes * np.nan_to_num(level)[:, None, None],
-                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+                slopes[:, :, creeping].sum(axis=2, keepdims=True) * state.years[rows, None, None],
             ],
             axis=2,
         )
@@ -397,18 +420,23 @@ class Watcher:
     def _sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
         structure, layout = self.structure, self.structure.layout
-        warmth, years = self._warmth(state), state.years[rows]
-        of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
-        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q]
+        years = state.years[rows]
+        apart = np.abs(years[:, None] - years)
+        of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
+        of_level = layout.prior_sd[-1 - layout.q : -1]
         unknown = state.slopes[rows] * (self.options.unknown_log_amplitude_sd * of_level)
         unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
-        doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
+        doubt = self._doubt(state, of_season=True)[rows]
         open_left = np.concatenate([unknown, doubt], axis=2)
         common = open_left @ np.swapaxes(open_left, 1, 2)
         factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
         spread = factors @ np.swapaxes(factors, 1, 2)
         scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
         covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
+        if structure.wander.any():
+            together = (apart < structure.wander_years).sum(axis=1)
+            slow = structure.scales[:, None, None] ** 2 * structure.wander @ structure.wander.T
+            covariance = covariance + together[:, None, None, None] * slow
         wider = 1 / state.weight[rows]
         return sums_of(
             self._columns(state, rows),
@@ -466,9 +494,9 @@ class Watcher:
         return np.vstack([of_modes[firsts], of_modes.mean(axis=0)])
 
     def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-        """How far each quantity goes with a kelvin (q,) and its sd, by the likeliest scatter."""
-        n, q = self.structure.layout.n, self.structure.layout.q
-        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + q)
+        """How far each quantity goes with a kelvin (laws q,), and its sd; by the likeliest scatter."""
+        n, count = self.structure.layout.n, len(self._prior_of_coefficients)
+        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + count)
         variance = np.diag(evidence.null_covariance[likeliest])[own]
         return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
 

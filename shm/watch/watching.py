@@ -94,7 +94,7 @@ def watch_hanger(
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
-    options = _options_of(hanger, len(baseline_tests), options)
+    options = options_of(hanger, len(baseline_tests), options)
     watch = watched(readings, reader.quantities, reader.columns, hanger, options)
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
@@ -139,7 +139,7 @@ def watch_newest(
     """
     baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
-    options = _options_of(hanger, len(baseline_tests), options)
+    options = options_of(hanger, len(baseline_tests), options)
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
@@ -166,7 +166,7 @@ def watch_newest(
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
-def _options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
+def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
     """How many tests precede every change, and how often this hanger may be called falsely."""
     own = hanger.thresholds.false_call_years
     limit_years = options.limit_years if own is None else own
