@@ -37,6 +37,7 @@ _CERTAIN = 0.995  # reads 1.00 in two decimals, which nobody may claim
 _LISTED = 3  # technical: what a list in a message bears
 _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 _HALF_WIDTH = "± is half the 90 % interval"
+_LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 
 
 def message_of(
@@ -55,6 +56,8 @@ def message_of(
     are the shifts from the baseline that the alert says to be beyond their threshold.
     """
     change = change if change and change.moved else None
+    if not hanger.is_modelled:
+        return _of_frequencies(test, hanger, change, beyond, is_call=is_call, is_further=is_further)
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
     is_odd = test.change.outlier_probability > 0.5
@@ -97,6 +100,8 @@ def message_of_agreeing(
 
 def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     """Of a test that agrees with none before it, or of so many in a row."""
+    if not hanger.is_modelled:
+        return _odd_frequencies(test, hanger, in_a_row)
     if in_a_row == 1:
         return (
             f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
@@ -227,6 +232,105 @@ def _way(group: Sequence[Moved]) -> str:
     return "changed" if len(ways) > 1 else "rose" if ways.pop() else "fell"
 
 
+# ---------------------------------------------------------------- frequencies without a model
+
+
+def structure_words(hanger: Hanger) -> str:
+    """The name of a structure that no model class describes."""
+    return hanger.name or f"structure {hanger.id}"
+
+
+def _of_frequencies(
+    test: WatchedTest,
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    *,
+    is_call: bool,
+    is_further: bool,
+) -> str:
+    """What `message_of` says of a structure of which frequencies alone are watched."""
+    parts = [
+        _frequencies_state(hanger, change, beyond, is_further=is_further),
+        action_words(hanger, change, beyond, test.drifts),
+        _when(change),
+        "Temperature, frost and excitation are taken off as far as the tests show what they do.",
+        _details(
+            _HALF_WIDTH,
+            _each_frequency(test),
+            f"probability {_probability(change.probability)} that anything changed"
+            if change
+            else "",
+            _false_alarms(change) if is_call else "",
+        ),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _frequencies_state(
+    hanger: Hanger, change: Change | None, beyond: Sequence[Drift], *, is_further: bool
+) -> str:
+    """`The frequencies of Deck have dropped by 1.2 ± 0.3 % since 2028-04-01.`"""
+    name, again = structure_words(hanger), " again" if is_further else ""
+    if beyond:
+        lead = min(beyond, key=lambda each: each.shift_mean)
+        words = _have("has", lead.shift_mean, lead.shift_sd)
+        return f"The {lead.quantity} of {name} {words}, beyond its threshold."
+    groups = probable_groups(change) if change else []
+    if change is None or not groups:
+        return f"The frequencies of {name} changed{again}; the tests do not show which."
+    first, since = groups[0][0], f"since {change.began_by:%Y-%m-%d}"
+    size = first.shift_mean, first.shift_sd
+    if first.quantity in CAUSES:
+        said = f"have{again} moved by different amounts {since}, on average by"
+        return f"The frequencies of {name} {said} {_signed(*size)}."
+    if first.together:
+        return f"The frequencies of {name} {_have(f'have{again}', *size)} {since}."
+    return f"The {first.quantity} of {name} {_have(f'has{again}', *size)} {since}."
+
+
+def frequency_words(watched: Sequence[WatchedTest], hanger: Hanger) -> str:
+    """What was detected of such a structure since its baseline, or how near that is."""
+    detected = [each.change for each in watched if each.change.called]
+    if not detected:
+        return _detected_words(watched) if watched else ""
+    told = (
+        _frequencies_state(hanger, each, (), is_further=n > 0) for n, each in enumerate(detected)
+    )
+    return " ".join(told)
+
+
+def _have(verb: str, mean: float, sd: float) -> str:
+    half = NINETY_PERCENT * sd
+    return f"{verb} {'dropped' if mean < 0 else 'risen'} by {rounded_percent(abs(mean), half)}"
+
+
+def _signed(mean: float, sd: float) -> str:
+    return rounded_percent(mean, NINETY_PERCENT * sd, "+")
+
+
+def _each_frequency(test: WatchedTest) -> str:
+    """The shift of each, as it is if it changed."""
+    told = (f"{each.quantity} {_signed(each.shift_mean, each.shift_sd)}" for each in test.drifts)
+    return ", ".join(told)
+
+
+def _odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """What `message_of_odd` says of such a structure."""
+    name = structure_words(hanger)
+    if in_a_row == 1:
+        return (
+            f"The frequencies of {name} in test {test.test} agree with no test before. Test again "
+            "within a week; this one does not count until another agrees with it. A mode may be "
+            "mistaken, a clock or a sensor wrong; or the structure has changed."
+        )
+    return (
+        f"The frequencies of {name} agreed {in_a_row} times in a row neither with those before nor "
+        "with each other. Look at sensors and clock within a week. Until then its state rests on "
+        "older tests."
+    )
+
+
 # ---------------------------------------------------------------- what to do, and how soon
 
 
@@ -241,7 +345,7 @@ def urgency_of(
     A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
     then the next planned test is soon enough to see where it goes.
     """
-    if _losses(hanger, beyond):
+    if hanger.is_modelled and _losses(hanger, beyond):
         return "today"
     slow = change is not None and change.sudden < 0.5
     near = any(each.probability > 0.5 for each in drifts)
@@ -262,6 +366,9 @@ def action_words(
 ) -> str:
     """What to do and how soon, in a sentence."""
     urgency = urgency_of(hanger, change, beyond, drifts)
+    if not hanger.is_modelled:
+        when = "within a week" if urgency == "week" else "at the next planned inspection"
+        return f"Look at the structure {when}: {_LOOK_AT}."
     if urgency == "today":
         look = _look(_gravest(beyond), change)
         return f"Repeat the hammer test today and decide on traffic until then; {look}."
