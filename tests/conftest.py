@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.postgres import Databases, postgresql_server
+from tests.helpers.quick_stores import copy_new_stores, share_compiled_statements
 
 os.environ.pop("COLUMNS", None)  # the processes of pytest-xdist set it, a single one does not
 
@@ -26,6 +27,15 @@ def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
         del os.environ["SHM_CACHE"]
     else:
         os.environ["SHM_CACHE"] = before
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_stores(tmp_path_factory) -> Iterator[None]:
+    """What each of hundreds of new stores would do alike is done once in a process."""
+    with pytest.MonkeyPatch.context() as patch:
+        copy_new_stores(patch, tmp_path_factory.mktemp("template"))
+        share_compiled_statements(patch)
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -32,7 +32,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.watch.alert_text import frequency_words
+from shm.watch.frequency_text import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.silences import said_of

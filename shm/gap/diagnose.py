@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
-from shm.gap.cross_validation import held_out, shrinkage
+from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.data_checks import doubtful, set_aside, usable
 from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
@@ -73,6 +73,7 @@ def diagnose(
     check_baseline(options.baseline, hanger)
     found = usable(tests, hanger)
     whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
+    check_hold_out(whole, options.hold_out)
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
     problem, attribution = clear.problem, clear.attribution

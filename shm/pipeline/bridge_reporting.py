@@ -12,11 +12,12 @@ import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_of
-from shm.report.contents import BridgeReport, Course, HangerLine, status_of
+from shm.report.contents import BridgeReport, Course, HangerLine
+from shm.report.hanger_status import standing_at, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
-from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
+from shm.store import BaselineGlance, Store, StoredAlert, StoredWatch, TrendPoint, Workspace
 from shm.store.checksums import of_readable
 from shm.values import TENSION, Change, Drift, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
@@ -75,6 +76,7 @@ class _Kept:
     watches: Mapping[int, StoredWatch]
     called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
+    standing: Sequence[StoredAlert]
     damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
 
@@ -87,6 +89,7 @@ class _Kept:
             of_readable(store.watch.latest, damaged),
             of_readable(store.watch.detected_changes, damaged),
             store.alerts.open_counts(),
+            store.alerts.list_standing(),
             damaged,
             warnings_of(workspace, store, hangers),
         )
@@ -108,6 +111,10 @@ class _Kept:
                 is_first=baseline is None or point.test in baseline.tests,
                 is_called=bool(called),
                 warnings=warnings,
+                standing=standing_at(
+                    (each.alert for each in self.standing if each.alert.hanger == hanger.id),
+                    point.test,
+                ),
             ),
             point.time,
             Interval.of_averaged(point.averaged),

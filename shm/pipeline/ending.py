@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
-from shm.values.rounding import NINETY_PERCENT
 
 _HALF = 0.5  # judgement: of a shift below the threshold, so much must be left of it
 
@@ -20,14 +19,16 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
     that was detected below the threshold has ended once less than half of it is left, by the same
     level. Where no change is behind it, as of two tests that agree while their clocks left the
     watch no time for a change, the probability was low all along: the shift must have come back,
-    too. A held test ends by a decision, never here; a
-    mode that does not fit, once it does.
+    too. A held test ends by a decision, never here; a mode that does not fit, once it does; a
+    baseline that stands alone, once another is set.
     """
     if test.time <= alert.time or "held" in alert.kinds:
         return ""
     if "check the modes" in alert.kinds and not alert.drifts:
         stands = any(each.is_notable for each in test.mistaken)
         return "" if stands else f"all modes of test {test.test} fit again"
+    if "check the baseline" in alert.kinds and not test.change.is_baseline_alone:
+        return f"test {test.test} does not speak against the baseline any more"
     if "gap" in alert.kinds and gap_stands:
         return ""
     if "gap" not in alert.kinds and not alert.drifts:
@@ -38,7 +39,7 @@ def why_over(alert: Alert, test: WatchedTest, hanger: Hanger, *, gap_stands: boo
         later = now.get(told.quantity)
         if later is None or not _left(told, later) < level:
             return ""
-        if alert.change is None and _may_be_beyond(told, later):
+        if alert.change is None and later.may_be_beyond(told.shift_mean):
             return ""
     return f"test {test.test} reads as the baseline does again"
 
@@ -53,12 +54,6 @@ def _left(told: Drift, later: Drift) -> float:
     return (
         0.5 * math.erfc(-off / (math.sqrt(2) * later.shift_sd)) if later.shift_sd > 0 else math.nan
     )
-
-
-def _may_be_beyond(told: Drift, later: Drift) -> bool:
-    """Whether the 90 % interval of a later shift reaches beyond the threshold, the same way."""
-    way = math.copysign(1, told.shift_mean)
-    return way * later.shift_mean + NINETY_PERCENT * later.shift_sd >= told.threshold
 
 
 def gap_stands(baseline: Posterior, current: Posterior) -> bool:

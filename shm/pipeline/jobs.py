@@ -81,6 +81,14 @@ def wait_after(attempts: int, settings: Settings) -> timedelta:
     return timedelta(seconds=min(seconds, _LONGEST_S))
 
 
+def _waits(settings: Settings) -> list[timedelta]:
+    """Those after so many failures, up to the first that is as long as any."""
+    waits = [wait_after(0, settings)]
+    while waits[-1].total_seconds() < _LONGEST_S and len(waits) < _DOUBLINGS:
+        waits.append(wait_after(len(waits), settings))
+    return waits
+
+
 @dataclass(frozen=True)
 class Jobs:
     """The jobs of a workspace, made from what its store says now."""
@@ -132,8 +140,7 @@ class Jobs:
         if taken.total() >= DELIVERIES:
             return
         ids = [delivery.id for delivery in under_way]
-        waits = [wait_after(count, self.workspace.settings) for count in range(_DOUBLINGS)]
-        now, most = self.clock(), 2 * DELIVERIES
+        now, most, waits = self.clock(), 2 * DELIVERIES, _waits(self.workspace.settings)
         due = self.store.alerts.list_due_deliveries(now, most, ids, waits, begun=True)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
         for part in self.store.alerts.list_of_messages([each.id for each in due]) if due else ():

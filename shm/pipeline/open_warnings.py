@@ -26,7 +26,7 @@ def warnings_of(
             hanger,
             baselines[hanger.id].check,
             standing_out(hanger, every, tensions),
-            latest[hanger.id].watched.mistaken if hanger.id in latest else (),
+            latest[hanger.id].watched if hanger.id in latest else None,
         )
         for hanger in hangers
         if hanger.id in baselines

@@ -24,13 +24,15 @@ from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
+from shm.report.hanger_status import standing_at
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
-from shm.watch.alert_text import frequency_words, watch_words
+from shm.watch.alert_text import watch_words
+from shm.watch.frequency_text import frequency_words
 from shm.watch.neighbours import BridgePattern
 
 
@@ -132,6 +134,7 @@ def hanger_now(
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of(store, in_force),
         warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
+        standing=standing_at((a.alert for a in alerts if a.resolution is None), latest.test.id),
     )
 
 

@@ -232,7 +232,8 @@ def works_before(
 ) -> Silence | None:
     """The maintenance window that an alert is the first to come after; None where there is none.
 
-    Not where the change is known to have begun later, or another alert came in between.
+    Not where the change is known to have begun later, or another alert came in between; that a
+    test was to be repeated is none.
     """
     ended = [
         each
@@ -247,7 +248,8 @@ def works_before(
     latest = max(ended, key=lambda each: each.until)
     if alert.change is not None and alert.change.began_after >= latest.until:
         return None
-    if any(each.time >= latest.until and each.key != alert.key for each in earlier):
+    told = [each for each in earlier if each.kinds != ("repeat the test",)]
+    if any(each.time >= latest.until and each.key != alert.key for each in told):
         return None
     return latest
 

@@ -46,7 +46,8 @@ def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
 def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside:
     """The tests that a test may agree with: two each way, as they came in and by their clocks.
 
-    What is held for its clock alone came in as any other: what it measured is in no doubt.
+    What is held for its clock alone came in as any other: what it measured is in no doubt. Tests
+    that were passed over for planned works count here alone: a loss that lasts agrees with them.
     """
     by_clock = [
         hold.recording_id
@@ -56,7 +57,13 @@ def tests_beside(store: Store, baseline: Baseline, newest: StoredTest) -> Beside
     came = store.tests.received_beside(baseline, newest, _BESIDE, by_clock)
     dated = store.tests.dated_beside(baseline, newest, _BESIDE)
     held = [each.test.id for each in (*came[0], *came[1]) if each.stage is Stage.HELD]
-    return Beside(_plain(came), _plain(dated), held)
+    watched = {each.id for each in store.watch.list_watched(baseline)}
+    of_works = {
+        each.test.id
+        for each in (*came[0], *came[1], *dated[0], *dated[1])
+        if each.id not in watched and each.stage is Stage.WATCHED
+    }
+    return Beside(_plain(came), _plain(dated), held, of_works)
 
 
 def _plain(

@@ -73,8 +73,8 @@ def traced(records: Sequence[Sequence[FloatArray]]) -> tuple[NDArray[np.uint8], 
         onsets = _onsets(record)
         for row in record:
             starts = _starts(len(row), onsets)
-            found = _signs(row, starts)
-            if found.any() and sum(map(len, places)) + len(starts) <= _MOST:
+            has_room = sum(map(len, places)) + len(starts) <= _MOST
+            if has_room and (found := _signs(row, starts)).any():
                 noise.append(np.packbits(found, axis=2))
                 places.append(np.array([(channel, len(row), each, *onsets) for each in starts]))
             channel += 1

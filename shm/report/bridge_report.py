@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from shm.documents import averaged_document, drift_document
 from shm.report import formatting
-from shm.report.contents import BridgeReport, Course, HangerLine, Status, hangers_unit
+from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
+from shm.report.hanger_status import Status
 from shm.report.intervals import Interval
 from shm.report.origin import lineage, settings
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled

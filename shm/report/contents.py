@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from enum import Enum
 from functools import cached_property
 from typing import ClassVar, Protocol
 
 from shm.identify import Dropped, Hit, Identification
+from shm.report.hanger_status import Status, status_of
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
@@ -116,7 +116,8 @@ class HangerReport:
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
     hanger's description has changed since the baseline, where that moves results; `discarded` names
-    the tests of the baseline that count no more. `warnings` are the open ones.
+    the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
+    alerts whose condition has not ended, as far as they speak of the latest test.
     """
 
     bridge: str
@@ -146,6 +147,7 @@ class HangerReport:
     redescribed: tuple[str, ...] = ()
     discarded: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    standing: tuple[Alert, ...] = ()
 
     @property
     def latest(self) -> ModalTest:
@@ -191,19 +193,6 @@ class HangerReport:
         return force_unit(*(each.mean for each in both if each))
 
 
-_WATCH_PROBABILITY = 0.5  # likelier than not
-
-
-class Status(Enum):
-    """The state of a hanger in a word."""
-
-    ALERT = "Alert"
-    WATCH = "Watch"
-    CHECK = "Check baseline"
-    STEADY = "No change"
-    FIRST = "First test"
-
-
 def status(data: HangerReport) -> Status:
     """The state that the watch gives."""
     return status_of(
@@ -212,29 +201,8 @@ def status(data: HangerReport) -> Status:
         is_first=data.baseline_tension_n is None,
         is_called=data.is_called,
         warnings=data.warnings,
+        standing=data.standing,
     )
-
-
-def status_of(
-    drifts: Sequence[Drift],
-    hanger: Hanger,
-    *,
-    is_first: bool,
-    is_called: bool,
-    warnings: Sequence[str] = (),
-) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was called.
-
-    With open `warnings` no hanger is quiet: what it is compared with may be wrong.
-    """
-    highest = max((drift.probability for drift in drifts), default=math.nan)
-    if highest >= hanger.thresholds.alert_probability:
-        return Status.ALERT
-    if highest >= _WATCH_PROBABILITY or is_called:
-        return Status.WATCH
-    if warnings:
-        return Status.CHECK
-    return Status.FIRST if is_first else Status.STEADY
 
 
 def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:

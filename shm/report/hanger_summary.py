@@ -8,15 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.report import formatting
-from shm.report.contents import HangerReport, Status, status
+from shm.report.contents import HangerReport, status
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
+from shm.report.hanger_status import WATCH_PROBABILITY, Status
 from shm.report.intervals import Interval
+from shm.report.outdated_baseline import discarded, redescribed
 from shm.report.shifts import shift_cells, threshold_cell
 from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
-from shm.watch.alert_text import action_words
+from shm.watch.alert_action import action_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -302,7 +304,12 @@ def _chosen(data: HangerReport) -> str:
 def _urgent(data: HangerReport) -> str:
     """The same action and urgency as in the alert."""
     level = data.hanger.thresholds.alert_probability
-    beyond = [drift for drift in data.drifts if drift.probability >= level]
+    beyond = [drift for drift in data.drifts if drift.probability >= level] or [
+        drift
+        for alert in data.standing
+        if "beyond threshold" in alert.kinds
+        for drift in alert.drifts
+    ]
     change = next((each.change for each in reversed(data.alerts) if each.change), None)
     match status(data):
         case Status.ALERT:
@@ -313,6 +320,9 @@ def _urgent(data: HangerReport) -> str:
                 f"{action_words(data.hanger, change, beyond, data.drifts)} Once it is explained, "
                 "set a new baseline (shm drift rebaseline)."
             )
+        case Status.WATCH if not any(each.probability >= WATCH_PROBABILITY for each in data.drifts):
+            tests = formatting.listed(list(dict.fromkeys(each.test for each in data.standing)))
+            return f"The alert of test {tests} still stands: do what it asks for."
         case Status.WATCH:
             return "Test this hanger again within a week: a shift is likelier than not."
         case Status.CHECK:
@@ -367,35 +377,3 @@ def _thermometer(data: HangerReport) -> str:
     if math.isfinite(data.latest.temperature_c):
         return ""
     return "Record the temperature with the next test: it moves the tension."
-
-
-_MOST_CHANGES = 3  # what a sentence bears
-
-
-def redescribed(data: HangerReport) -> str:
-    """That the description has changed since the baseline, and what to do; empty where not."""
-    if not data.redescribed:
-        return ""
-    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
-    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
-    number = data.hanger.id
-    return (
-        f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"{_anew(number)} "
-        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
-    )
-
-
-def discarded(data: HangerReport) -> str:
-    """That tests of the baseline count no more, and what to do; empty where all do."""
-    if not data.discarded:
-        return ""
-    names, number = ", ".join(data.discarded), data.hanger.id
-    return (
-        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
-        f"change stands on what counts no more. {_anew(number)}"
-    )
-
-
-def _anew(number: int) -> str:
-    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."

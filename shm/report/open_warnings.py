@@ -10,7 +10,8 @@ import statistics
 from collections.abc import Mapping, Sequence
 
 from shm.report.formatting import listed
-from shm.values import BaselineCheck, Hanger, RepeatedMistake, Summary
+from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
+from shm.watch.alert_text import against_baseline_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
@@ -22,12 +23,12 @@ def open_warnings(
     hanger: Hanger,
     check: BaselineCheck | None,
     neighbours: str = "",
-    mistaken: Sequence[RepeatedMistake] = (),
+    latest: WatchedTest | None = None,
 ) -> tuple[str, ...]:
     """Each a state, what to do, and why; empty where nothing is wrong.
 
-    `check` is that of the baseline, `neighbours` what `standing_out` says of it, `mistaken` the
-    modes that the latest test has wrong.
+    `check` is that of the baseline, `neighbours` what `standing_out` says of it, `latest` what the
+    watch says after the newest test.
     """
     found = []
     if check is not None and check.misfit:
@@ -44,7 +45,13 @@ def open_warnings(
         )
     if neighbours:
         found.append(neighbours)
-    notable = [each for each in mistaken if each.is_notable]
+    if latest is not None and latest.change.is_baseline_alone:
+        found.append(
+            f"The baseline of hanger {hanger.id} stands alone: "
+            f"{against_baseline_words(latest.change)} Find out what was different on its day, and "
+            "set another (`shm drift rebaseline`)."
+        )
+    notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
         since = min(each.since for each in notable)
         many = len(notable) > 1

@@ -20,7 +20,9 @@ from shm.store.tables import (
     recordings,
     selection_entries,
     selections,
+    silences,
     tests,
+    watches,
 )
 from shm.values import ForeignMode, Posterior, QualityCheck, Selection
 
@@ -42,6 +44,19 @@ hidden = sa.union(
 )
 
 
+# Tests that were passed over within a maintenance window: they were compared with nothing.
+_OF_WORKS = (
+    sa.exists()
+    .where(
+        silences.c.is_maintenance,
+        sa.or_(silences.c.hanger.is_(None), silences.c.hanger == tests.c.hanger),
+        silences.c.starts_at <= tests.c.time,
+        tests.c.time < sa.func.coalesce(silences.c.ended_at, silences.c.ends_at),
+    )
+    .correlate(tests)
+) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
+
+
 def lineage_from(row: Row[Any]) -> Lineage:
     return Lineage(row.input_sha256, row.settings_sha256, row.version)
 
@@ -54,14 +69,16 @@ def counted_tests(hanger: int | None = None) -> sa.Select[Any]:
     return query.order_by(tests.c.time, tests.c.id)
 
 
-def compared_with(baseline: Baseline) -> list[sa.ColumnElement[bool]]:
-    """Tests that were watched since a baseline."""
+def compared_with(baseline: Baseline, *, or_of_works: bool = False) -> list[sa.ColumnElement[bool]]:
+    """Tests that were watched since a baseline, `or_of_works` those that were passed over."""
     found = [
         tests.c.hanger == baseline.hanger,
         tests.c.stage == Stage.WATCHED,
         tests.c.name.not_in(baseline.posterior.tests),
         in_force(tests),
     ]
+    if not or_of_works:
+        found.append(~_OF_WORKS)
     return found if baseline.since is None else [*found, tests.c.time >= baseline.since]
 
 

@@ -55,6 +55,7 @@ _OWED = (
 _outbox = stored_alerts.add_columns(
     *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
 ).join(deliveries, deliveries.c.alert_id == alerts.c.id)
+_any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAITING))
 
 
 class Alerts(Repository):
@@ -98,13 +99,16 @@ class Alerts(Repository):
             raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
         return found[0]
 
-    def list_standing(self, hanger: int, baseline_id: int) -> tuple[StoredAlert, ...]:
-        """Alerts of a hanger against a baseline whose condition has not ended, the oldest first."""
-        query = stored_alerts.where(
-            alerts.c.hanger == hanger,
-            alerts.c.baseline_id == baseline_id,
-            resolutions.c.id.is_(None),
-        )
+    def list_standing(
+        self, hanger: int | None = None, baseline_id: int | None = None
+    ) -> tuple[StoredAlert, ...]:
+        """Alerts whose condition has not ended, the oldest first; of a hanger, against a baseline
+        where these are named."""
+        query = stored_alerts.where(resolutions.c.id.is_(None))
+        if hanger is not None:
+            query = query.where(alerts.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(alerts.c.baseline_id == baseline_id)
         with self.reading() as connection:
             return tuple(
                 stored_alert(row) for row in connection.execute(query.order_by(alerts.c.id))
@@ -225,6 +229,9 @@ class Alerts(Repository):
         Also those that would wait longer than `waits` says for so many attempts, its last for more:
         the clock was ahead when they were put off.
         """
+        with self.reading() as connection:
+            if not connection.scalar(_any_waits):  # as a rule, and what follows takes six times it
+                return ()
         at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
         counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
         too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]

@@ -198,9 +198,10 @@ class Tests(Repository):
     def dated_beside(
         self, baseline: Baseline, test: StoredTest, limit: int
     ) -> tuple[tuple[StoredTest, ...], tuple[StoredTest, ...]]:
-        """So many tests watched since a baseline before a test and after it, by time, the nearest
-        first."""
-        query = plain_tests.where(*compared_with(baseline), tests.c.id != test.id)
+        """So many tests since a baseline before a test and after it, by time, the nearest first:
+        those that were watched, and those that were passed over for planned works."""
+        compared = compared_with(baseline, or_of_works=True)
+        query = plain_tests.where(*compared, tests.c.id != test.id)
         order = sa.tuple_(tests.c.time, tests.c.id)
         return self._around(query, order, (test.time, test.id), limit)
 
@@ -210,7 +211,7 @@ class Tests(Repository):
         """The same as they came in, those among them that are held of the recordings `held`."""
         is_held = (tests.c.hanger == baseline.hanger) & (tests.c.stage == Stage.HELD)
         is_held &= tests.c.recording_id.in_(held) & in_force(tests)
-        counted = sa.and_(*compared_with(baseline))
+        counted = sa.and_(*compared_with(baseline, or_of_works=True))
         query = plain_tests.where(counted | is_held, tests.c.id != test.id)
         order = sa.tuple_(tests.c.recording_id, tests.c.id)
         return self._around(query, order, (test.recording_id, test.id), limit)

@@ -22,6 +22,7 @@ FREQUENCY = "frequency "
 """Begins the names of frequencies that are watched by themselves: `frequency transverse 1`."""
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
+_ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -125,6 +126,11 @@ class Drift:
     threshold: float
     probability: float
 
+    def may_be_beyond(self, way: float) -> bool:
+        """Whether the 90 % interval reaches beyond the threshold, to the side of the sign `way`."""
+        shift = math.copysign(1, way) * self.shift_mean
+        return shift + NINETY_PERCENT * self.shift_sd >= self.threshold
+
 
 @dataclass(frozen=True)
 class Moved:
@@ -157,7 +163,9 @@ class Change:
     ramp, given a change. `began_after` and `began_by` hold the beginning with 90 % probability.
     `moved` is everything that may have changed, the likeliest first. `outlier_probability` is that
     of this test's reading being a blunder. `material_probability` is that the change moves a first
-    frequency, or the mean of all, by more than the watch is asked to tell; less is not called.
+    frequency, or the mean of a plane, by more than the watch is asked to tell; less is not called.
+    `against_baseline` tests agree with each other and not with a baseline of so few tests that it
+    may be the odd one; 0 where it is not so.
     """
 
     evidence_years: float
@@ -169,6 +177,12 @@ class Change:
     moved: tuple[Moved, ...]
     outlier_probability: float = NAN
     material_probability: float = 1.0
+    against_baseline: int = 0
+
+    @property
+    def is_baseline_alone(self) -> bool:
+        """Whether it is the baseline that does not fit, as far as anybody can say."""
+        return self.against_baseline >= _ENOUGH_AGAINST and not self.called
 
     @property
     def called(self) -> bool:
@@ -266,6 +280,7 @@ AlertKind = Literal[
     "repeat the test",
     "tests disagree",
     "check the modes",
+    "check the baseline",
     "gap",
     "held",
     "test",
@@ -279,12 +294,14 @@ class Beside:
     as they are `dated`.
 
     Those that came may be `held` (their names) for their clock alone: what they measured counts.
-    Tests that are not watched yet are left out; each is asked of in its turn.
+    Tests that are not watched yet are left out; each is asked of in its turn. Those `of_works`
+    (their names) were passed over within a maintenance window, and so have told nothing.
     """
 
     came: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
     dated: tuple[Sequence[ModalTest], Sequence[ModalTest]] = ((), ())
     held: Collection[str] = ()
+    of_works: Collection[str] = ()
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -22,9 +23,10 @@ import numpy as np
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
-from shm.watch.posterior_summary import beyond, shift_of_mixture, threshold_of
+from shm.watch.posterior_summary import threshold_of
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
+from shm.watch.shift_mixture import beyond, shift_of_mixture
 
 _CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -35,9 +37,6 @@ _PULL_STEPS = 10.0
 
 _SCATTER, _SCATTER_OF_STEP = 0.01, 0.2
 """Of a test beyond its errors, of the tension and of a spring's step: the most that is usual."""
-
-_TOLD = 2
-"""Tests that agree: as many as that were told when the second of them came."""
 
 Way = Literal["up", "down"]
 
@@ -70,12 +69,13 @@ def agreement(
         [(test, _shown(reader, test, hanger, options)) for test in tests]
         for tests in (*beside.came, *beside.dated)
     ]
+    are_later = (False, True, False, True)
     for j, (quantity, mine) in enumerate(zip(reader.quantities, own, strict=True)):
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
         runs = [_run(tests, mine, j) for tests in near]
         others = [run[0] for run in runs if run]
-        if others and max(map(len, runs)) < _TOLD:
+        if others and not any(map(partial(_have_told, beside), runs, are_later)):
             other, shown = others[0]
             drift = _drift(quantity, newest, (mine, shown), hanger)
             return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
@@ -98,6 +98,14 @@ def _run(
             break
         found.append((test, shown))
     return found
+
+
+def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, _Shown]], are_later: bool) -> bool:
+    """Whether two tests of a run told that they agree: when the second of them came, unless works
+    were on then. The run goes away from the newest test: which are second depends on the side."""
+    names = [test.id for test, _ in run]
+    second = names[1:] if are_later else names[:-1]
+    return any(name not in beside.of_works for name in second)
 
 
 def _agree(one: _Shown, other: _Shown) -> bool:

@@ -10,15 +10,14 @@ import hashlib
 import math
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Literal
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
-    ends_words,
     factor,
     group_words,
     is_stiffness,
@@ -27,9 +26,9 @@ from shm.watch.change_words import (
     size_words,
     suspects,
     threshold_words,
+    undetected_words,
 )
-
-Urgency = Literal["next_test", "week", "today"]
+from shm.watch.frequency_text import each_frequency, frequencies_state, odd_frequencies
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
@@ -37,7 +36,6 @@ _CERTAIN = 0.995  # reads 1.00 in two decimals, which nobody may claim
 _LISTED = 3  # technical: what a list in a message bears
 _LONGEST_TEST, _DIGITS = 80, 12  # of a key's 255 characters
 _HALF_WIDTH = "± is half the 90 % interval"
-_LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 
 
 def message_of(
@@ -77,6 +75,33 @@ def message_of(
     return " ".join(part for part in parts if part)
 
 
+def _of_frequencies(
+    test: WatchedTest,
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    *,
+    is_call: bool,
+    is_further: bool,
+) -> str:
+    """What `message_of` says of a structure of which frequencies alone are watched."""
+    parts = [
+        frequencies_state(hanger, change, beyond, is_further=is_further),
+        action_words(hanger, change, beyond, test.drifts),
+        _when(change),
+        "Temperature, frost and excitation are taken off as far as the tests show what they do.",
+        _details(
+            _HALF_WIDTH,
+            each_frequency(test),
+            f"probability {_probability(change.probability)} that anything changed"
+            if change
+            else "",
+            _false_alarms(change) if is_call else "",
+        ),
+    ]
+    return " ".join(part for part in parts if part)
+
+
 def message_of_agreeing(
     drift: Drift, hanger: Hanger, tests: tuple[str, str], *, is_held: bool
 ) -> str:
@@ -101,7 +126,7 @@ def message_of_agreeing(
 def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     """Of a test that agrees with none before it, or of so many in a row."""
     if not hanger.is_modelled:
-        return _odd_frequencies(test, hanger, in_a_row)
+        return odd_frequencies(test, hanger, in_a_row)
     if in_a_row == 1:
         return (
             f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
@@ -112,6 +137,24 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
         f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
         "each other. Repeat the hammer test within a week, with the same people and sensors as at "
         "the baseline. Until then the state of this hanger rests on older tests."
+    )
+
+
+def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
+    """Of a baseline that agrees with none of the tests since."""
+    return (
+        f"Hanger {hanger.id}: {against_baseline_words(test.change)} Find out what was different on "
+        "the day of the baseline, and set another within a month (`shm drift rebaseline`). Either "
+        "the baseline was disturbed, by a load on the deck for one, or the hanger changed right "
+        "after it; no test tells which."
+    )
+
+
+def against_baseline_words(change: Change) -> str:
+    """That the baseline is the odd one."""
+    return (
+        f"the {change.against_baseline} tests since the baseline agree with each other and not "
+        "with it."
     )
 
 
@@ -134,14 +177,9 @@ def watch_words(watched: Sequence[WatchedTest]) -> str:
 def _detected_words(watched: Sequence[WatchedTest]) -> str:
     detected = [each.change for each in watched if each.change.called]
     if detected:
-        each_one = (f"{_sentence(_changed(each))} {_when(each)}" for each in detected)
+        each_one = (f"{as_sentence(_changed(each))} {_when(each)}" for each in detected)
         return f"Detected since the baseline: {' Then: '.join(each_one)}"
-    latest = watched[-1].change
-    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
-    return (
-        "No change was detected since the baseline: the evidence for one is "
-        f"{share} % of what it takes."
-    )
+    return undetected_words(watched[-1].change)
 
 
 # ---------------------------------------------------------------- the first sentence
@@ -153,7 +191,7 @@ def _state(
     """The state in a sentence of at most 25 words, with one number and its interval."""
     name = f"Hanger {hanger.id}"
     if beyond:
-        lead = _gravest(beyond)
+        lead = gravest(beyond)
         places = {
             each.quantity: (each.end, each.plane) for each in (change.moved if change else ())
         }
@@ -163,11 +201,6 @@ def _state(
     if change is None:
         return f"{name} changed{again}; its tests do not show what."
     return f"{name}{' changed again' if again else ''}: {_changed(change)}."
-
-
-def _gravest(beyond: Sequence[Drift]) -> Drift:
-    """A loss before a gain, the tension before the ends."""
-    return min(beyond, key=lambda each: (each.shift_mean > 0, each.quantity != TENSION))
 
 
 def _changed(change: Change) -> str:
@@ -230,188 +263,6 @@ def _way(group: Sequence[Moved]) -> str:
     springs = [each for each in group if len(group) == 1 or each.quantity != TENSION]
     ways = {each.shift_mean > 0 for each in springs}
     return "changed" if len(ways) > 1 else "rose" if ways.pop() else "fell"
-
-
-# ---------------------------------------------------------------- frequencies without a model
-
-
-def structure_words(hanger: Hanger) -> str:
-    """The name of a structure that no model class describes."""
-    return hanger.name or f"structure {hanger.id}"
-
-
-def _of_frequencies(
-    test: WatchedTest,
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    *,
-    is_call: bool,
-    is_further: bool,
-) -> str:
-    """What `message_of` says of a structure of which frequencies alone are watched."""
-    parts = [
-        _frequencies_state(hanger, change, beyond, is_further=is_further),
-        action_words(hanger, change, beyond, test.drifts),
-        _when(change),
-        "Temperature, frost and excitation are taken off as far as the tests show what they do.",
-        _details(
-            _HALF_WIDTH,
-            _each_frequency(test),
-            f"probability {_probability(change.probability)} that anything changed"
-            if change
-            else "",
-            _false_alarms(change) if is_call else "",
-        ),
-    ]
-    return " ".join(part for part in parts if part)
-
-
-def _frequencies_state(
-    hanger: Hanger, change: Change | None, beyond: Sequence[Drift], *, is_further: bool
-) -> str:
-    """`The frequencies of Deck have dropped by 1.2 ± 0.3 % since 2028-04-01.`"""
-    name, again = structure_words(hanger), " again" if is_further else ""
-    if beyond:
-        lead = min(beyond, key=lambda each: each.shift_mean)
-        words = _have("has", lead.shift_mean, lead.shift_sd)
-        return f"The {lead.quantity} of {name} {words}, beyond its threshold."
-    groups = probable_groups(change) if change else []
-    if change is None or not groups:
-        return f"The frequencies of {name} changed{again}; the tests do not show which."
-    first, since = groups[0][0], f"since {change.began_by:%Y-%m-%d}"
-    size = first.shift_mean, first.shift_sd
-    if first.quantity in CAUSES:
-        said = f"have{again} moved by different amounts {since}, on average by"
-        return f"The frequencies of {name} {said} {_signed(*size)}."
-    if first.together:
-        return f"The frequencies of {name} {_have(f'have{again}', *size)} {since}."
-    return f"The {first.quantity} of {name} {_have(f'has{again}', *size)} {since}."
-
-
-def frequency_words(watched: Sequence[WatchedTest], hanger: Hanger) -> str:
-    """What was detected of such a structure since its baseline, or how near that is."""
-    detected = [each.change for each in watched if each.change.called]
-    if not detected:
-        return _detected_words(watched) if watched else ""
-    told = (
-        _frequencies_state(hanger, each, (), is_further=n > 0) for n, each in enumerate(detected)
-    )
-    return " ".join(told)
-
-
-def _have(verb: str, mean: float, sd: float) -> str:
-    half = NINETY_PERCENT * sd
-    return f"{verb} {'dropped' if mean < 0 else 'risen'} by {rounded_percent(abs(mean), half)}"
-
-
-def _signed(mean: float, sd: float) -> str:
-    return rounded_percent(mean, NINETY_PERCENT * sd, "+")
-
-
-def _each_frequency(test: WatchedTest) -> str:
-    """The shift of each, as it is if it changed."""
-    told = (f"{each.quantity} {_signed(each.shift_mean, each.shift_sd)}" for each in test.drifts)
-    return ", ".join(told)
-
-
-def _odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """What `message_of_odd` says of such a structure."""
-    name = structure_words(hanger)
-    if in_a_row == 1:
-        return (
-            f"The frequencies of {name} in test {test.test} agree with no test before. Test again "
-            "within a week; this one does not count until another agrees with it. A mode may be "
-            "mistaken, a clock or a sensor wrong; or the structure has changed."
-        )
-    return (
-        f"The frequencies of {name} agreed {in_a_row} times in a row neither with those before nor "
-        "with each other. Look at sensors and clock within a week. Until then its state rests on "
-        "older tests."
-    )
-
-
-# ---------------------------------------------------------------- what to do, and how soon
-
-
-def urgency_of(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
-) -> Urgency:
-    """How soon: today for a loss beyond its threshold as surely as the owner asked to be told.
-
-    A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
-    then the next planned test is soon enough to see where it goes.
-    """
-    if hanger.is_modelled and _losses(hanger, beyond):
-        return "today"
-    slow = change is not None and change.sudden < 0.5
-    near = any(each.probability > 0.5 for each in drifts)
-    return "next_test" if slow and not beyond and not near else "week"
-
-
-def _losses(hanger: Hanger, beyond: Sequence[Drift]) -> list[Drift]:
-    """Lost tension or loosened ends that are probable, for which alone traffic is named."""
-    level = hanger.thresholds.alert_probability
-    return [each for each in beyond if each.shift_mean < 0 and each.probability >= level]
-
-
-def action_words(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
-) -> str:
-    """What to do and how soon, in a sentence."""
-    urgency = urgency_of(hanger, change, beyond, drifts)
-    if not hanger.is_modelled:
-        when = "within a week" if urgency == "week" else "at the next planned inspection"
-        return f"Look at the structure {when}: {_LOOK_AT}."
-    if urgency == "today":
-        look = _look(_gravest(beyond), change)
-        return f"Repeat the hammer test today and decide on traffic until then; {look}."
-    groups = probable_groups(change) if change else []
-    if len(groups) > 1 and not beyond:
-        return _tell_apart(groups, urgency)
-    lead = _gravest(beyond) if beyond else groups[0][0] if groups else None
-    when = "within a week" if urgency == "week" else "at the next planned date"
-    if lead is None:
-        return f"Repeat the hammer test {when}, with more modes."
-    if lead.quantity in CAUSES:
-        check = CAUSES[lead.quantity].check
-        return _sentence(f"{_before(urgency)}, {check}, then test again")
-    return f"Repeat the hammer test {when}; {_look(lead, change)}."
-
-
-def _before(urgency: Urgency) -> str:
-    return "within a week" if urgency == "week" else "before the next planned test"
-
-
-def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
-    """What shows which of several causes it was."""
-    causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
-    if not causes:
-        with_what = "a sensor near each end and more modes"
-        return f"Repeat the hammer test {_before(urgency)} with {with_what}, to see what changed."
-    check, apart_by = causes[0].check, causes[0].apart_by
-    return _sentence(f"{_before(urgency)}, {check}; then test with {apart_by}, to tell them apart")
-
-
-def _look(lead: Moved | Drift, change: Change | None) -> str:
-    """Where to look if a change of tension or of an end stays."""
-    lost = lead.shift_mean < 0
-    if lead.quantity == TENSION:
-        beside = "compare the hangers beside it (`shm drift bridge`)"
-        look = f"inspect its anchorages and the rod, and {beside}" if lost else beside
-        return f"if the {'loss' if lost else 'gain'} stays, {look}"
-    moved = {each.quantity: each for each in (change.moved if change else ())}
-    own = moved.get(lead.quantity)
-    ends = {moved[n].end for n in (lead.quantity, *own.together) if n in moved} if own else {None}
-    end = "both ends" if None in ends else ends_words(ends)
-    found = "a worn pin, a cracked plate or loose bolts" if lost else "a pin seized by rust or dirt"
-    return f"if the change stays, inspect {end} for {found}"
 
 
 # ---------------------------------------------------------------- why, and details
@@ -532,7 +383,3 @@ def _false_alarms(change: Change | None) -> str:
     if change is None:
         return ""
     return f"mean time between false alarms at least {change.limit_years:.3g} years"
-
-
-def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."

@@ -20,7 +20,7 @@ from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
 from shm.models.turnbuckles import coupled_bar
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, WatchedQuantity
-from shm.watch.change_point import Direction, Layout
+from shm.watch.change_layout import Direction, Layout
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
 
@@ -136,6 +136,7 @@ class Structure:
     directions: tuple[Direction, ...]
     quantities: tuple[WatchedQuantity, ...]
     scattering: FloatArray
+    stiffening: FloatArray
     scatter_variance: FloatArray
     scales: FloatArray
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
@@ -165,7 +166,14 @@ def structure_of(
         options.spring_per_amplitude_sd_of_step * steps,
     )
     prior_sd = np.concatenate(
-        [np.ones(n), steps, per_kelvin, per_amplitude, [options.creep_per_year_sd]]
+        [
+            np.ones(n),
+            steps,
+            per_kelvin,
+            per_amplitude,
+            [options.bending_per_amplitude_sd],
+            [options.creep_per_year_sd],
+        ]
     )
     strength, axes = np.linalg.eigh(columns.sensors)
     kept = strength > _SEEN_OF_SENSORS * strength[-1]
@@ -190,6 +198,7 @@ def structure_of(
         directions=tuple(_directions(quantities, columns)),
         quantities=tuple(quantities),
         scattering=scattering,
+        stiffening=columns.by_cause[BENDING_STIFFNESS][0] / _STIFFER,
         scatter_variance=sds**2,
         scales=np.array(options.scatter_scales),
     )

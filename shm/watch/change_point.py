@@ -24,70 +24,18 @@ from functools import cached_property
 import numpy as np
 
 from shm.values import FloatArray, IntArray
+from shm.watch.change_layout import Direction, Layout, Told
 from shm.watch.conditions import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
 SIZES = np.array([1.0, 6.0])
 """Of a change, in units of its prior: what may not be missed, and what nobody can miss."""
 
+# Judgement: nine of ten changes are just what may not be missed.
 LOG_SHARES = np.log([0.9, 0.1])
 _ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
 _A_WEEK_YEARS = 7 / 365.25
 _NEGLIGIBLE = 1e-6  # of all masses: what it adds is not told
-
-
-@dataclass(frozen=True, eq=False)
-class Direction:
-    """One way to change: `factor` (columns, r) maps r independent unit normals to the change.
-
-    `columns` are the modes (n), then the watched quantities (q). `name` is the cause's, `members`
-    the quantities that move. `log_prior` is that of this cause given a change, `may_ramp` whether
-    it may come slowly.
-    """
-
-    name: str
-    factor: FloatArray
-    members: tuple[int, ...]
-    log_prior: float
-    may_ramp: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """A called change: the test at which it began, its time, and whether it goes on.
-
-    `precision` (n + q, n + q) is that of its size before the tests after the call: which causes
-    called it.
-    """
-
-    first: int
-    years: float
-    is_ramp: bool
-    precision: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """What stands where in the columns of a test: `n` modes, `q` quantities, then covariates.
-
-    `prior_sd` (columns,) are those of the null's parameters; the quantities' own columns are no
-    part of it, since the modes' levels hold them.
-    """
-
-    n: int
-    q: int
-    prior_sd: FloatArray
-
-    @property
-    def null(self) -> IntArray:
-        """The columns of the null."""
-        covariates = np.arange(self.n + self.q, len(self.prior_sd))
-        return np.concatenate([np.arange(self.n), covariates])
-
-    @property
-    def change(self) -> slice:
-        """The columns of which a change is made."""
-        return slice(0, self.n + self.q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,12 +204,10 @@ def evidence_of(
     tests = len(years)
     suffix = [_suffix(_times(sums.square, years**k)) for k in range(3)]
     pulls = [_suffix(_times(sums.cross, years**k)) for k in range(2)]
-    null = layout.null
     mean, covariance, log_null = _null(sums, years, layout, called, suffix, pulls)
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
     beginnings = _chosen(np.arange(first, tests), most_beginnings)
-    part = layout.change
     if not len(beginnings):
         nothing = np.zeros((0, len(log_null), 2, len(directions), len(SIZES)))
         empty = np.zeros((2, 0))
@@ -269,10 +215,34 @@ def evidence_of(
             layout, tuple(directions), years, beginnings, tuple(called),
             log_null, nothing, mean, covariance, (empty, empty, empty),
         )  # fmt: skip
-    from_years = _ramp_from(years, beginnings)
-    at = [each[beginnings] for each in suffix]
-    crossed = [each[beginnings] for each in pulls]
-    since = from_years[:, None, None, None]
+    seen = _seen(years, beginnings, layout, called, (suffix, pulls), (mean, covariance))
+    waited = np.log(np.maximum(_waited(years, beginnings), 1e-12))
+    log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
+    log_mass = log_mass + waited[:, None, None, None, None]
+    return Evidence(
+        layout, tuple(directions), years, beginnings, tuple(called),
+        log_null, log_mass, mean, covariance, seen,
+    )  # fmt: skip
+
+
+def _seen(
+    years: FloatArray,
+    beginnings: IntArray,
+    layout: Layout,
+    called: Sequence[Told],
+    sums: tuple[Sequence[FloatArray], Sequence[FloatArray]],
+    of_null: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """J and v of a change at each beginning, and what the null's parameters have in common with it.
+
+    Each (2, beginnings, K, ...), a step's and a ramp's; `sums` are those of each power of the years
+    from each test on, `of_null` the mean and covariance without change.
+    """
+    null, part = layout.null, layout.change
+    mean, covariance = of_null
+    at = [each[beginnings] for each in sums[0]]
+    crossed = [each[beginnings] for each in sums[1]]
+    since = _ramp_from(years, beginnings)[:, None, None, None]
     informations, cross, responses = [], [], []
     for kind in (STEP, RAMP):
         if kind == STEP:
@@ -298,14 +268,7 @@ def evidence_of(
         informations.append(own - np.swapaxes(response, 2, 3) @ moved)
         cross.append(pull - np.einsum("bkzc,kz->bkc", response, mean))
         responses.append(response)
-    seen = (np.array(informations), np.array(cross), np.array(responses))
-    waited = np.log(np.maximum(_waited(years, beginnings), 1e-12))
-    log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
-    log_mass = log_mass + waited[:, None, None, None, None]
-    return Evidence(
-        layout, tuple(directions), years, beginnings, tuple(called),
-        log_null, log_mass, mean, covariance, seen,
-    )  # fmt: skip
+    return np.array(informations), np.array(cross), np.array(responses)
 
 
 def _null(

@@ -145,3 +145,12 @@ def threshold_words(drift: Drift) -> str:
 def beyond_words(drift: Drift) -> str:
     name = quantity_words(drift.quantity)
     return f"{name} is beyond its threshold of {threshold_words(drift)}"
+
+
+def undetected_words(latest: Change) -> str:
+    """How near the evidence for a change is to a detection."""
+    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
+    return (
+        "No change was detected since the baseline: the evidence for one is "
+        f"{share} % of what it takes."
+    )

@@ -29,12 +29,15 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
-from shm.watch.causes import UNEXPLAINED, Structure
-from shm.watch.change_point import Direction, Layout
+from shm.watch.causes import UNEXPLAINED, Columns, Structure
+from shm.watch.change_layout import Direction, Layout
+from shm.watch.change_point import Evidence
 from shm.watch.conditions import DAYS_PER_YEAR, Warmth
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
-from shm.watch.watcher import Watcher, WatchState
+from shm.watch.state_sums import StateSums
+from shm.watch.watch_state import WatchState
+from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
 # Of a frequency. Half of what stiffens concrete and asphalt by 1e-3 / K is that of the frequency:
@@ -57,13 +60,6 @@ _ALIKE_SHARE, _ALONE_SHARE, _EACH_SHARE = 0.5, 0.2, 0.3
 _RENAMED = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class FrequencyColumns:
-    """The modes (n,) of the baseline."""
-
-    modes: tuple[MeasuredMode, ...]
-
-
 class FrequencyReader:
     """Reads tests of one structure against its baseline: log frequencies beside their first level.
 
@@ -79,7 +75,8 @@ class FrequencyReader:
             raise BadInput("The first tests hold no mode.", remedy="Give tests with modes.")
         self.modes: tuple[MeasuredMode, ...] = tuple(sorted(found))
         self._level = np.array([float(np.median(found[key])) for key in self.modes])
-        self.columns = FrequencyColumns(self.modes)
+        nothing = np.zeros((len(self.modes), len(self.modes)))
+        self.columns = Columns(self.modes, {}, nothing)  # no model says what causes do
         self.quantities = tuple(map(_quantity, self.modes, self._level.tolist()))
 
     @property
@@ -167,7 +164,7 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
             _PER_KELVIN_SD * ones,
             _PER_KELVIN_OF_FROST_SD * ones,
             _PER_AMPLITUDE_SD * ones,
-            [_CREEP_PER_YEAR_SD],
+            [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
         ]
     )
     own = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
@@ -188,10 +185,24 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
         scattering=ones[:, None],
         scatter_variance=np.append(np.full(n, _SCATTER_OF_A_MODE), _SCATTER) ** 2,
         scales=np.array(options.scatter_scales),
+        stiffening=np.zeros(n),
         wander=wander,
         wander_years=_WANDER_DAYS / DAYS_PER_YEAR,
         thermal_laws=2,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencySums(StateSums):
+    """What the tests of such a structure are to the evidence."""
+
+    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
+        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
+
+    def effects(self, state: WatchState) -> FloatArray:
+        """Each frequency counts: which of them matters no model says."""
+        n = self.structure.layout.n
+        return np.hstack([np.eye(n), np.eye(n)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,13 +215,13 @@ class FrequencyWatcher(Watcher):
         found = structure_of_frequencies(len(self.quantities), self.options)
         return replace(found, quantities=self.quantities)
 
-    def _effects(self, state: WatchState) -> FloatArray:
-        """Each frequency counts: which of them matters no model says."""
-        n = self.structure.layout.n
-        return np.hstack([np.eye(n), np.eye(n)])
+    @cached_property
+    def sums(self) -> StateSums:
+        """What the tests of a state are to the evidence."""
+        return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
 
-    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
+    def _creep(self, evidence: Evidence) -> None:
+        """It is allowed for, and of no interest."""
 
 
 def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:

@@ -27,10 +27,11 @@ from shm.values import (
     Reading,
     WatchedTest,
 )
+from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
 from shm.watch.options import WatchOptions
-from shm.watch.watcher import WatchState
-from shm.watch.watching import AlertState, DatedTest, Newest, after, options_of
+from shm.watch.watch_state import WatchState
+from shm.watch.watching import DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)
 

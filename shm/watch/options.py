@@ -15,9 +15,10 @@ class WatchOptions:
     tuples are what tests may differ by beyond what identification explains: fractions of the
     tension, and shares of a spring's `step_sd`; which pair of them holds is learnt.
     Temperature coefficients have mean 0 and the sds given, of the tension a fraction per kelvin, of
-    a spring a share of its `step_sd` per kelvin. The first `baseline_tests` readings are taken to
-    precede every change. `beginnings` is how many possible beginnings of a change are kept. `most_of_one_test` is
-    the share of the limit that no test exceeds by itself, however wild.
+    a spring a share of its `step_sd` per kelvin; likewise per unit of log amplitude, of the bending
+    stiffness a share. The first `baseline_tests` readings are taken to
+    precede every change. `beginnings` is how many possible beginnings of a change are kept.
+    `most_of_one_test` is the share of the limit that no test exceeds by itself, however wild.
     """
 
     limit_years: float = 100.0
@@ -33,11 +34,12 @@ class WatchOptions:
     spring_per_kelvin_sd_of_step: float = 0.1
     tension_per_amplitude_sd: float = 0.002
     spring_per_amplitude_sd_of_step: float = 0.1
+    bending_per_amplitude_sd: float = 0.05
     creep_per_year_sd: float = 0.002
     unknown_temperature_sd_k: float = 10.0
     thermometer_sd_k: float = 1.5
     unknown_log_amplitude_sd: float = 0.5
-    least_frequency_shift: float = 0.004
+    least_frequency_shift: float = 0.006
     most_of_one_test: float = 0.2
     baseline_tests: int = 1
     beginnings: int = 60

@@ -19,18 +19,24 @@ import numpy as np
 import scipy
 
 from shm.values import FloatArray
-from shm.watch.causes import SPRINGS
+from shm.watch.causes import BENDING_STIFFNESS, SPRINGS
 from shm.watch.change_point import RAMP, Evidence
 
 _SHOWN = 0.5  # of a change: half of it or more is nearer to it than to none
 _SHOWING = 0.9  # judgement: of the tests after a change; one in ten is disturbed itself
-# Before any test, of tests without a change so many lie as far as one, along a joint's direction
-# and along any other, as if from so many tests. Judgement: windy days are one in seven; heavy
-# vehicles, sensors and mistakes together one test in thirty, which no number of tests disproves.
-_SPRINGS_SEEM, _SEEM, _AS_FROM = 0.15, 0.03, 5.0
+# Before any test, of tests without a change so many lie as far as one, as if from so many tests.
+# Judgement: joints give and wires slip on one windy day in seven, which ten calm tests do not
+# disprove; heavy vehicles, sensors and mistakes together are one test in thirty, which no number
+# of tests disproves.
+_SLIPPING = (SPRINGS, BENDING_STIFFNESS)
+_SLIPPED, _SLIPPED_AS_FROM = 0.15, 20.0
+_SEEM, _AS_FROM = 0.03, 5.0
 # Of a log frequency: no load that passes does as much, but a blunder may.
 _LARGE, _LARGE_SEEM = 0.04, 0.01
-_LEADING = 12  # technical: hypotheses that are asked, the likeliest
+# Years: vans come with tests, not with time; a long wait before two tests makes them no surer.
+_WAITED = 1 / 12
+# Hypotheses that are asked: none that others beat by 20 to 1 (technical: of so many at most).
+_LEADING, _BEATEN_NATS = 12, 3.0
 _TELLING = 0.5  # of a change: a test that is less sure of it by itself says nothing
 
 
@@ -39,23 +45,41 @@ class Course:
     """Tests mode by mode: what the evidence is the sum of.
 
     `rows` (T, n, z) are the null's columns and those of called changes, `changing` (T, n, n + q)
-    the columns of a change, `values` and `variances` (T, n), infinite where not measured.
+    the columns of a change, `values` and `variances` (T, n), infinite where not measured. The first
+    `baseline` are the baseline's.
     """
 
     rows: FloatArray
     changing: FloatArray
     values: FloatArray
     variances: FloatArray
+    baseline: int
 
 
-def most_evidence(evidence: Evidence, course: Course) -> float:
-    """Log of the years that what stays has for it: of each change no more than it has anyway, and
-    the most of all."""
-    found = -math.inf
-    for index in _likeliest(evidence):
+@dataclass(frozen=True)
+class Stays:
+    """What stays: `log_years` that it has for a change, of each no more than it has anyway and the
+    most of all; and how many tests agree with each other against a baseline that stands alone."""
+
+    log_years: float
+    against_baseline: int = 0
+
+
+def what_stays(evidence: Evidence, course: Course, limit_years: float) -> Stays:
+    """Of the likeliest changes; a baseline stands alone only where a normal law would call it."""
+    is_clear = evidence.log_evidence > math.log(limit_years)
+    found, against = -math.inf, 0
+    leading = float(evidence.log_mass.max(initial=-math.inf))
+    for n, index in enumerate(_likeliest(evidence)):
         mass = float(evidence.log_mass[index])
-        found = max(found, min(mass, _of_change(evidence, course, index)))
-    return found
+        if mass < leading - _BEATEN_NATS:
+            break
+        log_years, is_of_those_before, showing = _of_change(evidence, course, index)
+        found = max(found, min(mass, log_years))
+        first = int(evidence.beginnings[index[0]])
+        if n == 0 and first == course.baseline and is_of_those_before and is_clear:
+            against = showing
+    return Stays(found, against)
 
 
 def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
@@ -71,7 +95,10 @@ def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
     return chosen
 
 
-def _of_change(evidence: Evidence, course: Course, index: tuple[int, ...]) -> float:
+def _of_change(
+    evidence: Evidence, course: Course, index: tuple[int, ...]
+) -> tuple[float, bool, int]:
+    """Log of the years, whether those before a change being odd bounds these, how many show it."""
     at, _, kind, d, _ = index
     first = int(evidence.beginnings[at])
     begun = max((each.first for each in evidence.called), default=0)
@@ -82,20 +109,22 @@ def _of_change(evidence: Evidence, course: Course, index: tuple[int, ...]) -> fl
         expected = since / max(evidence.progress(at), 1e-12)
     is_after = np.arange(len(shown)) >= first
     before = shown[begun:first][sd[begun:first] < _TELLING]
-    after = is_after & (sd < _TELLING * expected)
+    after = is_after & (sd < _TELLING * expected) & (expected >= _SHOWN)
     least = _LARGE_SEEM if largest > _LARGE else _SEEM
-    seem = _SPRINGS_SEEM if evidence.directions[d].name == SPRINGS else least
+    slips = evidence.directions[d].name in _SLIPPING
+    seem, as_from = (_SLIPPED, _SLIPPED_AS_FROM) if slips else (least, _AS_FROM)
     does = shown[after] >= _SHOWN * expected[after]
     as_far = (before[:, None] >= _SHOWN * expected[after]).sum(axis=0)
-    odd = np.maximum((as_far + seem * _AS_FROM) / (len(before) + _AS_FROM), least)
+    odd = np.maximum((as_far + seem * as_from) / (len(before) + as_from), least)
     showing, not_showing = _SHOWING * _AS_FROM, (1 - _SHOWING) * _AS_FROM
     likely = scipy.special.betaln(showing + does.sum(), not_showing + (~does).sum())
     likely -= scipy.special.betaln(showing, not_showing)
     those_after = np.where(does, np.log(odd), np.log1p(-odd)).sum()
     early = before >= _SHOWN
-    those_before = np.where(early, math.log1p(-seem), math.log(seem)).sum()
-    waited = float(evidence.waited @ evidence.shares.sum(axis=(1, 2, 3, 4)))
-    return math.log(waited) + float(likely - np.logaddexp(those_after, those_before))
+    those_before = np.where(early, math.log1p(-_SEEM), math.log(max(seem, _SEEM))).sum()
+    waited = float(np.minimum(evidence.waited, _WAITED) @ evidence.shares.sum(axis=(1, 2, 3, 4)))
+    log_years = math.log(waited) + float(likely - np.logaddexp(those_after, those_before))
+    return log_years, bool(those_before > those_after), int(does.sum())
 
 
 def _shown(

@@ -29,12 +29,13 @@ from shm.values import (
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.options import WatchOptions
-from shm.watch.quantities import coordinate_of, shift_of, value_at
+from shm.watch.quantities import value_at
+from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
-_MOST = 120  # technical: changes that a mixture is made of, the likeliest
+_MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,8 @@ def changed(
     before: float,
     outlier: float,
     effects: FloatArray,
+    *,
+    against_baseline: int,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
     `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is
@@ -84,6 +87,7 @@ def changed(
         moved=_moved(subject.quantities, causes),
         outlier_probability=outlier,
         material_probability=_material(subject, causes, effects),
+        against_baseline=against_baseline,
     )
 
 
@@ -259,8 +263,8 @@ def drifted(
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
     threshold is averaged over all; where springs trade with the tension, and no frequency moves by
-    more than what is to be told (`effects`), nothing is beyond. As long as no test since the baseline
-    says anything, a shift is as open as before any.
+    more than what is to be told (`effects`), nothing is beyond. As long as no test since the
+    baseline says anything, a shift is as open as before any.
     """
     probability = probability_of_change(evidence, subject.options)
     evidence = causes
@@ -315,7 +319,8 @@ def _of_null(evidence: Evidence, subject: Subject) -> FloatArray:
     layout, now = evidence.layout, float(evidence.years[-1])
     own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
     creep = np.zeros((layout.q, len(layout.null)))
-    creep[[is_ratio(each.name) for each in subject.quantities], -1] = now - subject.baseline_years
+    creeping = [is_ratio(each.name) for each in subject.quantities]
+    creep[creeping, -1] = now - subject.baseline_years
     blocks = [creep]
     for each in evidence.called:
         blocks.append(own)
@@ -381,67 +386,3 @@ def _drift(
         threshold=threshold,
         probability=probability,
     )
-
-
-# Technical: exact for polynomials of degree 13.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
-_NEGLIGIBLE = 1e-7  # technical: less than the least probability that is told
-
-
-@dataclass(frozen=True)
-class Shift:
-    """Mean and sd of a shift."""
-
-    mean: float
-    sd: float
-
-
-def shift_of_mixture(
-    quantity: WatchedQuantity, weights: FloatArray, mean: FloatArray, sd: FloatArray
-) -> Shift:
-    """Of normal distributions (B,) in the coordinate; no shift at all with what `weights` leave.
-
-    By Gauss-Hermite quadrature of seven nodes in each.
-    """
-    kept = weights > _NEGLIGIBLE
-    weights = weights[kept]
-    mean, sd = mean[kept], sd[kept]
-    shifts = shift_of(quantity, mean[:, None] + sd[:, None] * _NODES)
-    first = float(weights @ shifts @ _WEIGHTS)
-    second = float(weights @ (shifts - first) ** 2 @ _WEIGHTS)
-    second += (1 - float(weights.sum())) * first**2
-    return Shift(first, math.sqrt(max(second, 0.0)))
-
-
-def beyond(
-    quantity: WatchedQuantity,
-    weights: FloatArray,
-    mean: FloatArray,
-    sd: FloatArray,
-    threshold: float,
-    least: float = 0.0,
-) -> float:
-    """Probability of a shift beyond a threshold, the likelier way, by the same mixture.
-
-    Decades of an end that is as good as clamped move nothing: what moves the frequencies' mean by
-    less than `least`, a spring's coordinate, is not beyond.
-    """
-    kept = weights > _NEGLIGIBLE
-    weights, mean = weights[kept], mean[kept]
-    sd = np.maximum(sd[kept], 1e-12)
-    low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
-    if not is_ratio(quantity.name):
-        low, high = min(low, -least), max(high, least)
-    down = float(weights @ scipy.special.ndtr((low - mean) / sd))
-    up = float(weights @ scipy.special.ndtr((mean - high) / sd))
-    return min(max(down, up), 1.0)
-
-
-def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
-    """The coordinate of a shift; infinite where the quantity's table ends before it."""
-    is_fraction = is_ratio(quantity.name)
-    value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
-    if not min(quantity.values) < value < max(quantity.values):
-        return math.copysign(math.inf, shift)
-    return coordinate_of(quantity, value)

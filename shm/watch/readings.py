@@ -24,15 +24,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.models import Model, class_of, described
-from shm.models.base import Conditions
+from shm.models import Model, class_of
 from shm.values import (
     PLANES,
     TENSION,
@@ -48,6 +47,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.causes import columns_of
+from shm.watch.linear_reading import LinearReading, SeenModes
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
     MeasuredMode,
@@ -57,15 +57,12 @@ from shm.watch.quantities import (
     shift_of,
     watched_quantities,
 )
+from shm.watch.steel_softening import softening
 
 # A frequency without a stated error is as good as a usual identification: its errors go from 1e-4
 # to 1e-3 of a frequency, and who states none is given the worse.
 _UNKNOWN_SD = 1e-3
 _FREQUENCY_ALLOWANCE = 1e-4
-# Of steel's modulus: Ledbetter and Reed (1973), Elastic properties of metals and alloys, I.
-_MODULUS_PER_KELVIN = -3e-4
-_STIFFER = 0.01
-_CLAMPED = "beam1"
 _SLOPE_STEP = 0.1
 # Far above the rounding of a log frequency, far below what a test can tell.
 _LEAST_SLOPE_STEP = 1e-7
@@ -91,56 +88,6 @@ _UNEVEN = 0.5  # of tests with a mode that seems mistaken, judgement: an end has
 _LEAST_MISTAKE = 0.006
 _ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
 _PRIOR_FREEDOM = 4.0  # judgement: stated sds are off by a factor of up to two
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The modes (n,) of a test that the baseline has too: what is measured less its own residual.
-
-    `plane` and `order` index the model's frequencies, `own` the reader's modes; `log_frequency`
-    and its `variance` are (n,).
-    """
-
-    conditions: Conditions
-    plane: IntArray
-    order: IntArray
-    own: IntArray
-    log_frequency: FloatArray
-    variance: FloatArray
-
-    def taken(self, rows: BoolArray) -> _Seen:
-        """Some of the modes."""
-        arrays = ("plane", "order", "own", "log_frequency", "variance")
-        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
-
-
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    """The likelihood about coordinates `x` (q,): residuals (n,) and slopes (n, q), both over sd."""
-
-    x: FloatArray
-    residual: FloatArray
-    slopes: FloatArray
-    pull: FloatArray
-
-    @property
-    def information(self) -> FloatArray:
-        return self.slopes.T @ self.slopes
-
-    @property
-    def cost(self) -> float:
-        """What is made small: the misfit and the pull to the baseline."""
-        return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
-
-    @property
-    def step(self) -> FloatArray:
-        """To where the cost is least, were it all linear."""
-        downhill = self.slopes.T @ self.residual - self.pull * self.x
-        return np.asarray(np.linalg.solve(self.information + np.diag(self.pull), downhill))
-
-    def gain(self, step: FloatArray) -> float:
-        """Of a step, in units of the variance."""
-        return float(step @ self.information @ step)
 
 
 class Reader:
@@ -180,7 +127,7 @@ class Reader:
         self._lowest = np.array([each.coordinates[0] for each in self.quantities])
         self._highest = np.array([each.coordinates[-1] for each in self.quantities])
         self.reference_temperature_c = mean_temperature_c(usable)
-        self._per_kelvin = self._softening(hanger)
+        self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
         self._uneven = self._unevenness()
@@ -203,8 +150,8 @@ class Reader:
         mistaken, seen = seen.own[~sound], seen.taken(sound)
         linear = self._settled(seen)
         misfit = linear.residual + linear.slopes @ linear.x
-        softening = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
-        (mean, per_kelvin), information = self._read(linear, np.array([misfit, softening]))
+        softer = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
+        (mean, per_kelvin), information = self._read(linear, np.array([misfit, softer]))
         left = None if self._is_warmth_known(test) else per_kelvin
         modes = self._by_mode(seen, linear, mistaken, is_warmth_known=left is None)
         return replace(
@@ -217,7 +164,7 @@ class Reader:
         )
 
     def _by_mode(
-        self, seen: _Seen, linear: _Linear, mistaken: IntArray, *, is_warmth_known: bool
+        self, seen: SeenModes, linear: LinearReading, mistaken: IntArray, *, is_warmth_known: bool
     ) -> ModeReading:
         """The same for each of the baseline's modes.
 
@@ -234,10 +181,10 @@ class Reader:
         slopes[seen.own] = sd[:, None] * linear.slopes
         wrong = np.zeros(n, bool)
         wrong[mistaken] = True
-        softening = np.zeros(n) if is_warmth_known else self._per_kelvin
-        return ModeReading(values, variances, slopes, softening, wrong)
+        softer = np.zeros(n) if is_warmth_known else self._per_kelvin
+        return ModeReading(values, variances, slopes, softer, wrong)
 
-    def _sound(self, seen: _Seen) -> BoolArray:
+    def _sound(self, seen: SeenModes) -> BoolArray:
         """Which modes (n,) are not mistaken: likelier good than off by anything.
 
         Each is good with its error and scatter or, seldom, anywhere. Which are mistaken is asked
@@ -257,7 +204,7 @@ class Reader:
                 found = uneven
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: _Seen, more: FloatArray) -> SoundModes:
+    def _sound_by(self, seen: SeenModes, more: FloatArray) -> SoundModes:
         """Which modes are sound where the quantities, and `more` (modes, k), may have moved."""
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
@@ -291,7 +238,7 @@ class Reader:
     def _is_warmth_known(self, test: ModalTest) -> bool:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
 
-    def _own_residual(self, tests: Sequence[_Seen]) -> FloatArray:
+    def _own_residual(self, tests: Sequence[SeenModes]) -> FloatArray:
         """Measured less predicted log frequency (modes,), over the tests.
 
         The weighted mean; of three tests or more the median of what is left of each once its own
@@ -313,30 +260,7 @@ class Reader:
             residual = np.nanmedian(table - common[:, None], axis=0)
         return np.asarray(residual)
 
-    def _softening(self, hanger: Hanger) -> FloatArray:
-        """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
-
-        Nothing where the class follows the temperature itself: it was fitted to what softens, too.
-        Where the class is expensive, that of a clamped beam: it differs by a few percent.
-        """
-        base, model = self._base, self._model
-        mild, warm = (
-            model.frequencies_at(base[None], 1, Conditions(temperature_shift_k=kelvin))
-            for kelvin in (0.0, 1.0)
-        )
-        if not np.array_equal(mild, warm):
-            return np.zeros(len(self.modes))
-        if model.expensive:
-            model = described(_CLAMPED, hanger)
-            known = dict(zip(self._model.parameter_names, base.tolist(), strict=True))
-            base = np.array([known.get(each, 1.0) for each in model.parameter_names])
-        stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
-        stiff = described(model.name, stiffer, model.priors)
-        change = log_frequencies(stiff, base[None], self.modes)
-        change = change - log_frequencies(model, base[None], self.modes)
-        return np.asarray(_MODULUS_PER_KELVIN * change[0] / _STIFFER)
-
-    def _seen(self, test: ModalTest) -> _Seen:
+    def _seen(self, test: ModalTest) -> SeenModes:
         read = (mode for mode in test.regular_modes if _is_measured(mode))
         modes = [mode for mode in read if _key(mode) in self.modes]
         own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
@@ -348,7 +272,7 @@ class Reader:
             if self._is_warmth_known(test)
             else 0.0
         )
-        return _Seen(
+        return SeenModes(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
@@ -357,7 +281,7 @@ class Reader:
             variance=sd**2 + self._allowance**2,
         )
 
-    def _settled(self, seen: _Seen) -> _Linear:
+    def _settled(self, seen: SeenModes) -> LinearReading:
         """The likelihood about where it is largest, or very nearly; steps that overshoot halve."""
         best = self._linear(np.zeros(len(self.quantities)), seen)
         step = best.step
@@ -372,7 +296,7 @@ class Reader:
                 step = step / 2
         return best
 
-    def _linear(self, x: FloatArray, seen: _Seen) -> _Linear:
+    def _linear(self, x: FloatArray, seen: SeenModes) -> LinearReading:
         """One call of the model: at `x` and to both sides of it along each coordinate.
 
         Beyond the end of a table the model stands still, and frequencies go on straight.
@@ -387,9 +311,9 @@ class Reader:
         slopes = (rise / (high - low)[:, None]).T
         sd = np.sqrt(seen.variance)
         residual = seen.log_frequency - predicted[0] - slopes @ (x - inside)
-        return _Linear(x, residual / sd, slopes / sd[:, None], self._pull)
+        return LinearReading(x, residual / sd, slopes / sd[:, None], self._pull)
 
-    def _read(self, linear: _Linear, off: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
 
         And the information (q, q) of the likelihood alone, 0 along what is not seen.
@@ -404,7 +328,7 @@ class Reader:
         information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
         return self._scale * (steps[:, kept] @ axes.T), np.asarray(information + information.T) / 2
 
-    def _predicted(self, x: FloatArray, seen: _Seen) -> FloatArray:
+    def _predicted(self, x: FloatArray, seen: SeenModes) -> FloatArray:
         """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""
         theta = np.tile(self._base, (len(x), 1))
         for quantity, columns, values in zip(self.quantities, self._columns, x.T, strict=True):

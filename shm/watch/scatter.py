@@ -17,7 +17,7 @@ from shm.values import FloatArray
 _PRIOR_TESTS = 6.0  # judgement: a dozen tests say more than what was assumed of any hanger
 _ROUNDS = 4  # technical: begun from what the tests before gave, it has nearly settled
 # Of a difference, in its own sds: up to the first all counts, from the second on nothing: what lies
-# that far is a change, and no scatter (Hampel 1974). One good difference in 370 is beyond the first.
+# that far is a change, and no scatter (Hampel 1974). One good one in 370 is beyond the first.
 _SCATTER_UP_TO, _CHANGE_FROM = 3.0, 6.0
 _ABSENT = 1e8  # technical: no log frequency differs by 1e4
 

@@ -17,13 +17,10 @@ All is derived from the sequence of tests, so that the same tests give the same 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 
-from shm.documents import value_of
-from shm.errors import BadInput
 from shm.values import (
     Alert,
     AlertKind,
@@ -32,19 +29,20 @@ from shm.values import (
     Drift,
     Hanger,
     ModalTest,
-    Plane,
     Posterior,
     Reading,
     RepeatedMistake,
     WatchedTest,
 )
 from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_text import message_of, message_of_odd, short_name
+from shm.watch.alert_state import AlertState
+from shm.watch.alert_text import message_of, message_of_baseline, message_of_odd, short_name
 from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
-from shm.watch.watcher import Watch, Watcher, WatchState, watched
+from shm.watch.watch_state import WatchState
+from shm.watch.watcher import Watch, Watcher, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -162,7 +160,9 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
         if agreed is not None:
+            two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
+            told = replace(told, agreed=told.agreed | two_told)
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
@@ -209,6 +209,9 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     if alert is None and wrong - noted:
         # It waits while there is worse to tell.
         alert, noted = notice_of(test, hanger), frozenset(wrong)
+    alone = told.alone
+    if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
+        alert, alone = _of_baseline(test, hanger), True
     stands = replace(
         _with_beyond(standing, news.beyond, test.time),
         call=call,
@@ -216,6 +219,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         odd=odd,
         mistaken=test.mistaken,
         noted=noted,
+        alone=alone,
     )
     return stands, alert
 
@@ -242,6 +246,20 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     )
 
 
+def _of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
+    """A notice of a baseline that stands alone against the tests since."""
+    kind: AlertKind = "check the baseline"
+    return Alert(
+        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message_of_baseline(test, hanger),
+        drifts=(),
+        kinds=(kind,),
+    )
+
+
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
     """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
     told, alerts = AlertState(), []
@@ -252,17 +270,25 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
 
 
 def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """What still stands at a test, its probability not below `end`; unknown ones end nothing."""
+    """What still stands at a test, its probability not below `end`; unknown ones end nothing.
+
+    What two tests that agree have told was improbable to the watch all along: it ends once the
+    shift has come back, too.
+    """
     ended = {
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
         if _probability(drift, way) < end
+        and not (
+            (drift.quantity, way) in told.agreed
+            and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
+        )
     }
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
     if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd)
-    return replace(told, beyond=beyond)
+        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=told.agreed - ended)
+    return replace(told, beyond=beyond, agreed=told.agreed - ended)
 
 
 def _probability(drift: Drift, way: Way) -> float:
@@ -355,56 +381,3 @@ def _first_moved(news: _News, test: WatchedTest) -> str:
         first = test.change.moved[0]
         return f"{first.quantity}-{way_of(first.shift_mean)}"
     return "unknown"
-
-
-@dataclass(frozen=True)
-class AlertState:
-    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
-
-    `called` are the changes that were called, told or not: after a call the sequential test speaks
-    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
-    wrong, `noted` those of them that were told.
-    """
-
-    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
-    call: datetime | None = None
-    called: tuple[Change, ...] = ()
-    odd: int = 0
-    mistaken: tuple[RepeatedMistake, ...] = ()
-    noted: frozenset[tuple[Plane, int]] = frozenset()
-
-    def to_text(self) -> str:
-        """JSON, from which `from_text` makes an equal one."""
-        return json.dumps(
-            {
-                "beyond": [[*condition, at] for condition, at in self.beyond.items()],
-                "call": self.call,
-                "called": [asdict(change) for change in self.called],
-                "odd": self.odd,
-                "mistaken": [asdict(each) for each in self.mistaken],
-                "noted": sorted(self.noted),
-            },
-            default=datetime.isoformat,
-        )
-
-    @classmethod
-    def from_text(cls, text: str) -> AlertState:
-        """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
-        if not text:
-            return cls()
-        try:
-            kept = json.loads(text)
-            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
-            return cls(
-                {(quantity, way): at for quantity, way, at in beyond},
-                kept["call"] and value_of(datetime, kept["call"]),
-                value_of(tuple[Change, ...], kept["called"]),
-                int(kept["odd"]),
-                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
-                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"what was told of a hanger cannot be read: {error!r}.",
-                remedy="Go over the hanger's tests from its baseline on.",
-            ) from error

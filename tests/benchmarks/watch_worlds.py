@@ -1,7 +1,8 @@
 """The watch over seasons whose truth its author did not write (`tests/worlds/*_seasons.py`).
 
-python tests/benchmarks/watch_worlds.py --world tied_arch --hangers 20            # a look
-python tests/benchmarks/watch_worlds.py --world tied_arch --scenarios quiet,step3 --seed 900
+python tests/benchmarks/watch_worlds.py --world tied_arch --bridges 2             # a look
+python tests/benchmarks/watch_worlds.py --scenarios quiet --bridges 9 --seed 2000 --answers a.jsonl
+python tests/benchmarks/watch_worlds.py --of a.jsonl b.jsonl --write-docs
 
 Each hanger goes through the watch as a user's would: its description, its tests, a baseline of the
 first ten or of one. Two processes. Nothing was tuned on the seeds that docs/trials quote.
@@ -19,6 +20,7 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,26 +29,25 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.stats import beta, gamma
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from docs.filling import fill_in  # noqa: E402
 from shm.bridge import load_hanger  # noqa: E402
 from shm.inference import UpdateOptions, update  # noqa: E402
 from shm.models import build  # noqa: E402
 from shm.modes_document import parse_modes  # noqa: E402
-from shm.values import TENSION, Hanger, ModalTest, Posterior  # noqa: E402
-from shm.watch import WatchOptions, watch_hanger  # noqa: E402
-from shm.watch.baseline_check import without_mistaken  # noqa: E402
+from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # noqa: E402
+from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
+from shm.watch.agreement import agreement  # noqa: E402
+from shm.watch.baseline_check import check_baseline  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
-from tests.benchmarks.drift.rivals import cusum, sound, without_swing  # noqa: E402
+from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
+from tests.benchmarks.watch_trial.report import save_figure, tables  # noqa: E402
+from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402
 
 WORLDS = ("tied_arch", "network")
-DAYS_A_YEAR = 365.25
-BEGINS = 540.0
-"""The day of every event: a baseline and a year before it, a year and a half after."""
-
 ON_A_BRIDGE = 6
 """Hangers of one bridge; a quiet one gives as many, one with an event a single one."""
 
@@ -67,6 +68,7 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "sensor": ("sensor_moved", {"size": 0.7}),
 }
 CREEP_PER_YEAR = 0.003
+PAGE = ROOT / "docs" / "trials" / "watch_trial.md"
 CACHE = Path(os.environ.get("SHM_WATCH_CACHE", ROOT / "build" / "watch_worlds"))
 
 
@@ -133,9 +135,11 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         if len(tests) < baseline_tests + 6:
             continue
         hanger = hanger_of(described.description, number)
-        first, mistaken = without_mistaken(tests[:baseline_tests], build("beam2", hanger))
-        posterior = baseline_of(first, hanger)
-        dated = [(test, test.time) for test in [*first, *tests[baseline_tests:]]]
+        first = tests[:baseline_tests]
+        check = check_baseline(first, build("beam2", hanger))
+        posterior = baseline_of(check.kept_of(first), hanger)
+        posterior = replace(posterior, baseline_check=check)
+        dated = [(test, test.time) for test in tests]
         started = time.process_time()
         watched = watch_hanger(
             posterior, dated[:baseline_tests], dated[baseline_tests:], hanger,
@@ -145,8 +149,13 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         start = tests[0].time
         days = [(t.time - start).total_seconds() / 86400 for t in tests]
         zero = described_day(season, number, tests)
-        alerts = alerts_of(watched.watch.tests, hanger)
+        alerts = [
+            *alerts_of(watched.watch.tests, hanger),
+            *agreeing(watched, dated, baseline_tests, hanger),
+        ]
+        alerts.sort(key=lambda alert: alert.time)
         by_id = {test.id: n for n, test in enumerate(tests)}
+        watched_at = [by_id[each.test] for each in watched.watch.tests]
         drift = {d.quantity: d for d in watched.latest.drifts}[TENSION]
         found.append({
             "world": world, "scenario": scenario, "seed": seed, "hanger": number,
@@ -162,15 +171,33 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
                 }
                 for a in alerts
             ],
+            "watched_at": watched_at,
             "evidence": [float(f"{t.change.evidence_years:.3g}") for t in watched.watch.tests],
             "outlier": [round(t.change.outlier_probability, 3) for t in watched.watch.tests],
             "shift": [drift.shift_mean, drift.shift_sd],
             "true_shift": true_shift(season, number),
-            "rivals": rivals(tests, np.array(days), baseline_tests),
-            "mistaken_in_baseline": [str(m) for m in mistaken],
+            "rivals": rivals(tests, np.array(days)),
+            "mistaken_in_baseline": [str(each) for each in (*check.modes, *check.tests)],
+            "misfit": check.misfit,
+            "left_out": len(check.tests),
             "seconds": seconds / max(len(tests), 1),
         })  # fmt: skip
     return found
+
+
+def agreeing(
+    watched: Watched, dated: Sequence[DatedTest], first: int, hanger: Hanger
+) -> list[Alert]:
+    """What the daemon adds where two tests agree, next to each other and after the `first`
+    ones, the baseline's: the first such alert."""
+    for n in range(first + 1, len(dated)):
+        before = [test for test, _ in reversed(dated[first:n])]
+        found = agreement(
+            watched.reader, dated[n], Beside(came=(before[:3], ())), hanger, WatchOptions(), ()
+        )
+        if found is not None:
+            return [found]
+    return []
 
 
 def described_day(season: Any, number: int, tests: Sequence[ModalTest]) -> float:
@@ -191,111 +218,6 @@ def true_shift(season: Any, number: int) -> float:
     return float(lasting[-1] / lasting[0] - 1)
 
 
-FIRST = ("transverse", 1)
-
-
-def rivals(
-    tests: Sequence[ModalTest], days: np.ndarray, baseline_tests: int
-) -> dict[str, list[float]]:
-    """CUSUM and EWMA on the first frequency, cleared of its line in the temperature, clipped."""
-    first = np.array([
-        next((np.log(m.frequency_hz) for m in t.modes if (m.plane, m.order) == FIRST), np.nan)
-        for t in tests
-    ])  # fmt: skip
-    warmth = np.array([t.temperature_c for t in tests])
-    year = (days < DAYS_A_YEAR) | (np.arange(len(days)) < 6)
-    used = year & np.isfinite(first) & np.isfinite(warmth)
-    rest = without_swing(first, warmth, used)
-    # A test without a temperature is taken at the mean.
-    plain = first - np.nanmedian(first[used])
-    rest = np.where(np.isfinite(rest), rest, plain)
-    own = rest[year & np.isfinite(rest)]
-    own = own[sound(own)]
-    scaled = np.where(year, np.nan, (rest - own.mean()) / max(own.std(ddof=1), 1e-9))
-    clipped = np.clip(scaled, -3.0, 3.0)
-    smooth, level = [], 0.0
-    for value in clipped:
-        level = level if np.isnan(value) else 0.8 * level + 0.2 * value
-        smooth.append(abs(level))
-    return {
-        "cusum": [round(float(v), 3) for v in cusum(clipped)],
-        "ewma": [round(v, 3) for v in smooth],
-    }
-
-
-def share(hits: int, count: int) -> str:
-    """A share with its 90 % interval (Clopper and Pearson)."""
-    low = beta.ppf(0.05, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.95, hits + 1, count - hits) if hits < count else 1.0
-    return f"{hits} of {count}: {hits / max(count, 1):.2f} ({low:.2f} to {high:.2f})"
-
-
-def rate(hits: int, years: float) -> str:
-    """Events a year with a 90 % interval (Garwood)."""
-    low = gamma.ppf(0.05, hits) / years if hits else 0.0
-    high = gamma.ppf(0.95, hits + 1) / years
-    return f"{hits} in {years:.0f}: {hits / years:.3f} ({low:.3f} to {high:.3f})"
-
-
-def is_alert(alert: dict[str, Any]) -> bool:
-    return any(kind != "repeat the test" for kind in alert["kinds"])
-
-
-def report(rows: Sequence[dict[str, Any]]) -> str:
-    lines = []
-    for world in WORLDS:
-        for count in sorted({r["baseline"] for r in rows}):
-            mine = [r for r in rows if r["world"] == world and r["baseline"] == count]
-            if not mine:
-                continue
-            lines.append(f"## {world}, baseline of {count}")
-            for scenario in SCENARIOS:
-                chosen = [r for r in mine if r["scenario"] == scenario]
-                if chosen:
-                    lines.append(told(scenario, chosen))
-    lines.append(f"seconds a test: {np.median([r['seconds'] for r in rows]):.4f}")
-    return "\n".join(lines)
-
-
-def told(scenario: str, rows: Sequence[dict[str, Any]]) -> str:
-    watched_from = [r["baseline"] for r in rows]
-    if scenario in ("quiet", "creep"):
-        years, false, notices = 0.0, 0, 0
-        for r, b in zip(rows, watched_from, strict=True):
-            firsts = [a["at"] for a in r["alerts"] if is_alert(a)]
-            end = r["days"][firsts[0]] if firsts else r["days"][-1]
-            years += (end - r["days"][b - 1]) / DAYS_A_YEAR
-            false += bool(firsts)
-            notices += sum(not is_alert(a) for a in r["alerts"])
-        often = f"notices {notices / years:.2f} a year"
-        return f"{scenario}: first false alarms {rate(false, years)}; {often}"
-    delays, early, named, today = [], 0, {}, 0
-    for r in rows:
-        begun = next((n for n, d in enumerate(r["days"]) if d >= BEGINS), None)
-        if begun is None:
-            continue
-        firsts = [a for a in r["alerts"] if is_alert(a)]
-        if firsts and firsts[0]["at"] < begun:
-            early += 1
-            continue
-        if not firsts:
-            delays.append(np.inf)
-            continue
-        delays.append(firsts[0]["at"] - begun + 1)
-        moved = firsts[0]["moved"]
-        first = moved[0][0] if moved else "beyond"
-        named[first] = named.get(first, 0) + 1
-        today += "today" in firsts[0]["message"]
-    delays = np.array(delays)
-    q = np.quantile(delays, [0.5, 0.9, 0.95], method="higher") if len(delays) else [np.nan] * 3
-    cover = [abs(r["true_shift"] - r["shift"][0]) <= 1.645 * r["shift"][1] for r in rows]
-    return (
-        f"{scenario}: n {len(delays)}, early {early}, tests {q[0]} / {q[1]} / {q[2]} (50/90/95 %), "
-        f"never {int(np.isinf(delays).sum())}; named {named}; today {today}; "
-        f"covers {np.mean(cover):.2f}"
-    )
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--world", default=",".join(WORLDS))
@@ -305,7 +227,9 @@ def main() -> int:
     parser.add_argument("--years", type=float, default=3.0)
     parser.add_argument("--baselines", default="10,1")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--answers", type=Path)
+    parser.add_argument("--answers", type=Path, help="keeps every hanger's outcome, a line each")
+    parser.add_argument("--of", type=Path, nargs="*", help="these answers, nothing is run")
+    parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     tasks = [
         (world, scenario, seed, int(count), given.years)
@@ -315,6 +239,9 @@ def main() -> int:
         for seed in range(given.seed, given.seed + given.bridges)
     ]
     rows: list[dict[str, Any]] = []
+    if given.of:
+        rows = [json.loads(line) for path in given.of for line in path.read_text().splitlines()]
+        tasks = []
     with ProcessPoolExecutor(given.jobs) as pool:
         for number, found in enumerate(pool.map(solved, tasks), 1):
             rows += found
@@ -322,7 +249,11 @@ def main() -> int:
             if given.answers:
                 with given.answers.open("a") as file:
                     file.writelines(json.dumps(row) + "\n" for row in found)
-    print(report(rows))
+    told = tables(rows)
+    print(told)
+    if given.write_docs:
+        fill_in(PAGE, "trial", told)
+        save_figure(rows, PAGE.parent / "figures" / "watch_delays.png")
     return 0
 
 

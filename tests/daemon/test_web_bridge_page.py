@@ -13,7 +13,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.report.contents import HangerLine, Status
+from shm.report.contents import HangerLine
+from shm.report.hanger_status import Status
 from shm.report.intervals import Interval
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger

@@ -14,7 +14,8 @@ import plotly.graph_objects as plotly
 import pytest
 
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import Status, status
+from shm.report.contents import status
+from shm.report.hanger_status import Status
 from shm.report.hanger_summary import summary
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace

@@ -18,7 +18,7 @@ import shm_daemon
 from shm.pipeline import steps
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import Status
+from shm.report.hanger_status import Status
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import check_store
 from shm.store.tables import posteriors

@@ -91,11 +91,25 @@ def modelled_test(name: str, hanger: Hanger, day: float = 0.0, tension: float = 
 def write_loss(folder: Path, workspace: Workspace, lost: int = 2) -> None:
     """Writes `t0`, and of each month after it a test with a fifth less tension.
 
-    The loss is called at `t2`: one test that shows it may be a blunder.
+    `t1` is to be repeated, since it may be a blunder; `t2` agrees with it, which is an alert. That
+    the watch detects a change takes more than one test before it: see `write_slow_loss`.
     """
     for number in range(1 + lost):
         path = folder / f"t{number}.modes.json"
         write_test(path, workspace, day=30 * number, tension=0.8 if number else 1.0)
+
+
+SLOW_LOSS = (1.0, 1.0, 1.0, 1.0, 0.96, 0.92, 0.92)
+
+
+def write_slow_loss(folder: Path, workspace: Workspace) -> None:
+    """Writes `t0` to `t6`, one a month, whose loss no two tests tell before `t6`.
+
+    Then the watch detects it and is sure that it is beyond the threshold: one alert.
+    """
+    for number, tension in enumerate(SLOW_LOSS):
+        path = folder / f"t{number}.modes.json"
+        write_test(path, workspace, day=30 * (number - 4), tension=tension)
 
 
 def put(path: Path, content: str | bytes) -> None:

@@ -213,11 +213,10 @@ def test_a_gap_that_opens_with_a_loss_of_tension_is_the_same_alert(
         spool(begun, f"t{number}", day=30 * number, tension=0.8)
     ingest(begun)
     with begun.store() as store:
-        (stored,) = store.alerts.list_all()
-    assert stored.alert.key.startswith(
-        "hanger-3:beyond-threshold+sudden-change:tension-down:t3:gap-up:baseline-"
-    )
-    assert stored.alert.kinds == ("beyond threshold", "sudden change", "gap")
+        notice, stored = store.alerts.list_all()
+    assert (notice.alert.test, notice.alert.kinds) == ("t2", ("repeat the test",))
+    assert stored.alert.key.startswith("hanger-3:two-tests-agree:tension-down:t3:gap-up:baseline-")
+    assert stored.alert.kinds == ("beyond threshold", "gap")
     assert "tension fell by" in stored.alert.message
     assert stored.alert.message.endswith("The gap opened.")
 

@@ -18,7 +18,8 @@ from shm.pipeline import rebaselining
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.rebaselining import Order, rebaseline
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import Status, status
+from shm.report.contents import status
+from shm.report.hanger_status import Status
 from shm.report.hanger_summary import summary
 from shm.store import Workspace
 from shm.values import ModalTest, Plane, Posterior

@@ -27,7 +27,14 @@ from shm.store import DeliveryState, Stage, Workspace
 from shm.store.stored_tests import Tests
 from shm.values import AddedMass, ModalTest, Posterior
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
-from tests.helpers.workspaces import START, make_workspace, put, write_loss, write_test
+from tests.helpers.workspaces import (
+    START,
+    make_workspace,
+    put,
+    write_loss,
+    write_slow_loss,
+    write_test,
+)
 
 
 def spool(workspace: Workspace, name: str, **values: float) -> None:
@@ -99,7 +106,7 @@ def test_the_baseline_waits_for_a_file_that_is_slow_to_identify(
 def test_tests_are_watched_in_the_order_of_their_times(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Three tests show a loss, the first is slow to update: the second in time calls it still."""
+    """Three tests show a loss, the first is slow to update: the second in time tells it still."""
     spool(workspace, "t0", day=0)
     ingest(workspace)
     quick, done = steps.refresh, threading.Event()
@@ -117,7 +124,10 @@ def test_tests_are_watched_in_the_order_of_their_times(
     ingest(workspace, lanes=3)
     with workspace.store() as store:
         assert [drift.test for drift in store.watch.list_drifts(3)] == ["t1", "t2", "t3"]
-        assert [stored.alert.test for stored in store.alerts.list_all()] == ["t2"]
+        assert [(each.alert.test, each.alert.kinds) for each in store.alerts.list_all()] == [
+            ("t1", ("repeat the test",)),
+            ("t2", ("beyond threshold",)),
+        ]
 
 
 def test_several_first_tests_make_the_baseline_together(tmp_path: Path) -> None:
@@ -160,18 +170,35 @@ def test_a_lost_tension_is_told_once_to_each_hook_and_names_the_test_that_calls_
     postman = Postman()
     ingest(workspace, notifier=postman, lanes=3)
     with workspace.store() as store:
-        (stored,) = store.alerts.list_all()
-        assert stored.alert.test == "t2"
-        assert stored.alert.key == (
-            "hanger-3:beyond-threshold+sudden-change:tension-down:t2:baseline-1"
-        )
-        assert postman.told == [("mail", stored.alert.key)]
-        assert [each.state for each in store.alerts.list_deliveries()] == [DeliveryState.DELIVERED]
+        stored = [each.alert for each in store.alerts.list_all()]
+        assert [each.key for each in stored] == [
+            "hanger-3:repeat-the-test:t1:baseline-1",
+            "hanger-3:two-tests-agree:tension-down:t2:baseline-1",
+        ]
+        assert [each.test for each in stored] == ["t1", "t2"]
+        assert postman.told == [("mail", each.key) for each in stored]
+        assert {each.state for each in store.alerts.list_deliveries()} == {DeliveryState.DELIVERED}
         assert len(store.watch.list_drifts(3)) == 3
 
 
+def test_a_slow_loss_is_told_once_by_the_test_that_detects_it_beyond_its_threshold(
+    workspace: Workspace,
+) -> None:
+    write_slow_loss(workspace.spool, workspace)
+    postman = Postman()
+    ingest(workspace, notifier=postman, lanes=3)
+    with workspace.store() as store:
+        (stored,) = store.alerts.list_all()
+        assert stored.alert.key == (
+            "hanger-3:beyond-threshold+slow-drift:tension-down:t6:baseline-1"
+        )
+        assert postman.told == [("mail", stored.alert.key)]
+        assert [each.state for each in store.alerts.list_deliveries()] == [DeliveryState.DELIVERED]
+        assert len(store.watch.list_drifts(3)) == 6
+
+
 def test_without_a_notifier_alerts_wait_in_the_outbox(workspace: Workspace) -> None:
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
     postman = Postman()
     ingest(workspace, notifier=postman)
@@ -184,7 +211,7 @@ def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(tmp_path:
         hooks={"mail": ["true"]},
         settings={"hook_attempts": 3, "hook_backoff_seconds": 10.0},
     )
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     clock, postman, waits = Clock(), Postman(failures=99), []
     with a_flow(workspace, clock=clock, notifier=postman) as flow:
         receive_all(flow)
@@ -201,7 +228,7 @@ def test_a_hook_that_fails_is_tried_again_ever_later_and_then_given_up(tmp_path:
 
 
 def test_a_hook_that_recovers_is_told(workspace: Workspace) -> None:
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     clock, postman = Clock(), Postman(failures=1)
     with a_flow(workspace, clock=clock, notifier=postman) as flow:
         receive_all(flow)
@@ -216,7 +243,7 @@ def test_a_hook_that_recovers_is_told(workspace: Workspace) -> None:
 def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
     workspace: Workspace,
 ) -> None:
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     ahead = 400 * 86400.0
     clock, postman = Clock(), Postman(failures=1)
     clock.pass_by(ahead)
@@ -231,7 +258,7 @@ def test_an_alert_raised_while_the_clock_was_ahead_is_told_once_it_is_right(
 
 
 def test_a_hook_that_is_no_longer_described_fails_and_says_so(workspace: Workspace) -> None:
-    write_loss(workspace.spool, workspace)
+    write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
     bare = replace(workspace, bridge=replace(workspace.bridge, hooks=()))
     ingest(bare, notifier=Postman())
@@ -322,7 +349,7 @@ def test_a_flow_ended_after_any_turn_goes_on_where_it_stood(workspace: Workspace
         assert [a.alert for a in store.alerts.list_all()] == [
             a.alert for a in expected.alerts.list_all()
         ]
-        assert [a.alert.test for a in store.alerts.list_all()] == ["t2"]
+        assert [a.alert.test for a in store.alerts.list_all()] == ["t1", "t2"]
 
 
 def test_a_fault_of_ours_refuses_the_file_and_the_rest_goes_on(

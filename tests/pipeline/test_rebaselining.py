@@ -131,8 +131,9 @@ def test_the_sampler_itself_takes_such_an_order(history: Workspace) -> None:
 def test_a_baseline_over_a_called_change_is_known_as_such(
     history: Workspace, hints: list[Posterior]
 ) -> None:
-    for day in (61, 91):  # a loss that two tests have told is detected by the third
-        spool(history, day, 0.9)
+    # What two tests have told is detected with a third, and more than one before it.
+    for day, tension in ((10, 1.0), (20, 1.0), (61, 0.9), (91, 0.9)):
+        spool(history, day, tension)
     ingest(history)
     with history.store() as store:
         (called,) = changes_within(store, 3, START)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -73,12 +74,34 @@ def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_
             assert missing_rows(connection) == ()
     take(bridge, postman, 60, 0.8)
     take(bridge, postman, 90, 0.8)
-    assert len(postman.told) == 1
+    # The first asks to repeat the test that fits none before it.
+    assert [key.split(":")[1] for _, key in postman.told] == ["repeat-the-test", "two-tests-agree"]
     with bridge.store() as store:
-        (raised,) = store.alerts.list_all()
+        raised = store.alerts.list_all()[-1]
     said = raised.alert.message
     assert "Planned works lie in between (new pin)" in said
     assert f"--since {period[1]:%Y-%m-%d}" in said
+
+
+@pytest.mark.parametrize("days", [(40,), (20, 40)])
+def test_a_loss_that_lasts_beyond_a_maintenance_window_is_told_once_at_the_first_test_after_it(
+    bridge: Workspace, days: Sequence[int]
+) -> None:
+    postman = Postman()
+    take(bridge, postman, 0, 1.0)
+    with bridge.store() as store:
+        period = START + timedelta(days=10), START + timedelta(days=50)
+        store.silences.make(3, period, "Ann", "new pin", START, is_maintenance=True)
+    for day in days:
+        take(bridge, postman, day, 0.8)
+    assert postman.told == []
+    for day in (60, 90, 120, 150):
+        take(bridge, postman, day, 0.8)
+    with bridge.store() as store:
+        (raised,) = (each.alert for each in store.alerts.list_all())
+    assert [key for _, key in postman.told] == [raised.key]
+    assert raised.test == "d60"
+    assert "Planned works lie in between (new pin)" in raised.message
 
 
 @pytest.mark.parametrize(

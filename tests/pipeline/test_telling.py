@@ -204,7 +204,8 @@ def test_what_nobody_acknowledged_is_escalated_once_within_a_minute_of_its_time(
     bridge: Workspace, clock: Clock, inbox: Inbox
 ) -> None:
     raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, HOUR - 10.0, 10.0)
+    live(bridge, clock, inbox, HOUR - 120.0, 60.0)
+    live(bridge, clock, inbox, 110.0, 10.0)
     assert inbox.of("boss") == []
     live(bridge, clock, inbox, 70.0, 10.0)
     assert [each.key for each in inbox.of("boss")] == ["hanger-7:h7-1"]

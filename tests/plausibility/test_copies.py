@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import timedelta
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +33,17 @@ PLAIN = Candidate(
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 
 
+@cache
 def a_recording(seed: int = 1, hits: int = 3, noise_m_s2: float = 0.002) -> Recording:
     plan = HammerPlan(hits=hits, acceleration_noise_m_s2=noise_m_s2)
     return hammer_test(HANGER_3, STATE, plan, np.random.default_rng(seed), time=START, source="s")
+
+
+@cache
+def print_of(seed: int = 1, hits: int = 3, noise_m_s2: float = 0.002) -> Fingerprint:
+    found = fingerprint_of([a_recording(seed, hits, noise_m_s2)])
+    assert found is not None
+    return found
 
 
 def changed(recording: Recording, change: Callable[[Channel], Channel]) -> Recording:
@@ -94,9 +103,8 @@ COPIES: dict[str, Callable[[Recording], Recording]] = {
 @pytest.mark.parametrize("hits", [1, 3])
 @pytest.mark.parametrize("how", COPIES)
 def test_a_copy_is_known(how: str, hits: int) -> None:
-    original = a_recording(seed=2, hits=hits)  # it has hit before the 0.6 s
-    own, copy = fingerprint_of([original]), fingerprint_of([COPIES[how](original)])
-    assert own is not None
+    original = a_recording(2, hits)  # it has hit before the 0.6 s
+    own, copy = print_of(2, hits), fingerprint_of([COPIES[how](original)])
     assert copy is not None
     assert is_copy(copy, own)
     assert is_copy(own, copy)
@@ -105,10 +113,9 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
 @pytest.mark.parametrize("hits", [1, 3])
 @pytest.mark.parametrize("how", KNOWN)
 def test_a_copy_that_was_altered_a_little_is_known(how: str, hits: int) -> None:
-    original = a_recording(seed=2, hits=hits)
+    original = a_recording(2, hits)
     altered = KNOWN[how](replace(original, time=START + timedelta(days=30)))
-    own, copy = fingerprint_of([original]), fingerprint_of([altered])
-    assert own is not None
+    own, copy = print_of(2, hits), fingerprint_of([altered])
     assert copy is not None
     assert is_copy(copy, own)
     assert is_copy(own, copy)
@@ -123,13 +130,18 @@ def test_an_altered_copy_is_named_with_the_file_that_it_is_of() -> None:
 
 
 def candidate(own: Recording, *known: KnownSamples) -> Candidate:
-    return replace(PLAIN, fingerprint=fingerprint_of([own]), copies=known)
+    return replace(PLAIN, fingerprint=_print(own), copies=known)
 
 
 def known(number: int, recording: Recording, counts: bool = True) -> KnownSamples:
-    print_ = fingerprint_of([recording])
-    assert print_ is not None
+    print_ = _print(recording)
     return KnownSamples(f"f{number} (recording {number})", 3, print_, number, counts)
+
+
+def _print(recording: Recording) -> Fingerprint:
+    found = print_of() if recording is a_recording() else fingerprint_of([recording])
+    assert found is not None
+    return found
 
 
 def state_of(own: Recording, *others: KnownSamples) -> tuple[str, tuple[int, ...]]:
@@ -202,8 +214,8 @@ def test_what_counts_is_named_before_what_is_held_and_what_has_most_before_the_r
 @pytest.mark.parametrize("noise_m_s2", [0.002, 2e-5])
 @pytest.mark.parametrize("hits", [1, 3])
 def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: float) -> None:
-    prints = [fingerprint_of([a_recording(seed, hits, noise_m_s2)]) for seed in range(8)]
-    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
+    prints = [print_of(seed, hits, noise_m_s2) for seed in range(8)]
+    pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i]]
     assert len(pairs) == 28
     assert not any(is_copy(*pair) for pair in pairs)
 
@@ -242,8 +254,7 @@ def test_each_hit_of_a_recording_is_a_copy_of_it_but_not_of_another_hit() -> Non
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
     assert len(pairs) == 3
     assert not any(is_copy(*pair) for pair in pairs)
-    own = fingerprint_of([whole])
-    assert own is not None
+    own = print_of()
     assert all(hit is not None and is_copy(hit, own) and is_copy(own, hit) for hit in prints)
 
 
@@ -265,9 +276,7 @@ def test_the_digest_is_that_of_the_numbers_alone() -> None:
         for how in ("another header", "other order")
         if (found := fingerprint_of([COPIES[how](one)]))
     }
-    own, other = fingerprint_of([one]), fingerprint_of([a_recording(2)])
-    assert own is not None
-    assert other is not None
+    own, other = print_of(), print_of(2)
     assert digests == {own.digest}
     assert other.digest != own.digest
 
@@ -311,8 +320,7 @@ def test_a_hum_alone_is_known_by_its_numbers() -> None:
 
 
 def test_a_print_of_before_shapes_had_places_tells_by_its_digest() -> None:
-    own = fingerprint_of([a_recording()])
-    assert own is not None
+    own = print_of()
     old = np.ones((4, 256), dtype=np.float32) / 16
     assert is_copy(own, Fingerprint(own.digest, old))
     assert not is_copy(own, Fingerprint("0" * 64, old))

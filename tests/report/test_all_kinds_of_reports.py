@@ -22,10 +22,10 @@ from shm.report.contents import (
     HangerLine,
     HangerReport,
     ModalTestReport,
-    Status,
     TrendRow,
 )
 from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_status import Status
 from shm.report.intervals import Interval
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.period import Period

@@ -23,14 +23,16 @@ KEPT = Path(__file__).parent / "data" / "captions.txt"
 
 def written(season: HangerReport, bare: HangerReport) -> str:
     """Caption and description of each figure of each report, for data that have it."""
+    warned, ambient = (Shown.of(SHEETS[case]()) for case in ("warned", "ambient"))
+    score = make_score("plausible")
     shown: list[tuple[str, Any, Any]] = [
-        *(("test", each, Shown.of(SHEETS["warned"]())) for each in OF_MODAL_TEST),
-        *(("ambient test", each, Shown.of(SHEETS["ambient"]())) for each in OF_MODAL_TEST),
+        *(("test", each, warned) for each in OF_MODAL_TEST),
+        *(("ambient test", each, ambient) for each in OF_MODAL_TEST),
         *((f"diagnosis, {case}", each, sheet(case)) for case in ("blunder", "alike")
           for each in OF_DIAGNOSIS),
         *(("season", each, season) for each in OF_HANGER),
         *(("first test", each, bare) for each in OF_HANGER),
-        *(("trial", each, make_score("plausible")) for each in OF_TRIAL),
+        *(("trial", each, score) for each in OF_TRIAL),
     ]  # fmt: skip
     return "\n".join(
         line

@@ -14,13 +14,14 @@ from shm import notebook
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
-from shm.report.contents import BridgeReport, DiagnosisSheet, HangerLine, HangerReport, Status
+from shm.report.contents import BridgeReport, DiagnosisSheet, HangerLine, HangerReport
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.report.figures.every_figure import hanger_figures
 from shm.report.figures.gap_before_and_after import GAP_TENSION
 from shm.report.figures.hanger_states import STATES
 from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_status import Status
 from shm.report.hanger_tables import history, models, tension
 from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit

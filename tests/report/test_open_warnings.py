@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 
-from shm.report.contents import Status, status_of
+from shm.report.hanger_status import Status, standing_at, status_of
 from shm.report.open_warnings import open_warnings, standing_out
-from shm.values import BaselineCheck, MistakenMode, MistakenTest, RepeatedMistake, Summary
+from shm.values import (
+    Alert,
+    AlertKind,
+    BaselineCheck,
+    Change,
+    MistakenMode,
+    MistakenTest,
+    RepeatedMistake,
+    Summary,
+    WatchedTest,
+)
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift
 
@@ -20,6 +31,22 @@ MODE = MistakenMode("t1", "transverse", 2, 21.3, 14.2)
 def tension(share: float, half_width: float = 0.02) -> Summary:
     ends = share - half_width, share, share + half_width
     return Summary(*(each * HANGER_3.nominal_tension_n for each in (share, 0.01, *ends)))
+
+
+def latest(mistaken: tuple[RepeatedMistake, ...] = (), **of_change: Any) -> WatchedTest:
+    change = Change(
+        **{
+            "evidence_years": 1.0,
+            "limit_years": 100.0,
+            "probability": 0.01,
+            "sudden": 0.5,
+            "began_after": SINCE,
+            "began_by": SINCE,
+            "moved": (),
+            **of_change,
+        }
+    )
+    return WatchedTest("t9", SINCE, 10.0, (), change, mistaken=mistaken)
 
 
 def row(*shares: float, families: str = "") -> str:
@@ -50,12 +77,20 @@ def test_a_baseline_that_does_not_fit_is_a_warning(check: BaselineCheck, said: s
 
 def test_a_mode_is_a_warning_from_the_third_test_on_that_has_it_wrong() -> None:
     twice = RepeatedMistake("transverse", 3, SINCE, 2)
-    assert open_warnings(HANGER_3, None, mistaken=[twice]) == ()
-    (warning,) = open_warnings(HANGER_3, None, mistaken=[replace(twice, tests=3)])
+    assert open_warnings(HANGER_3, None, latest=latest(mistaken=(twice,))) == ()
+    (warning,) = open_warnings(HANGER_3, None, latest=latest(mistaken=(replace(twice, tests=3),)))
     assert warning == (
         "Transverse 3 of hanger 3 has not fitted the other modes since 2026-05-01. Check its "
         "number at the next planned test."
     )
+
+
+def test_a_baseline_that_stands_alone_is_a_warning() -> None:
+    assert open_warnings(HANGER_3, None, latest=latest(against_baseline=3)) == ()
+    (warning,) = open_warnings(HANGER_3, None, latest=latest(against_baseline=6))
+    assert "stands alone: the 6 tests since the baseline agree with each other" in warning
+    called = latest(against_baseline=6, evidence_years=1e4)
+    assert open_warnings(HANGER_3, None, latest=called) == (), "it is told as a change"
 
 
 def test_a_tension_far_off_the_nominal_one_stands_out_only_beside_neighbours_that_are_not() -> None:
@@ -82,3 +117,33 @@ def test_with_an_open_warning_no_hanger_is_quiet_and_an_alert_stays_one() -> Non
         assert status_of(quiet, HANGER_3, **given, warnings=["x"]) is Status.CHECK
         assert status_of(quiet, HANGER_3, **given) in (Status.FIRST, Status.STEADY)
         assert status_of(loud, HANGER_3, **given, warnings=["x"]) is Status.ALERT
+
+
+@pytest.mark.parametrize(
+    ("kinds", "expected"),
+    [
+        (("beyond threshold",), Status.ALERT),
+        (("sudden change",), Status.WATCH),
+        (("tests disagree",), Status.WATCH),
+        (("gap",), Status.WATCH),
+        (("held",), Status.WATCH),
+        ((), Status.WATCH),  # what the row said is lost
+        (("check the modes",), Status.CHECK),
+        (("check the baseline",), Status.CHECK),
+    ],
+)
+def test_beside_an_alert_that_stands_no_hanger_is_quiet(
+    kinds: tuple[AlertKind, ...], expected: Status
+) -> None:
+    alert = Alert("k", 3, "t2", SINCE, "fell", (), kinds)
+    quiet = [a_drift(probability=0.04)]
+    for is_first in (True, False):
+        given = {"is_first": is_first, "is_called": False, "standing": standing_at([alert], "t5")}
+        assert status_of(quiet, HANGER_3, **given) is expected
+
+
+def test_that_a_test_was_to_be_repeated_stands_until_another_comes() -> None:
+    notice = Alert("k", 3, "t2", SINCE, "repeat it", (), ("repeat the test",))
+    trial = Alert("k", 3, "t2", SINCE, "a trial", (), ("test",))
+    assert standing_at([notice, trial], "t2") == (notice,)
+    assert standing_at([notice, trial], "t3") == ()

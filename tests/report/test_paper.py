@@ -14,9 +14,10 @@ from shm.report.as_html import as_html
 from shm.report.as_pdf import as_pdf
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_paper
-from shm.report.contents import BridgeReport, HangerLine, HangerReport, Status
+from shm.report.contents import BridgeReport, HangerLine, HangerReport
 from shm.report.diagnosis_report import diagnosis_paper
 from shm.report.hanger_report import hanger_paper
+from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Part, Table
 from shm.report.trial_report import trial_paper

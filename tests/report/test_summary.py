@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.report.contents import HangerReport, Status, status
+from shm.report.contents import HangerReport, status
+from shm.report.hanger_status import Status
 from shm.report.hanger_summary import advice, summary, tension_change
 from shm.values import Drift, Hanger, Thresholds
 from tests.report.diagnoses import LED

@@ -10,8 +10,9 @@ import pytest
 
 from shm.errors import BadInput
 from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
+from shm.watch.alert_state import AlertState
 from shm.watch.change_words import shift_words
-from shm.watch.watching import AlertState, after, alerts_of, new_alert
+from shm.watch.watching import after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 5, 1, tzinfo=UTC)

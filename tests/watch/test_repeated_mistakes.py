@@ -10,9 +10,10 @@ import pytest
 
 from shm.pipeline.ending import why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
+from shm.watch.alert_state import AlertState
 from shm.watch.quantities import MeasuredMode
 from shm.watch.repeated_mistakes import repeated_mistakes
-from shm.watch.watching import AlertState, after
+from shm.watch.watching import after
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
 
@@ -58,7 +59,7 @@ def watched(number: int, tests: int) -> WatchedTest:
     mistaken = (RepeatedMistake("transverse", 3, START, tests),) if tests else ()
     still = a_change(probability=0.01, evidence_years=1.0)
     time = START + timedelta(days=number)
-    return WatchedTest(f"t{number}", time, 10.0, (), still, mistaken)
+    return WatchedTest(f"t{number}", time, 10.0, (), still, mistaken=mistaken)
 
 
 def test_a_notice_is_given_once_and_again_only_after_the_mode_has_fitted() -> None:

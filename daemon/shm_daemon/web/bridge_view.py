@@ -13,7 +13,8 @@ from fastapi import Request
 
 from shm.errors import NothingThere
 from shm.pipeline.bridge_reporting import hanger_lines, hanger_shifts
-from shm.report.contents import HangerLine, Status
+from shm.report.contents import HangerLine
+from shm.report.hanger_status import Status
 from shm.report.intervals import Interval
 from shm.values import NAN, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern

@@ -13,9 +13,10 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from shm.report import colours, formatting
-from shm.report.contents import BridgeReport, HangerLine, Status
+from shm.report.contents import BridgeReport, HangerLine
 from shm.report.figures import style
 from shm.report.figures.illustration import Illustration, Member, drawn
+from shm.report.hanger_status import Status
 from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.values import FloatArray

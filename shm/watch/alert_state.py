@@ -1,0 +1,74 @@
+"""What was told of a hanger and still stands, kept as text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+
+from shm.documents import value_of
+from shm.errors import BadInput
+from shm.values import Change, Plane, RepeatedMistake
+from shm.watch.agreement import Way
+
+
+@dataclass(frozen=True)
+class AlertState:
+    """What stands: when each quantity was told to be beyond its threshold, and when a call was.
+
+    `called` are the changes that were called, told or not: after a call the sequential test speaks
+    of a further change, no longer of that one. `mistaken` are the modes that the last tests have
+    wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
+    stands alone. `agreed` are those of `beyond` that two tests told which agree: to the watch they
+    were improbable all along.
+    """
+
+    beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
+    call: datetime | None = None
+    called: tuple[Change, ...] = ()
+    odd: int = 0
+    mistaken: tuple[RepeatedMistake, ...] = ()
+    noted: frozenset[tuple[Plane, int]] = frozenset()
+    alone: bool = False
+    agreed: frozenset[tuple[str, Way]] = frozenset()
+
+    def to_text(self) -> str:
+        """JSON, from which `from_text` makes an equal one."""
+        return json.dumps(
+            {
+                "beyond": [[*condition, at] for condition, at in self.beyond.items()],
+                "call": self.call,
+                "called": [asdict(change) for change in self.called],
+                "odd": self.odd,
+                "mistaken": [asdict(each) for each in self.mistaken],
+                "noted": sorted(self.noted),
+                "alone": self.alone,
+                "agreed": sorted(self.agreed),
+            },
+            default=datetime.isoformat,
+        )
+
+    @classmethod
+    def from_text(cls, text: str) -> AlertState:
+        """What `to_text` wrote, nothing where the text is empty; raises BadInput for another."""
+        if not text:
+            return cls()
+        try:
+            kept = json.loads(text)
+            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
+            return cls(
+                {(quantity, way): at for quantity, way, at in beyond},
+                kept["call"] and value_of(datetime, kept["call"]),
+                value_of(tuple[Change, ...], kept["called"]),
+                int(kept["odd"]),
+                value_of(tuple[RepeatedMistake, ...], kept["mistaken"]),
+                frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
+                bool(kept["alone"]),
+                frozenset(value_of(tuple[tuple[str, Way], ...], kept["agreed"])),
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise BadInput(
+                f"what was told of a hanger cannot be read: {error!r}.",
+                remedy="Go over the hanger's tests from its baseline on.",
+            ) from error

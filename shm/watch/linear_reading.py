@@ -1,0 +1,60 @@
+"""The modes of a test that its baseline has too, and their likelihood about one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.models.base import Conditions
+from shm.values import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SeenModes:
+    """The modes (n,) of a test that the baseline has too: what is measured less its own residual.
+
+    `plane` and `order` index the model's frequencies, `own` the reader's modes; `log_frequency`
+    and its `variance` are (n,).
+    """
+
+    conditions: Conditions
+    plane: IntArray
+    order: IntArray
+    own: IntArray
+    log_frequency: FloatArray
+    variance: FloatArray
+
+    def taken(self, rows: BoolArray) -> SeenModes:
+        """Some of the modes."""
+        arrays = ("plane", "order", "own", "log_frequency", "variance")
+        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
+
+
+@dataclass(frozen=True, eq=False)
+class LinearReading:
+    """The likelihood about coordinates `x` (q,): residuals (n,) and slopes (n, q), both over sd."""
+
+    x: FloatArray
+    residual: FloatArray
+    slopes: FloatArray
+    pull: FloatArray
+
+    @property
+    def information(self) -> FloatArray:
+        return self.slopes.T @ self.slopes
+
+    @property
+    def cost(self) -> float:
+        """What is made small: the misfit and the pull to the baseline."""
+        return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
+
+    @property
+    def step(self) -> FloatArray:
+        """To where the cost is least, were it all linear."""
+        downhill = self.slopes.T @ self.residual - self.pull * self.x
+        return np.asarray(np.linalg.solve(self.information + np.diag(self.pull), downhill))
+
+    def gain(self, step: FloatArray) -> float:
+        """Of a step, in units of the variance."""
+        return float(step @ self.information @ step)

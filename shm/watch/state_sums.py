@@ -1,0 +1,183 @@
+"""What the tests of a state are to the evidence: columns, scatter, doubt, and their sums."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.values import FloatArray, IntArray, WatchedQuantity, is_ratio
+from shm.watch.causes import Structure
+from shm.watch.change_layout import Told
+from shm.watch.change_point import Sums, sums_of
+from shm.watch.conditions import OF_ONE_VISIT_YEARS, Warmth, warmth_of
+from shm.watch.isolated_tests import Seen
+from shm.watch.options import WatchOptions
+from shm.watch.persistence import Course
+from shm.watch.quantities import MeasuredMode
+from shm.watch.scatter import differences, learnt
+from shm.watch.watch_state import WatchState
+
+
+@dataclass(frozen=True, eq=False)
+class StateSums:
+    """Of one hanger's watch, whose `modes` are those of the baseline."""
+
+    quantities: tuple[WatchedQuantity, ...]
+    modes: Sequence[MeasuredMode]
+    structure: Structure
+    options: WatchOptions
+
+    def _factors(self, state: WatchState) -> FloatArray:
+        """Along what each test scatters (T, n, q + c)."""
+        fixed = np.broadcast_to(
+            self.structure.scattering, (state.tests, *self.structure.scattering.shape)
+        )
+        return np.concatenate([state.slopes, fixed], axis=2)
+
+    def _warmth(self, state: WatchState) -> Warmth:
+        return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
+
+    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
+        """What quantities go with, each by a coefficient of its own: kelvin, and as many further
+        laws as the structure has."""
+        return (self._warmth(state),)
+
+    def _by_law(self, values: FloatArray) -> FloatArray:
+        """Coefficients (laws q,), or their sds, by law (laws, q)."""
+        return values.reshape(self.structure.thermal_laws, self.structure.layout.q)
+
+    def _doubt(self, state: WatchState, *, of_season: bool = False) -> FloatArray:
+        """Factors (T, n, laws (1 + q)) of what a temperature that is not known, or not well, leaves
+        open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
+        share what they miss."""
+        own, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
+        softening, parts = state.per_kelvin, []
+        for law, mean, sd in zip(self._thermal(state), own, sds, strict=True):
+            known = softening + state.slopes @ mean
+            per_kelvin = np.concatenate([known[:, :, None], state.slopes * sd], axis=2)
+            off = law.sd * np.sqrt(law.shared) if of_season else law.sd
+            parts.append(off[:, None, None] * per_kelvin)
+            softening = np.zeros_like(softening)  # steel's goes with the first law
+        return np.concatenate(parts, axis=2)
+
+    def seen(self, state: WatchState) -> Seen:
+        """All tests so far, their swing with the temperature taken off as far as it is known."""
+        factors = self._factors(state)
+        measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
+        variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
+        return Seen(
+            values=self._at_rest(state),
+            variances=state.variances,
+            doubt=self._doubt(state),
+            factors=factors[measured[-1]] if len(measured) else factors[-1],
+            sds=np.sqrt(variance),
+        )
+
+    def _at_rest(self, state: WatchState) -> FloatArray:
+        laws, own = self._thermal(state), self._by_law(state.coefficients)
+        swing = laws[0].kelvin[:, None] * state.per_kelvin
+        for law, mean in zip(laws, own, strict=True):
+            swing = swing + law.kelvin[:, None] * (state.slopes @ mean)
+        return np.asarray(state.values - swing)
+
+    def scatter(self, state: WatchState) -> FloatArray:
+        """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
+        rows = np.flatnonzero(state.counted)
+        rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
+        found = differences(
+            self._at_rest(state)[rows],
+            state.variances[rows],
+            self._factors(state)[rows],
+            self._doubt(state)[rows],
+        )
+        return learnt(found, self.structure.scatter_variance, state.scatter_variance)
+
+    def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
+        """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
+        layout = self.structure.layout
+        slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
+        creeping = [is_ratio(each.name) for each in self.quantities]
+        return np.concatenate(
+            [
+                np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
+                slopes,
+                *(slopes * each.kelvin[rows, None, None] for each in self._thermal(state)),
+                slopes * np.nan_to_num(level)[:, None, None],
+                self.structure.stiffening[:, None] * np.nan_to_num(level)[:, None, None],
+                slopes[:, :, creeping].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+            ],
+            axis=2,
+        )
+
+    def _softened(self, state: WatchState, rows: IntArray) -> FloatArray:
+        """Log frequencies (T, n) less what a softer steel does."""
+        kelvin = self._warmth(state).kelvin
+        return np.asarray(state.values[rows] - kelvin[rows, None] * state.per_kelvin[rows])
+
+    def sums(self, state: WatchState, rows: IntArray) -> Sums:
+        """Of the tests `rows`; those of one day scatter together, and say no more than one."""
+        structure, layout = self.structure, self.structure.layout
+        years = state.years[rows]
+        apart = np.abs(years[:, None] - years)
+        of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
+        of_level = layout.prior_sd[-2 - layout.q : -1]  # before creep
+        stiffening = np.broadcast_to(structure.stiffening[:, None], (len(rows), layout.n, 1))
+        moving = np.concatenate([state.slopes[rows], stiffening], axis=2)
+        unknown = moving * (self.options.unknown_log_amplitude_sd * of_level)
+        unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
+        doubt = self._doubt(state, of_season=True)[rows]
+        open_left = np.concatenate([unknown, doubt], axis=2)
+        common = open_left @ np.swapaxes(open_left, 1, 2)
+        factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
+        spread = factors @ np.swapaxes(factors, 1, 2)
+        scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
+        covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
+        if structure.wander.size:
+            together = (apart < structure.wander_years).sum(axis=1)
+            slow = structure.scales[:, None, None] ** 2 * structure.wander @ structure.wander.T
+            covariance = covariance + together[:, None, None, None] * slow
+        wider = 1 / state.weight[rows]
+        return sums_of(
+            self._columns(state, rows),
+            self._softened(state, rows),
+            wider[:, None] * state.variances[rows],
+            wider[:, None, None, None] * covariance,
+        )
+
+    def course(self, state: WatchState, rows: IntArray, called: Sequence[Told]) -> Course:
+        """The tests `rows` with what the null says of each, called changes included."""
+        layout = self.structure.layout
+        columns = self._columns(state, rows)
+        changing, years = columns[:, :, layout.change], state.years[rows]
+        parts = [columns[:, :, layout.null]]
+        for each in called:
+            since = np.where(np.arange(len(rows)) >= each.first, 1.0, 0.0)
+            for _ in range(2 if each.is_ramp else 1):
+                parts.append(changing * since[:, None, None])
+                since = since * (years - each.years)
+        own = self.options.mode_scatter**2
+        return Course(
+            np.concatenate(parts, axis=2),
+            changing,
+            self._softened(state, rows),
+            state.variances[rows] + own,
+            max(int((rows < self.options.baseline_tests).sum()), 1),
+        )
+
+    def effects(self, state: WatchState) -> FloatArray:
+        """What a change does to each plane's first frequency and to its mean (r, n + q)."""
+        measured = np.isfinite(state.variances)
+        count = np.maximum(measured.sum(axis=0), 1)[:, None]
+        slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
+        of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
+        planes = np.array([plane for plane, _ in self.modes])
+        of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
+        return np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
+
+
+def _levels(log_amplitude: FloatArray) -> FloatArray:
+    """Over the usual one, NaN where unknown."""
+    known = np.isfinite(log_amplitude)
+    return log_amplitude - (float(np.median(log_amplitude[known])) if known.any() else 0.0)

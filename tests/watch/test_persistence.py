@@ -1,0 +1,89 @@
+"""What stays is a change; what tests did before as often is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.values import Reading
+from shm.watch.persistence import Stays
+from shm.watch.watcher import Watch
+from tests.helpers.synthetic_readings import (
+    PLANES_ALONE,
+    SPRING_STEP,
+    TENSION_ALONE,
+    History,
+    shifted,
+    watch_of,
+)
+
+QUIET = History(tests=24, outliers=0, seasons_k=5)
+
+
+def vans(readings: list[Reading], tests: list[int], by: float = 0.04) -> list[Reading]:
+    """A load on the deck in some of the tests."""
+    for test in tests:
+        readings = [*readings[:test], *shifted(readings, test, [by])[test:]]
+    return readings
+
+
+def calls(readings: list[Reading]) -> list[int]:
+    return [call.index for call in watch_of(readings, TENSION_ALONE).calls]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_tests_in_a_row_under_a_van_call_nothing_and_three_that_stay_do(seed: int) -> None:
+    readings = QUIET.readings(seed)
+
+    assert not calls(vans(readings, [12, 13]))
+    (called,) = calls(vans(readings, list(range(12, 24))))
+    assert 13 <= called <= 15
+
+
+def test_what_one_test_in_four_did_before_needs_more_tests_than_what_none_did() -> None:
+    readings = QUIET.readings(4)
+
+    (never,) = calls(vans(readings, list(range(14, 24))))
+    often = calls(vans(readings, [2, 6, 10, *range(14, 24)]))
+
+    assert never <= 16
+    assert not often or often[0] > never
+
+
+def test_a_change_that_comes_back_at_once_leaves_no_call_behind() -> None:
+    for seed in range(3):
+        assert not calls(vans(QUIET.readings(seed), [9, 10, 15, 20, 21], by=-0.03))
+
+
+def test_joints_that_give_now_and_then_are_no_loosened_end() -> None:
+    rng = np.random.default_rng(0)
+    for seed in range(3):
+        history = replace(QUIET, quantities=PLANES_ALONE, tests=30)
+        readings = history.readings(seed)
+        for test in np.flatnonzero(rng.random(30) < 0.2).tolist():
+            readings = shifted(readings, test, [0.0, -3 * SPRING_STEP, 0.0])
+
+        assert not watch_of(readings, PLANES_ALONE).calls
+
+
+def against(readings: list[Reading]) -> tuple[Watch, list[int]]:
+    found = watch_of(readings, TENSION_ALONE)
+    return found, [test.change.against_baseline for test in found.tests]
+
+
+def test_a_baseline_of_one_test_that_stands_alone_is_said_and_calls_nothing() -> None:
+    found, counts = against(vans(QUIET.readings(1), [0], by=0.08))
+
+    assert not found.calls
+    assert found.tests[-1].change.is_baseline_alone
+    assert counts[-1] >= 20
+    assert sum(count >= 4 for count in counts) > 10
+
+
+def test_a_sound_baseline_is_never_said_to_stand_alone() -> None:
+    for seed in range(3):
+        _, counts = against(QUIET.readings(seed))
+        assert not any(counts)
+    assert Stays(0.0).against_baseline == 0
