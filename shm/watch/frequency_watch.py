@@ -14,7 +14,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.documents import value_of
+from shm.documents import dump, value_of
 from shm.errors import BadInput
 from shm.modes_document import modes_document, parse_modes
 from shm.values import (
@@ -119,7 +119,7 @@ class FrequencyWatch:
         """From which `resume` goes on."""
         beside = {
             "told": now.told.to_text(),
-            "pool": modes_document([test for test, _ in now.pool.tests]),
+            "pool": json.loads(dump(modes_document([test for test, _ in now.pool.tests]))),
             "times": [time for _, time in now.pool.tests],
             "seen": now.pool.seen,
             "last": asdict(now.last),

@@ -113,6 +113,7 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
+        coefficients = q * self.structure.thermal_laws
         state = WatchState(
             key=self.key,
             start=time,
@@ -128,10 +129,8 @@ class Watcher:
             log_amplitude=np.zeros(0),
             weight=np.zeros(0),
             counted=np.zeros(0, bool),
-            coefficients=np.zeros(q * self.structure.thermal_laws),
-            coefficient_sd=self.structure.layout.prior_sd[n + q :][
-                : q * self.structure.thermal_laws
-            ],
+            coefficients=np.zeros(coefficients),
+            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
             scatter_variance=self.structure.scatter_variance,
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),

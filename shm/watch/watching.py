@@ -370,7 +370,8 @@ def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
 
 def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Hanger) -> str:
     rules = "+".join(kind.replace(" ", "-") for kind in kinds)
-    return f"hanger-{hanger.id}:{rules}:{_first_moved(news, test)}:{short_name(test.test)}"
+    moved = _first_moved(news, test).replace(" ", "-")
+    return f"hanger-{hanger.id}:{rules}:{moved}:{short_name(test.test)}"
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:
