@@ -22,6 +22,7 @@ from cattrs.v import transform_error
 
 from shm.values import (
     NAN,
+    WITHOUT_MODEL,
     Alert,
     Averaged,
     CreepRate,
@@ -218,15 +219,20 @@ def summary(samples: FloatArray, most_probable: float) -> dict[str, float]:
 
 
 def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[str, Any]:
-    """The document of `shm update --json`; `probability` is known after a selection only."""
+    """The document of `shm update --json`; `probability` is known after a selection only.
+
+    A structure without a model has no tension: `tension_n` is null.
+    """
     most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
+    tension = None
+    if posterior.model != WITHOUT_MODEL:
+        at = most_probable["theta_F"] * posterior.nominal_tension_n
+        tension = summary(posterior.tension_n, at)
     return {
         "model": posterior.model,
         "hanger": posterior.hanger,
         "tests": list(posterior.tests),
-        "tension_n": summary(
-            posterior.tension_n, most_probable["theta_F"] * posterior.nominal_tension_n
-        ),
+        "tension_n": tension,
         "repeatability_sd_n": posterior.repeatability_sd_n,
         "nominal_tension_n": posterior.nominal_tension_n,
         "parameters": {

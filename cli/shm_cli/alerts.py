@@ -172,7 +172,7 @@ def _described(bridge: Bridge, name: str) -> Hook:
 def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
-            workspace.bridge.hanger(hanger_id)
+            workspace.bridge.tested(hanger_id)
         alerts = store.alerts.list_all(hanger_id)
         deliveries = store.alerts.list_deliveries()
         made = store.silences.list_all()

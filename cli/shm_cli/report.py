@@ -15,13 +15,14 @@ from shm.documents import dump
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
-from shm.pipeline.reporting import hanger_report, modal_test_report
+from shm.pipeline.reporting import hanger_report, modal_test_report, structure_report
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.report.period import Period, period_since
+from shm.report.structure_report import structure_json, structure_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 from shm_cli.parameter_types import NewFile
 
@@ -118,11 +119,23 @@ def _gathered(
         if hanger_id is None:
             content = bridge_report(workspace, store, now, period)
             return _Report(content, bridge_paper, bridge_json)
+        if any(each.id == hanger_id for each in workspace.bridge.structures):
+            _refuse_of_structure(test_id, period)
+            of_structure = structure_report(workspace, store, hanger_id, now)
+            return _Report(of_structure, structure_paper, structure_json)
         if test_id is None:
             of_hanger = hanger_report(workspace, store, hanger_id, now, period)
             return _Report(of_hanger, hanger_paper, hanger_json)
         sheet = modal_test_report(workspace, store, hanger_id, test_id)
         return _Report(replace(sheet, generated_at=now), modal_test_paper, modal_test_json)
+
+
+def _refuse_of_structure(test_id: str | None, period: Period | None) -> None:
+    if test_id is not None or period is not None:
+        raise UsageError(
+            "a structure without a model has one report, of all its tests.",
+            remedy="Leave out --test and --since.",
+        )
 
 
 def _write(written: str | bytes, out: Path | None) -> None:

@@ -53,7 +53,7 @@ def silence(
     now = utc_now()
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
-            workspace.bridge.hanger(hanger_id)
+            workspace.bridge.tested(hanger_id)
         made = store.silences.make(
             hanger_id,
             (since or now, until),

@@ -32,6 +32,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
+from shm.watch.frequency_text import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.silences import said_of
@@ -78,6 +79,8 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
         if row["damage"] is not None:
             click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
+    for row in document["structures"]:
+        click.echo(paragraph(_told_of_structure(row)))
 
 
 def _show(document: dict[str, Any]) -> None:
@@ -129,6 +132,15 @@ def _show(document: dict[str, Any]) -> None:
     show_table(made)
     for said in _told_of_held(document["held"]):
         click.echo(said)
+
+
+def _told_of_structure(row: Mapping[str, Any]) -> str:
+    latest, since = row["latest_test"], row["baseline_since"]
+    name = f" ({row['name']})" if row["name"] else ""
+    told = f"structure {row['structure']}{name}: {row['tests']} tests"
+    told += f", the latest {latest:%Y-%m-%d %H:%M}" if latest else ""
+    told += f", baseline since {since:%Y-%m-%d}" if since else ", no baseline yet"
+    return f"{told}, {row['open_alerts']} open alerts. {row['said']}".rstrip()
 
 
 def _told_of_held(held: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -216,6 +228,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
+        "structures": _structures(workspace, store, open_at),
         "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),
     }
 
@@ -224,6 +237,35 @@ def _daemon(workspace: Workspace) -> dict[str, Any]:
     seen_s = seconds_since_beat(workspace)
     seen_at = None if seen_s is None else utc_now() - timedelta(seconds=seen_s)
     return {"active": workspace.holder(), "seen_at": seen_at}
+
+
+def _structures(
+    workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
+) -> list[dict[str, Any]]:
+    """Those without a model, of which frequencies alone are watched."""
+    latest, rows = store.tests.latest(), []
+    for each in workspace.bridge.structures:
+        found, damage, said = latest.get(each.id), None, ""
+        of_baseline: Sequence[StoredTest] = ()
+        try:
+            baseline = store.watch.baseline(each.id)
+            of_baseline = store.tests.of_baseline(baseline) if baseline else ()
+            watched = store.watch.list_detected_and_latest(baseline) if baseline else ()
+            said = frequency_words([one.watched for one in watched], each)
+        except DamagedRow as error:
+            damage = str(error)
+        rows.append(
+            {
+                "structure": each.id,
+                "name": each.name,
+                "tests": found.tests if found else 0,
+                "latest_test": found.time if found else None,
+                "baseline_since": min((test.time for test in of_baseline), default=None),
+                "open_alerts": open_alerts[each.id],
+                "said": damage or said,
+            }
+        )
+    return rows
 
 
 def _hangers(

@@ -10,7 +10,7 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from shm.bridge.hanger import hanger_of
+from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
@@ -28,7 +28,11 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Bridge:
-    """What `bridge.toml` says; `built` is None where it does not say."""
+    """What `bridge.toml` says; `built` is None where it does not say.
+
+    `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
+    Their numbers are none of a hanger.
+    """
 
     name: str
     hangers: tuple[Hanger, ...]
@@ -37,6 +41,7 @@ class Bridge:
     source: str
     disturbances: tuple[Disturbance, ...] = ()
     built: date | None = None
+    structures: tuple[Hanger, ...] = ()
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -47,11 +52,28 @@ class Bridge:
             if hook.escalation_after_seconds is not None
         }
 
+    @property
+    def watched(self) -> tuple[Hanger, ...]:
+        """All that tests may be of."""
+        return (*self.hangers, *self.structures)
+
+    def tested(self, number: int) -> Hanger:
+        """The hanger or structure of that number; raises BadInput when there is none such."""
+        return next((each for each in self.structures if each.id == number), None) or self.hanger(
+            number
+        )
+
     def hanger(self, hanger_id: int) -> Hanger:
         """The hanger of that number; raises BadInput when the bridge has none such."""
         for hanger in self.hangers:
             if hanger.id == hanger_id:
                 return hanger
+        if any(each.id == hanger_id for each in self.structures):
+            raise BadInput(
+                f"{hanger_id} is a structure without a model: it has no tension.",
+                remedy="See `shm status`, `shm alerts` and `shm report --hanger "
+                f"{hanger_id}` for its frequencies.",
+            )
         known = ", ".join(str(hanger.id) for hanger in self.hangers) or "none"
         raise BadInput(
             f"hanger {hanger_id} is not described in {Path(self.source).name} (known: {known}).",
@@ -63,7 +85,8 @@ def load_bridge(path: Path) -> Bridge:
     """Reads and checks `bridge.toml`; raises BadInput naming the table and key at fault."""
     document = _parse(path)
     hangers = tuple(hanger_of(table, path) for table in _tables(document, "hanger", path))
-    _refuse_doubles([hanger.id for hanger in hangers], "hanger id", path)
+    structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))
+    _refuse_doubles([each.id for each in (*hangers, *structures)], "hanger id", path)
     hooks = tuple(hook_of(table, path) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     return Bridge(
@@ -76,6 +99,7 @@ def load_bridge(path: Path) -> Bridge:
             _disturbance(table, path) for table in _tables(document, "disturbance", path)
         ),
         built=_built(document.get("bridge", {}), path),
+        structures=structures,
     )
 
 

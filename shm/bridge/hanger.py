@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from shm.bridge.table import Table
 from shm.values import (
@@ -89,11 +89,29 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
     )
 
 
+def structure_of(values: dict[str, Any], path: Path) -> Hanger:
+    """What a `[[structure]]` table describes; raises BadInput naming table and key at fault."""
+    table = Table(values, f"[[structure]] id {values.get('id', '?')}", path)
+    table.refuse_unknown(("id", "name", "kind", "thresholds"))
+    table.value("kind", Literal["any"], "is no kind of structure", 'Write kind = "any".', "any")
+    number = table.value(
+        "id", int, "is not a whole number", "Give a number that no hanger has.", holds=_is_number
+    )
+    name = str(values.get("name", ""))
+    return Hanger.without_model(number, name, _thresholds(table.table("thresholds")))
+
+
+def _is_number(id_: int) -> bool:
+    return id_ >= 0
+
+
 def _kind(table: Table) -> Kind:
     """A strand where it says so, or where its wires are said to slip."""
     slips = table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1) < 1
-    remedy, usual = 'Write "rod" or "strand".', "strand" if slips else "rod"
-    return cast(Kind, table.value("kind", Kind, "is no kind of hanger", remedy, usual))
+    remedy = 'Write "rod" or "strand"; of what no model describes, a [[structure]] table.'
+    usual = "strand" if slips else "rod"
+    kinds = Literal["rod", "strand"]
+    return cast(Kind, table.value("kind", kinds, "is no kind of hanger", remedy, usual))
 
 
 def _fittings(table: Table, length_m: float) -> tuple[float, float]:

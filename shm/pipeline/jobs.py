@@ -33,7 +33,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import nothing
-from shm.values import Alert, Hanger, Posterior, Selection, WatchedTest
+from shm.values import WITHOUT_MODEL, Alert, Hanger, Posterior, Selection, WatchedTest
 from shm.values.stated_tension import averaged_now
 
 DELIVERIES = 16  # technical: threads that mostly wait for an answer
@@ -112,7 +112,7 @@ class Jobs:
         selected = self.store.posteriors.selected_models()
         waiting = self._waiting_tests(limit, held)
         oldest = min((recording.id for recording in received), default=None)
-        for hanger in self.workspace.bridge.hangers:
+        for hanger in self.workspace.bridge.watched:
             if hanger.id in selected:
                 yield from self._later_tests(
                     hanger, selected[hanger.id], waiting[hanger.id], oldest
@@ -206,7 +206,9 @@ class Jobs:
 
     def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
         tests = [self.store.tests.get(test.id) for test in first]
-        names = competing_names(hanger, self.workspace.settings.model_names)
+        names: tuple[str, ...] = (WITHOUT_MODEL,)
+        if hanger.is_modelled:
+            names = competing_names(hanger, self.workspace.settings.model_names)
         settings = self.workspace.settings
         taught = self.taught(hanger, min(test.time for test in tests))
         terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
@@ -215,7 +217,8 @@ class Jobs:
 
         def keep(found: Selection) -> None:
             self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
-            self.store.posteriors.save_summaries(hanger)
+            if hanger.is_modelled:
+                self.store.posteriors.save_summaries(hanger)
 
         return Step(run, keep)
 
@@ -235,7 +238,8 @@ class Jobs:
         def keep(found: Posterior) -> None:
             now, to_watch = self.clock(), not makes_baseline
             self.store.posteriors.save(test, found, lineage, now, to_watch=to_watch)
-            self.store.posteriors.save_summaries(hanger)
+            if hanger.is_modelled:
+                self.store.posteriors.save_summaries(hanger)
 
         return Step(run, keep)
 
@@ -279,7 +283,7 @@ class Jobs:
         tests = (needed.baseline_tests, needed.later)
         selection = self.store.posteriors.selection(hanger.id)
         compared = None if selection is None else selection.selection
-        tension = averaged_now(current, compared, hanger.limits)
+        tension = averaged_now(current, compared, hanger.limits) if hanger.is_modelled else None
         beside = tests_beside(self.store, baseline, test)
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
@@ -357,7 +361,7 @@ def rebuild(workspace: Workspace, store: Store, recording_id: int, at: datetime)
     posteriors = store.upkeep.damaged_posteriors(recording_id)
     for each in posteriors:
         tests = [store.tests.get(test_id) for test_id in each.tests]
-        hanger = workspace.bridge.hanger(tests[0].hanger)
+        hanger = workspace.bridge.tested(tests[0].hanger)
         taught = Jobs(workspace, store, lambda: at).taught(hanger, min(t.time for t in tests))
         options, lineage = update_terms(
             hanger, [each.model], tests, workspace.settings, taught=taught

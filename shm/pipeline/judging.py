@@ -72,7 +72,7 @@ def _candidate(
     item: IdentifiedTest,
     found: Sequence[IdentifiedTest],
 ) -> Candidate:
-    test, hanger = item.test, workspace.bridge.hanger(item.test.hanger or 0)
+    test, hanger = item.test, workspace.bridge.tested(item.test.hanger or 0)
     earlier = store.tests.latest_before(hanger.id, recording.id, _LATEST)
     baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
     reference = store.tests.of_baseline(baseline) if baseline else earlier

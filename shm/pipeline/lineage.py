@@ -82,7 +82,7 @@ def identify_lineage(
     inputs = [recording.file.sha256, recording.file.sidecar_as]
     terms = {
         **identify_settings(workspace.settings),
-        "hanger": [asdict(hanger) for hanger in bridge.hangers if hanger.id == hanger_id],
+        "hanger": [asdict(hanger) for hanger in bridge.watched if hanger.id == hanger_id],
         "disturbances": [asdict(each) for each in bridge.disturbances],
     }
     return Lineage.of(inputs, terms)

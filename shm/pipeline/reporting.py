@@ -27,10 +27,12 @@ from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
 from shm.report.hanger_status import findings
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
+from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Drift, Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
+from shm.watch.frequency_text import frequency_words
 from shm.watch.neighbours import BridgePattern
 
 
@@ -58,6 +60,33 @@ def hanger_report(
         ),
         neighbours=_neighbours(workspace, store) if now.is_called else None,
         period=period,
+    )
+
+
+def structure_report(
+    workspace: Workspace, store: Store, number: int, generated_at: datetime
+) -> StructureReport:
+    """All that the store knows of a structure without a model."""
+    structure, baseline = workspace.bridge.tested(number), store.watch.baseline(number)
+    of_baseline = store.tests.of_baseline(baseline) if baseline else ()
+    watched, alerts = _watched_against(store, baseline), store.alerts.list_all(number)
+    latest = store.tests.latest().get(number)
+    levels = baseline.posterior if baseline else None
+    return StructureReport(
+        bridge=workspace.bridge.name,
+        structure=structure,
+        tests=latest.tests if latest else 0,
+        latest=latest.time if latest else None,
+        baseline_since=min((test.time for test in of_baseline), default=None),
+        baseline_hz=dict(zip(levels.names, levels.samples[0].tolist(), strict=True))
+        if levels
+        else {},
+        said=frequency_words(watched, structure),
+        drifts=watched[-1].drifts if watched else (),
+        alerts=tuple(stored.alert for stored in alerts),
+        open_alerts=sum(each.acknowledgement is None for each in alerts),
+        generated_at=generated_at,
+        version=shm.__version__,
     )
 
 

@@ -33,6 +33,7 @@ from shm.values import (
     WatchedTest,
 )
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
+from shm.watch.frequency_watch import measured_levels, watch_newest_frequencies
 
 
 def identify_file(
@@ -55,6 +56,8 @@ def identify_file(
             found = (_test_in(path, bridge, settings),)
     for item in found:
         hanger = _hanger(item.test.hanger, bridge)
+        if not hanger.is_modelled:
+            continue
         for model in competing(hanger, settings, selected):
             model.refuse(item.test)
     return found
@@ -78,7 +81,8 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     records = read_test(path, read_limits(settings))
     hanger = _hanger(records[0].hanger, bridge)
     options = identify_options(settings, bridge)
-    result = identify(records, options, test_id=path.stem, hanger=hanger)
+    described = hanger if hanger.is_modelled else None
+    result = identify(records, options, test_id=path.stem, hanger=described)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
     measured = [each for each in records if isinstance(each, Recording)]
     return IdentifiedTest(
@@ -89,7 +93,9 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
         set_aside=result.set_aside,
         times=tuple(record.time for record in records if record.time is not None),
         fingerprint=fingerprint_of(records),
-        signals=tuple(each.text for each in signal_doubts(measured, hanger)),
+        signals=tuple(each.text for each in signal_doubts(measured, hanger))
+        if hanger.is_modelled
+        else (),
     )
 
 
@@ -104,13 +110,15 @@ def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
         raise BadInput(
             "the file names no hanger.", remedy="Give `hanger` in its header or its sidecar."
         )
-    return bridge.hanger(hanger_id)
+    return bridge.tested(hanger_id)
 
 
 def select_model(
     tests: Sequence[ModalTest], hanger: Hanger, names: Sequence[str], terms: Terms
 ) -> Selection:
     """The competing classes of a hanger, compared on its first tests, their mistakes left out."""
+    if not hanger.is_modelled:
+        return Selection((measured_levels(tests, terms.seed),), (1.0,))
     models = [build(name, hanger, terms.priors) for name in names]
     check = checked(tests, hanger, terms)
     found = select(check.kept_of(tests), models, options_of(terms, hanger))
@@ -122,6 +130,8 @@ def update_test(
     test: ModalTest, hanger: Hanger, name: str, known: Posterior | None, terms: Terms
 ) -> Posterior:
     """The posterior of one test in the selected class, from what is `known` where that helps."""
+    if not hanger.is_modelled:
+        return measured_levels([test], terms.seed)
     model, options = build(name, hanger, terms.priors), options_of(terms, hanger)
     # Where description or priors have changed since, the class may have other parameters by now.
     if known is None or known.names[:-1] != model.parameter_names:
@@ -150,8 +160,10 @@ def watch_test(
     since_baseline, later = tests
     options = WatchOptions(limit_years=limit_years)
     try:
-        found = watch_newest(
-            baseline.posterior, since_baseline, later, hanger, options, kept, beside
+        found = (
+            watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept, beside)
+            if hanger.is_modelled
+            else watch_newest_frequencies(since_baseline, later, hanger, options, kept)
         )
     except BadInput:
         if kept is None:
@@ -160,8 +172,10 @@ def watch_test(
     if found is None:
         return None
     test, time = later[-1]
-    gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
-    alert = joined(found.alert, gap)
+    alert = found.alert
+    if hanger.is_modelled:
+        gap = watch_gap(baseline.posterior, current, hanger, test=test.id, time=time)
+        alert = joined(alert, gap)
     # A new baseline makes a standing condition a new one.
     alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}", tension=tension)
     return found.test, alert, found.kept

@@ -42,10 +42,14 @@ CHECKS: tuple[Check, ...] = (
     of_other_signals,
 )
 
+_WITHOUT_MODEL = tuple(each for each in CHECKS if each not in (of_another_bar, of_other_signals))
+"""Of a structure that no bar describes."""
+
 
 def doubts_about(candidate: Candidate) -> tuple[Doubt, ...]:
     """The reasons to hold a test, in the order of `CHECKS`; none where it is plausible."""
-    found = [doubt for check in CHECKS if (doubt := check(candidate)) is not None]
+    checks = CHECKS if candidate.hanger.is_modelled else _WITHOUT_MODEL
+    found = [doubt for check in checks if (doubt := check(candidate)) is not None]
     if any(doubt.check == "copy" for doubt in found):  # that explains the same time
         found = [doubt for doubt in found if doubt.check != "clock stuck"]
     return tuple(found)

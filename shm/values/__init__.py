@@ -24,6 +24,7 @@ from shm.values.diagnosis import (
     leads,
 )
 from shm.values.drift import (
+    FREQUENCY,
     TENSION,
     Alert,
     AlertKind,
@@ -39,6 +40,8 @@ from shm.values.drift import (
     TemperatureCoefficient,
     WatchedQuantity,
     WatchedTest,
+    is_frequency,
+    is_ratio,
 )
 from shm.values.hanger import (
     EffectPrior,
@@ -77,6 +80,7 @@ from shm.values.modes import (
 from shm.values.posterior import (
     ENOUGH_EFFECTIVE,
     MOST_MISFIT_PERCENT,
+    WITHOUT_MODEL,
     Averaged,
     Posterior,
     PredictedFrequency,
@@ -113,12 +117,14 @@ from shm.values.trial import (
 
 __all__ = [
     "ENOUGH_EFFECTIVE",
+    "FREQUENCY",
     "LONGEST_TEST_ID",
     "MIX",
     "MOST_MISFIT_PERCENT",
     "NAN",
     "PLANES",
     "TENSION",
+    "WITHOUT_MODEL",
     "AddedMass",
     "Alert",
     "AlertKind",
@@ -198,6 +204,8 @@ __all__ = [
     "Way",
     "as_test_id",
     "effect_label",
+    "is_frequency",
+    "is_ratio",
     "is_test_id",
     "leads",
     "printable",

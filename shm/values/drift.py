@@ -18,10 +18,22 @@ if TYPE_CHECKING:
 End = Literal["deck", "arch"]
 
 TENSION = "tension"
+FREQUENCY = "frequency "
+"""Begins the names of frequencies that are watched by themselves: `frequency transverse 1`."""
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
 _ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
+
+
+def is_frequency(quantity: str) -> bool:
+    """Whether a watched quantity is a frequency itself, of a structure without a model."""
+    return quantity.startswith(FREQUENCY)
+
+
+def is_ratio(quantity: str) -> bool:
+    """Whether shifts of a quantity are fractions of it: of the tension and frequencies they are."""
+    return quantity == TENSION or is_frequency(quantity)
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,8 +95,9 @@ class Limits:
     tension_min_n: float = NAN
 
 
-Kind: TypeAlias = Literal["rod", "strand"]
-"""Whether a hanger bends as one solid section, or its wires may slip."""
+Kind: TypeAlias = Literal["rod", "strand", "any"]
+"""Whether a hanger bends as one solid section, or its wires may slip; `any`: a structure that no
+model class describes, of which frequencies alone are watched."""
 
 Support: TypeAlias = Literal["clamped", "pinned", "free"]
 """How an end is held: fast, turning freely, or not at all."""
@@ -172,6 +173,19 @@ class Hanger:
     @property
     def bending_stiffness_n_m2(self) -> float:
         return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
+
+    @classmethod
+    def without_model(
+        cls, id_: int, name: str = "", thresholds: Thresholds | None = None
+    ) -> Hanger:
+        """A structure that no model class describes: it has no length, no section, no tension."""
+        limits = Thresholds() if thresholds is None else thresholds
+        return cls(id_, NAN, NAN, NAN, NAN, NAN, NAN, name, limits, kind="any")
+
+    @property
+    def is_modelled(self) -> bool:
+        """Whether a model class may describe it."""
+        return self.kind != "any"
 
     @property
     def as_hanger(self) -> bool:

@@ -26,6 +26,9 @@ NO_TENSION_PERCENT = 10.0
 CONTRADICTS_FROM_SD = 3.0
 """Of sound hangers one in some hundred comes so far off."""
 
+WITHOUT_MODEL = "frequencies"
+"""Stands for the class of a posterior of a structure without a model: frequencies as measured."""
+
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
 _SAID_ONCE = (
     _ENDS_DECIDE,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shm.models import end_stiffness
+from shm.watch.frequency_watch import WatchedFrequencies, watch_frequencies
 from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
 from shm.watch.options import WatchOptions
 from shm.watch.watching import (
@@ -18,10 +19,12 @@ __all__ = [
     "Newest",
     "WatchOptions",
     "Watched",
+    "WatchedFrequencies",
     "end_stiffness",
     "gap_percent",
     "has_grown",
     "joined",
+    "watch_frequencies",
     "watch_gap",
     "watch_hanger",
     "watch_newest",

@@ -71,7 +71,8 @@ def agreement(
     """The alert of a test that is the second to show a shift beyond its threshold.
 
     None where it shows none, no test beside it agrees, two that agree were there before it, the
-    clocks say that it was a later visit, or the shift is `told` already.
+    clocks say that it was a later visit, one of a visit before shows the same, or the shift is
+    `told` already.
     """
     own = _shown(reader, newest[0], hanger, options)
     unwatched = {*beside.held, *beside.of_works}
@@ -82,6 +83,7 @@ def agreement(
         for tests in (*beside.came, *beside.dated)
     ]
     are_later = (False, True, False, True)
+    known = _known_before(reader, newest[0], beside, options)
     for j, (quantity, mine) in enumerate(zip(reader.quantities, own, strict=True)):
         if mine is None or (quantity.name, way_of(mine.mean)) in told:
             continue
@@ -91,11 +93,26 @@ def agreement(
             for run in runs
             if run and (run[0][0].id in unwatched or not _is_later(newest[0], run[0][0]))
         ]
-        if others and not any(map(partial(_have_told, beside), runs, are_later)):
+        is_old = any(_agree(mine, each[j]) for each in known)
+        if others and not is_old and not any(map(partial(_have_told, beside), runs, are_later)):
             other, shown = others[0]
             drift = _drift(quantity, newest, (mine, shown), hanger)
             return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
     return None
+
+
+def _known_before(
+    reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
+) -> list[list[_Shown]]:
+    """What the last tests of visits before the newest say: what these show already is not new, and
+    the watch's to judge."""
+    earlier = {
+        test.id: test
+        for tests in (beside.came[0], beside.dated[0])
+        for test in tests
+        if _is_later(newest, test) and test.id not in beside.held
+    }
+    return [_read(reader, test, options) for test in earlier.values()]
 
 
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:

@@ -12,6 +12,7 @@ from shm.values import TENSION, Change, Drift, Hanger, Moved
 from shm.watch.change_words import CAUSES, ends_words, probable_groups
 
 Urgency = Literal["next_test", "week", "today"]
+_LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 
 
 def urgency_of(
@@ -25,7 +26,7 @@ def urgency_of(
     A change came slowly and stays below its threshold, as far as `drifts` of all quantities show:
     then the next planned test is soon enough to see where it goes.
     """
-    if _losses(hanger, beyond):
+    if hanger.is_modelled and _losses(hanger, beyond):
         return "today"
     slow = change is not None and change.sudden < 0.5
     near = any(each.probability > 0.5 for each in drifts)
@@ -46,6 +47,9 @@ def action_words(
 ) -> str:
     """What to do and how soon, in a sentence."""
     urgency = urgency_of(hanger, change, beyond, drifts)
+    if not hanger.is_modelled:
+        when = "within a week" if urgency == "week" else "at the next planned inspection"
+        return f"Look at the structure {when}: {_LOOK_AT}."
     if urgency == "today":
         look = _look(gravest(beyond), change)
         return f"Repeat the hammer test today and decide on traffic until then; {look}."

@@ -26,7 +26,9 @@ from shm.watch.change_words import (
     size_words,
     suspects,
     threshold_words,
+    undetected_words,
 )
+from shm.watch.frequency_text import each_frequency, frequencies_state, odd_frequencies
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
@@ -52,6 +54,8 @@ def message_of(
     are the shifts from the baseline that the alert says to be beyond their threshold.
     """
     change = change if change and change.moved else None
+    if not hanger.is_modelled:
+        return _of_frequencies(test, hanger, change, beyond, is_call=is_call, is_further=is_further)
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
     is_odd = test.change.outlier_probability > 0.5
@@ -65,6 +69,33 @@ def message_of(
         _details(
             _sizes(change, beyond) or _HALF_WIDTH * ("±" in state),
             _probabilities(test, change, beyond),
+            _false_alarms(change) if is_call else "",
+        ),
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _of_frequencies(
+    test: WatchedTest,
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    *,
+    is_call: bool,
+    is_further: bool,
+) -> str:
+    """What `message_of` says of a structure of which frequencies alone are watched."""
+    parts = [
+        frequencies_state(hanger, change, beyond, is_further=is_further),
+        action_words(hanger, change, beyond, test.drifts),
+        _when(change),
+        "Temperature, frost and excitation are taken off as far as the tests show what they do.",
+        _details(
+            _HALF_WIDTH,
+            each_frequency(test),
+            f"probability {_probability(change.probability)} that anything changed"
+            if change
+            else "",
             _false_alarms(change) if is_call else "",
         ),
     ]
@@ -94,6 +125,8 @@ def message_of_agreeing(
 
 def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     """Of a test that agrees with none before it, or of so many in a row."""
+    if not hanger.is_modelled:
+        return odd_frequencies(test, hanger, in_a_row)
     if in_a_row == 1:
         return (
             f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
@@ -146,12 +179,7 @@ def _detected_words(watched: Sequence[WatchedTest]) -> str:
     if detected:
         each_one = (f"{as_sentence(_changed(each))} {_when(each)}" for each in detected)
         return f"Detected since the baseline: {' Then: '.join(each_one)}"
-    latest = watched[-1].change
-    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
-    return (
-        "No change was detected since the baseline: the evidence for one is "
-        f"{share} % of what it takes."
-    )
+    return undetected_words(watched[-1].change)
 
 
 # ---------------------------------------------------------------- the first sentence

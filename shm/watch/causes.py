@@ -10,7 +10,7 @@ the ends of the baseline. What none of these does is "unexplained": every mode b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -127,7 +127,9 @@ class Structure:
     """What is watched: the layout of columns, directions of change, and scatters.
 
     Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
-    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that.
+    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
+    `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
+    Quantities go with the temperature by `thermal_laws` coefficients each.
     """
 
     layout: Layout
@@ -137,6 +139,9 @@ class Structure:
     stiffening: FloatArray
     scatter_variance: FloatArray
     scales: FloatArray
+    wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
+    wander_years: float = 0.0
+    thermal_laws: int = 1
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence, Set
 
 from shm.models.effects import EFFECTS
 from shm.models.effects.base import OverTime
-from shm.values import TENSION, Change, Drift, End, Moved, Plane
+from shm.values import Change, Drift, End, Moved, Plane, is_ratio
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 
 _PROBABLE = 0.1  # judgement: one in ten is worth a test that tells it from the rest
@@ -105,7 +105,7 @@ def shift_words(quantity: str, mean: float, sd: float) -> str:
 
 
 def is_stiffness(quantity: str) -> bool:
-    return quantity != TENSION and quantity not in CAUSES
+    return not is_ratio(quantity) and quantity not in CAUSES
 
 
 def _factor_words(decades: float) -> str:
@@ -137,7 +137,7 @@ def size_words(each: Moved | Drift) -> str:
 
 
 def threshold_words(drift: Drift) -> str:
-    if drift.quantity == TENSION:
+    if is_ratio(drift.quantity):
         return f"{100 * drift.threshold:.3g} %"
     return f"{factor(math.copysign(drift.threshold, drift.shift_mean))} times"
 
@@ -145,3 +145,12 @@ def threshold_words(drift: Drift) -> str:
 def beyond_words(drift: Drift) -> str:
     name = quantity_words(drift.quantity)
     return f"{name} is beyond its threshold of {threshold_words(drift)}"
+
+
+def undetected_words(latest: Change) -> str:
+    """How near the evidence for a change is to a detection."""
+    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
+    return (
+        "No change was detected since the baseline: the evidence for one is "
+        f"{share} % of what it takes."
+    )

@@ -23,6 +23,8 @@ from shm.values import (
     Moved,
     Reading,
     WatchedQuantity,
+    is_frequency,
+    is_ratio,
 )
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.conditions import DAYS_PER_YEAR
@@ -317,7 +319,8 @@ def _of_null(evidence: Evidence, subject: Subject) -> FloatArray:
     layout, now = evidence.layout, float(evidence.years[-1])
     own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
     creep = np.zeros((layout.q, len(layout.null)))
-    creep[[each.name == TENSION for each in subject.quantities], -1] = now - subject.baseline_years
+    creeping = [is_ratio(each.name) for each in subject.quantities]
+    creep[creeping, -1] = now - subject.baseline_years
     blocks = [creep]
     for each in evidence.called:
         blocks.append(own)
@@ -357,6 +360,8 @@ def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:
     limits = hanger.thresholds
     if quantity.name == TENSION:
         return limits.tension_shift_fraction
+    if is_frequency(quantity.name):  # it goes with the root of a stiffness, as with a tension's
+        return limits.tension_shift_fraction / 2
     return limits.stiffness_shift_decades
 
 
@@ -369,14 +374,13 @@ def _drift(
     probability: float,
 ) -> Drift:
     at_rest = value_at(quantity, 0.0)
-    is_tension = quantity.name == TENSION
     return Drift(
         hanger=subject.hanger.id,
         test=reading.test,
         time=reading.time,
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=at_rest * (1 + shift.mean) if is_tension else at_rest + shift.mean,
+        value=at_rest * (1 + shift.mean) if is_ratio(quantity.name) else at_rest + shift.mean,
         shift_mean=shift.mean,
         shift_sd=shift.sd,
         threshold=threshold,

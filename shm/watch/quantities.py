@@ -31,6 +31,7 @@ from shm.values import (
     Plane,
     Posterior,
     WatchedQuantity,
+    is_ratio,
 )
 
 MeasuredMode = tuple[Plane, int]
@@ -140,7 +141,7 @@ def value_at(quantity: WatchedQuantity, x: float) -> float: ...
 def value_at(quantity: WatchedQuantity, x: FloatArray) -> FloatArray: ...
 def value_at(quantity: WatchedQuantity, x: float | FloatArray) -> float | FloatArray:
     """The tension in N or log10 of the stiffness at coordinate `x`, no further than the table."""
-    if quantity.name == TENSION:
+    if is_ratio(quantity.name):
         inside = np.clip(x, quantity.coordinates[0], quantity.coordinates[-1])
         return _like(x, quantity.baseline * np.exp(inside))
     return _like(x, np.interp(x, quantity.coordinates, quantity.values))
@@ -153,14 +154,14 @@ def shift_of(quantity: WatchedQuantity, x: FloatArray) -> FloatArray: ...
 def shift_of(quantity: WatchedQuantity, x: float | FloatArray) -> float | FloatArray:
     """The shift from the baseline: a fraction of the tension, or decades of the stiffness."""
     value = value_at(quantity, x)
-    if quantity.name == TENSION:
+    if is_ratio(quantity.name):
         return _like(x, value / quantity.baseline - 1)
     return _like(x, value - quantity.baseline)
 
 
 def coordinate_of(quantity: WatchedQuantity, value: float) -> float:
     """The coordinate at which the quantity has `value`: tension in N, or log10 of the stiffness."""
-    if quantity.name == TENSION:
+    if is_ratio(quantity.name):
         return float(np.log(value / quantity.baseline))
     return float(np.interp(value, quantity.values, quantity.coordinates))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.values import TENSION, FloatArray, WatchedQuantity
+from shm.values import FloatArray, WatchedQuantity, is_ratio
 from shm.watch.quantities import coordinate_of, shift_of
 
 # Technical: exact for polynomials of degree 13.
@@ -59,7 +59,7 @@ def beyond(
     weights, mean = weights[kept], mean[kept]
     sd = np.maximum(sd[kept], 1e-12)
     low, high = (_coordinate(quantity, sign * threshold) for sign in (-1, 1))
-    if quantity.name != TENSION:
+    if not is_ratio(quantity.name):
         low, high = min(low, -least), max(high, least)
     down = float(weights @ scipy.special.ndtr((low - mean) / sd))
     up = float(weights @ scipy.special.ndtr((mean - high) / sd))
@@ -68,8 +68,8 @@ def beyond(
 
 def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
     """The coordinate of a shift; infinite where the quantity's table ends before it."""
-    tension = quantity.name == TENSION
-    value = quantity.baseline * (1 + shift) if tension else quantity.baseline + shift
+    is_fraction = is_ratio(quantity.name)
+    value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
     if not min(quantity.values) < value < max(quantity.values):
         return math.copysign(math.inf, shift)
     return coordinate_of(quantity, value)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.values import TENSION, FloatArray, IntArray, WatchedQuantity
+from shm.values import FloatArray, IntArray, WatchedQuantity, is_ratio
 from shm.watch.causes import Structure
 from shm.watch.change_layout import Told
 from shm.watch.change_point import Sums, sums_of
@@ -39,57 +39,74 @@ class StateSums:
     def _warmth(self, state: WatchState) -> Warmth:
         return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
 
-    def _doubt(self, state: WatchState, kelvin_sd: FloatArray) -> FloatArray:
-        """Factors (T, n, 1 + q) of what a temperature that is not known, or not well, leaves open:
-        what a kelvin does as far as that is known, and as far as it is not."""
-        known = state.per_kelvin + state.slopes @ state.coefficients
-        unknown = state.slopes * state.coefficient_sd
-        per_kelvin = np.concatenate([known[:, :, None], unknown], axis=2)
-        return np.asarray(kelvin_sd[:, None, None] * per_kelvin)
+    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
+        """What quantities go with, each by a coefficient of its own: kelvin, and as many further
+        laws as the structure has."""
+        return (self._warmth(state),)
+
+    def _by_law(self, values: FloatArray) -> FloatArray:
+        """Coefficients (laws q,), or their sds, by law (laws, q)."""
+        return values.reshape(self.structure.thermal_laws, self.structure.layout.q)
+
+    def _doubt(self, state: WatchState, *, of_season: bool = False) -> FloatArray:
+        """Factors (T, n, laws (1 + q)) of what a temperature that is not known, or not well, leaves
+        open: what a kelvin does as far as that is known, and as far as it is not. Tests `of_season`
+        share what they miss."""
+        own, sds = self._by_law(state.coefficients), self._by_law(state.coefficient_sd)
+        softening, parts = state.per_kelvin, []
+        for law, mean, sd in zip(self._thermal(state), own, sds, strict=True):
+            known = softening + state.slopes @ mean
+            per_kelvin = np.concatenate([known[:, :, None], state.slopes * sd], axis=2)
+            off = law.sd * np.sqrt(law.shared) if of_season else law.sd
+            parts.append(off[:, None, None] * per_kelvin)
+            softening = np.zeros_like(softening)  # steel's goes with the first law
+        return np.concatenate(parts, axis=2)
 
     def seen(self, state: WatchState) -> Seen:
         """All tests so far, their swing with the temperature taken off as far as it is known."""
-        factors, warmth = self._factors(state), self._warmth(state)
+        factors = self._factors(state)
         measured = np.flatnonzero(np.isfinite(state.variances).any(axis=1))
         variance = np.maximum(state.scatter_variance, self.structure.scatter_variance)
         return Seen(
-            values=self._at_rest(state, warmth),
+            values=self._at_rest(state),
             variances=state.variances,
-            doubt=self._doubt(state, warmth.sd),
+            doubt=self._doubt(state),
             factors=factors[measured[-1]] if len(measured) else factors[-1],
             sds=np.sqrt(variance),
         )
 
-    def _at_rest(self, state: WatchState, warmth: Warmth) -> FloatArray:
-        swing = warmth.kelvin[:, None] * (state.per_kelvin + state.slopes @ state.coefficients)
+    def _at_rest(self, state: WatchState) -> FloatArray:
+        laws, own = self._thermal(state), self._by_law(state.coefficients)
+        swing = laws[0].kelvin[:, None] * state.per_kelvin
+        for law, mean in zip(laws, own, strict=True):
+            swing = swing + law.kelvin[:, None] * (state.slopes @ mean)
         return np.asarray(state.values - swing)
 
     def scatter(self, state: WatchState) -> FloatArray:
         """What the counted tests so far say of the scatter (q + c,); of a day one alone does."""
         rows = np.flatnonzero(state.counted)
         rows = rows[np.diff(state.years[rows], prepend=-1.0) > OF_ONE_VISIT_YEARS]
-        warmth = self._warmth(state)
         found = differences(
-            self._at_rest(state, warmth)[rows],
+            self._at_rest(state)[rows],
             state.variances[rows],
             self._factors(state)[rows],
-            self._doubt(state, warmth.sd)[rows],
+            self._doubt(state)[rows],
         )
         return learnt(found, self.structure.scatter_variance, state.scatter_variance)
 
     def _columns(self, state: WatchState, rows: IntArray) -> FloatArray:
         """Of the tests `rows` (T, n, columns): modes, quantities, covariates."""
-        layout, warmth = self.structure.layout, self._warmth(state)
+        layout = self.structure.layout
         slopes, level = state.slopes[rows], _levels(state.log_amplitude[rows])
-        tension = [each.name == TENSION for each in self.quantities]
+        creeping = [is_ratio(each.name) for each in self.quantities]
         return np.concatenate(
             [
                 np.broadcast_to(np.eye(layout.n), (len(rows), layout.n, layout.n)),
                 slopes,
-                slopes * warmth.kelvin[rows, None, None],
+                *(slopes * each.kelvin[rows, None, None] for each in self._thermal(state)),
                 slopes * np.nan_to_num(level)[:, None, None],
                 self.structure.stiffening[:, None] * np.nan_to_num(level)[:, None, None],
-                slopes[:, :, tension].sum(axis=2, keepdims=True) * state.years[rows, None, None],
+                slopes[:, :, creeping].sum(axis=2, keepdims=True) * state.years[rows, None, None],
             ],
             axis=2,
         )
@@ -102,20 +119,25 @@ class StateSums:
     def sums(self, state: WatchState, rows: IntArray) -> Sums:
         """Of the tests `rows`; those of one day scatter together, and say no more than one."""
         structure, layout = self.structure, self.structure.layout
-        warmth, years = self._warmth(state), state.years[rows]
-        of_a_day = (np.abs(years[:, None] - years) < OF_ONE_VISIT_YEARS).sum(axis=1)
-        of_level = layout.prior_sd[layout.n + 2 * layout.q : layout.n + 3 * layout.q + 1]
+        years = state.years[rows]
+        apart = np.abs(years[:, None] - years)
+        of_a_day = (apart < OF_ONE_VISIT_YEARS).sum(axis=1)
+        of_level = layout.prior_sd[-2 - layout.q : -1]  # before creep
         stiffening = np.broadcast_to(structure.stiffening[:, None], (len(rows), layout.n, 1))
         moving = np.concatenate([state.slopes[rows], stiffening], axis=2)
         unknown = moving * (self.options.unknown_log_amplitude_sd * of_level)
         unknown[np.isfinite(state.log_amplitude[rows])] = 0.0
-        doubt = self._doubt(state, warmth.sd * np.sqrt(warmth.shared))[rows]
+        doubt = self._doubt(state, of_season=True)[rows]
         open_left = np.concatenate([unknown, doubt], axis=2)
         common = open_left @ np.swapaxes(open_left, 1, 2)
         factors = self._factors(state)[rows] * np.sqrt(state.scatter_variance)
         spread = factors @ np.swapaxes(factors, 1, 2)
         scatter = structure.scales[:, None, None] ** 2 * spread[:, None]
         covariance = of_a_day[:, None, None, None] * (common[:, None] + scatter)
+        if structure.wander.size:
+            together = (apart < structure.wander_years).sum(axis=1)
+            slow = structure.scales[:, None, None] ** 2 * structure.wander @ structure.wander.T
+            covariance = covariance + together[:, None, None, None] * slow
         wider = 1 / state.weight[rows]
         return sums_of(
             self._columns(state, rows),

@@ -113,6 +113,7 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
+        coefficients = q * self.structure.thermal_laws
         state = WatchState(
             key=self.key,
             start=time,
@@ -128,8 +129,8 @@ class Watcher:
             log_amplitude=np.zeros(0),
             weight=np.zeros(0),
             counted=np.zeros(0, bool),
-            coefficients=np.zeros(q),
-            coefficient_sd=self.structure.layout.prior_sd[n + q : n + 2 * q],
+            coefficients=np.zeros(coefficients),
+            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
             scatter_variance=self.structure.scatter_variance,
             called=np.zeros((0, 3)),
             called_precision=np.zeros((0, n + q, n + q)),
@@ -291,9 +292,9 @@ class Watcher:
         )
 
     def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-        """How far each quantity goes with a kelvin (q,) and its sd, by the likeliest scatter."""
-        n, q = self.structure.layout.n, self.structure.layout.q
-        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + q)
+        """How far each quantity goes with a kelvin (laws q,), its sd; by the likeliest scatter."""
+        n, count = self.structure.layout.n, self.structure.layout.q * self.structure.thermal_laws
+        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + count)
         variance = np.diag(evidence.null_covariance[likeliest])[own]
         return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
 

@@ -92,7 +92,7 @@ def watch_hanger(
     since = max(time for _, time in baseline_tests)
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
-    options = _options_of(hanger, len(baseline_tests), options)
+    options = options_of(hanger, len(baseline_tests), options)
     watch = watched(readings, reader.quantities, reader.columns, hanger, options)
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
@@ -137,7 +137,7 @@ def watch_newest(
     """
     baseline_tests = kept_of(baseline, baseline_tests)
     reader = Reader(baseline, [test for test, _ in baseline_tests], hanger)
-    options = _options_of(hanger, len(baseline_tests), options)
+    options = options_of(hanger, len(baseline_tests), options)
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
@@ -166,7 +166,7 @@ def watch_newest(
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
 
-def _options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
+def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
     """How many tests precede every change, and how often this hanger may be called falsely."""
     own = hanger.thresholds.false_call_years
     limit_years = options.limit_years if own is None else own
@@ -370,7 +370,8 @@ def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
 
 def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Hanger) -> str:
     rules = "+".join(kind.replace(" ", "-") for kind in kinds)
-    return f"hanger-{hanger.id}:{rules}:{_first_moved(news, test)}:{short_name(test.test)}"
+    moved = _first_moved(news, test).replace(" ", "-")
+    return f"hanger-{hanger.id}:{rules}:{moved}:{short_name(test.test)}"
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:

@@ -336,7 +336,7 @@ def check_hangers(examined: Examined) -> Iterator[Finding]:
         yield warning("hangers", f"no baseline yet: {some(forming)}", "Take more tests.")
     outdated = list(_outdated_baselines(examined))
     yield from outdated
-    strangers = sorted(set(latest) - set(ids))
+    strangers = sorted(set(latest) - {each.id for each in bridge.watched})
     if strangers:
         names = some([str(each) for each in strangers])
         yield warning(

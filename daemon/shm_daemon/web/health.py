@@ -81,7 +81,7 @@ def _of_strangers(site: Site) -> list[Notice]:
         tested = set(site.store.tests.latest())
     except ShmError:
         return []  # told as a trouble
-    missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.hangers})
+    missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
     if not missing:
         return []
     named = _named(missing)

@@ -1,0 +1,239 @@
+"""The watch of a structure without a model: its log frequencies, against its own first tests.
+
+No beam, no plane, no posterior. Each frequency is a quantity with its own coefficients of
+temperature, frost and excitation. All may move alike (mass, stiffness, a clock), one alone, or each
+by its own amount. The decision is that of the watch of a hanger (`change_point`).
+
+Ambient tests come daily, and most of what moves their frequencies goes on for weeks: moisture,
+ice in the joints, ballast. So tests of three days are pooled, each mode by its median, and all
+tests within 45 days are taken to share what wanders.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from shm.errors import BadInput
+from shm.values import (
+    FREQUENCY,
+    FloatArray,
+    ModalTest,
+    ModeReading,
+    Reading,
+    WatchedQuantity,
+)
+from shm.watch.causes import UNEXPLAINED, Columns, Structure
+from shm.watch.change_layout import Direction, Layout
+from shm.watch.change_point import Evidence
+from shm.watch.conditions import DAYS_PER_YEAR, Warmth
+from shm.watch.options import WatchOptions
+from shm.watch.quantities import MeasuredMode
+from shm.watch.state_sums import StateSums
+from shm.watch.watch_state import WatchState
+from shm.watch.watcher import Watcher
+
+POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
+# Of a frequency. Half of what stiffens concrete and asphalt by 1e-3 / K is that of the frequency:
+# 2 to 5e-4 / K of many bridges in mild weather (Peeters and De Roeck 2001; Magalhaes et al. 2012).
+_PER_KELVIN_SD = 5e-4
+# Below 0 C: bridge Z24 gained 1e-2 / K as its asphalt stiffened (Peeters and De Roeck 2001).
+_PER_KELVIN_OF_FROST_SD = 5e-3
+_PER_AMPLITUDE_SD = 2e-3  # as of a hanger's tension
+_CREEP_PER_YEAR_SD = 1e-3  # judgement: concrete stiffens, settlement goes on
+_STEP = 0.01  # judgement: of a frequency, what may not be missed
+_WANDER, _WANDER_OF_A_MODE = 1e-3, 5e-4  # judgement: moisture; Magalhaes et al. 2012 leave 1e-3
+_WANDER_DAYS = 45.0  # judgement: as long as a deck takes to dry
+_SCATTER, _SCATTER_OF_A_MODE = 5e-4, 5e-4  # before any test: traffic; the identification
+_UNKNOWN_SD, _ALLOWANCE = 1e-3, 1e-4  # as of a hanger's tests (`readings`)
+_FROST_SPREAD_K = 2.0  # of frost where no thermometer was read: judgement, a mild winter's days
+# Judgement: of what lasts, loads, stiffness of the whole and clocks are half; a local damage moves
+# several modes, each by its own amount, more often than one alone.
+_ALIKE_SHARE, _ALONE_SHARE, _EACH_SHARE = 0.5, 0.2, 0.3
+# Of a log frequency: a mode has another name only where that brings all nearer by as much in sum.
+_RENAMED = 0.02
+
+
+class FrequencyReader:
+    """Reads tests of one structure against its baseline: log frequencies beside their first level.
+
+    Raises BadInput where no test of the baseline has a mode.
+    """
+
+    def __init__(self, tests: Sequence[ModalTest]):
+        found: dict[MeasuredMode, list[float]] = {}
+        for test in tests:
+            for key, (hz, _) in _frequencies(test).items():
+                found.setdefault(key, []).append(math.log(hz))
+        if not found:
+            raise BadInput("The first tests hold no mode.", remedy="Give tests with modes.")
+        self.modes: tuple[MeasuredMode, ...] = tuple(sorted(found))
+        self._level = np.array([float(np.median(found[key])) for key in self.modes])
+        nothing = np.zeros((len(self.modes), len(self.modes)))
+        self.columns = Columns(self.modes, {}, nothing)  # no model says what causes do
+        self.quantities = tuple(map(_quantity, self.modes, self._level.tolist()))
+
+    @property
+    def levels_hz(self) -> dict[str, float]:
+        """The baseline's frequencies by their names."""
+        return {each.name: each.baseline for each in self.quantities}
+
+    def reading(self, tests: Sequence[ModalTest], time: datetime) -> Reading:
+        """What `tests`, pooled, say: of each mode the median; their mean temperature and level."""
+        n = len(self.modes)
+        rows = [self._matched(test) for test in tests]
+        values, variances = np.zeros(n), np.full(n, np.inf)
+        for j in range(n):
+            seen = [row[j] for row in rows if j in row]
+            if seen:
+                values[j] = float(np.median([value for value, _ in seen]))
+                # The median of m has pi / 2 times the variance of the mean, of up to two the same.
+                wider = math.pi / 2 if len(seen) > 2 else 1.0
+                own = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
+                variances[j] = own + _ALLOWANCE**2
+        levels = [math.log(test.amplitude) for test in tests if test.amplitude > 0]
+        temperatures = [test.temperature_c for test in tests if math.isfinite(test.temperature_c)]
+        return Reading(
+            test=tests[-1].id,
+            time=time,
+            temperature_c=float(np.mean(temperatures)) if temperatures else math.nan,
+            mean=values,
+            information=np.diag(1 / variances),
+            modes=ModeReading(values, variances, np.eye(n), np.zeros(n), np.zeros(n, dtype=bool)),
+            amplitude=math.exp(float(np.mean(levels))) if levels else math.nan,
+        )
+
+    def _matched(self, test: ModalTest) -> dict[int, tuple[float, float]]:
+        """Log frequency over the level and its sd by mode: as named, or by the nearest frequency.
+
+        Two close modes are exchanged in one test in a hundred, and a mode that a test lacks makes
+        the orders above it too low.
+        """
+        seen = _frequencies(test)
+        if not seen:
+            return {}
+        log_hz = np.log([hz for hz, _ in seen.values()])
+        cost = np.abs(log_hz[:, None] - self._level)
+        named = np.array([[key == mode for mode in self.modes] for key in seen])
+        cost = cost + np.where(named, 0.0, _RENAMED)
+        # A name that the baseline does not know may be none of its modes.
+        beside = np.where(named.any(axis=1), np.inf, _RENAMED + 0.5 * _RENAMED)
+        nothing = np.where(np.eye(len(seen), dtype=bool), beside[:, None], 1e6)
+        nothing[~np.isfinite(nothing)] = 1e3
+        at, to = scipy.optimize.linear_sum_assignment(np.hstack([cost, nothing]))
+        sds = [sd for _, sd in seen.values()]
+        return {
+            int(j): (float(log_hz[i] - self._level[j]), sds[i])
+            for i, j in zip(at.tolist(), to.tolist(), strict=True)
+            if j < len(self.modes)
+        }
+
+
+def _frequencies(test: ModalTest) -> dict[MeasuredMode, tuple[float, float]]:
+    """Frequency and its relative sd of each mode that was measured; the first of a name counts."""
+    found: dict[MeasuredMode, tuple[float, float]] = {}
+    for mode in test.modes:
+        hz, sd = mode.frequency_hz, mode.frequency_sd_hz
+        if math.isfinite(hz) and hz > 0 and not math.isinf(sd):
+            found.setdefault((mode.plane, mode.order), (hz, sd / hz if sd > 0 else _UNKNOWN_SD))
+    return found
+
+
+def _quantity(mode: MeasuredMode, level: float) -> WatchedQuantity:
+    plane, order = mode
+    reach = np.linspace(-2.0, 2.0, 5)  # technical: a frequency sevenfold or a seventh
+    hz = math.exp(level)
+    return WatchedQuantity(
+        f"{FREQUENCY}{plane} {order}", hz, reach, hz * np.exp(reach), _STEP, plane=plane
+    )
+
+
+def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
+    """The hypotheses of `n` frequencies."""
+    ones = np.ones(n)
+    prior_sd = np.concatenate(
+        [
+            ones,
+            _STEP * ones,
+            _PER_KELVIN_SD * ones,
+            _PER_KELVIN_OF_FROST_SD * ones,
+            _PER_AMPLITUDE_SD * ones,
+            [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
+        ]
+    )
+    own = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
+    each = np.vstack([_STEP * np.eye(n), np.zeros((n, n))])
+    directions = [
+        Direction("alike", own.sum(axis=1, keepdims=True), tuple(range(n)), math.log(_ALIKE_SHARE))
+    ]
+    if n > 1:
+        directions += [
+            Direction("alone", own[:, [j]], (j,), math.log(_ALONE_SHARE / n)) for j in range(n)
+        ]
+        directions.append(Direction(UNEXPLAINED, each, (), math.log(_EACH_SHARE)))
+    wander = np.hstack([_WANDER * ones[:, None], _WANDER_OF_A_MODE * np.eye(n)])
+    return Structure(
+        layout=Layout(n, n, prior_sd),
+        directions=tuple(directions),
+        quantities=(),
+        scattering=ones[:, None],
+        scatter_variance=np.append(np.full(n, _SCATTER_OF_A_MODE), _SCATTER) ** 2,
+        scales=np.array(options.scatter_scales),
+        stiffening=np.zeros(n),
+        wander=wander,
+        wander_years=_WANDER_DAYS / DAYS_PER_YEAR,
+        thermal_laws=2,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencySums(StateSums):
+    """What the tests of such a structure are to the evidence."""
+
+    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
+        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
+
+    def effects(self, state: WatchState) -> FloatArray:
+        """Each frequency counts: which of them matters no model says."""
+        n = self.structure.layout.n
+        return np.hstack([np.eye(n), np.eye(n)])
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyWatcher(Watcher):
+    """Watches the frequencies of one structure."""
+
+    @cached_property
+    def structure(self) -> Structure:
+        """The hypotheses."""
+        found = structure_of_frequencies(len(self.quantities), self.options)
+        return replace(found, quantities=self.quantities)
+
+    @cached_property
+    def sums(self) -> StateSums:
+        """What the tests of a state are to the evidence."""
+        return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
+
+    def _creep(self, evidence: Evidence) -> None:
+        """It is allowed for, and of no interest."""
+
+
+def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
+    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
+
+    The deck follows the air in its own time, so that near 0 C its mean is what counts.
+    """
+    known = np.isfinite(temperatures_c)
+    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
+    below = scipy.special.ndtr(-scaled)
+    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
+    kelvin = thermometer_sd_k * (scaled * below - density)
+    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
+    sd = np.where(known, thermometer_sd_k * below, _FROST_SPREAD_K)
+    return Warmth(kelvin, sd, np.ones(len(known)))

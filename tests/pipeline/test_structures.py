@@ -1,0 +1,132 @@
+"""A structure that no model describes, from its description to alert, status and report."""
+
+from __future__ import annotations
+
+import json
+import math
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.bridge import load_bridge
+from shm.documents import dump
+from shm.errors import BadInput
+from shm.modes_document import modes_document
+from shm.pipeline import steps
+from shm.store import Workspace
+from shm.values import ModalTest, Mode
+from shm_cli.main import run
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import START, make_workspace
+
+DECK = 100
+HZ = (("transverse", 1, 2.0), ("longitudinal", 1, 3.1), ("transverse", 2, 4.7))
+WEEK, LOST_FROM = 7, 11
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    settings = {"baseline_tests": 3}
+    made = make_workspace(tmp_path / "bridge", hooks={"mail": ["true"]}, settings=settings)
+    config = made.folder / "bridge.toml"
+    config.write_text(f'{config.read_text()}\n[[structure]]\nid = {DECK}\nname = "Deck"\n')
+    return Workspace.open(made.folder)
+
+
+def write_week(workspace: Workspace, week: int) -> None:
+    draw, loss = np.random.default_rng(week), -0.04 * (week >= LOST_FROM)
+    modes = tuple(
+        Mode(plane, order, hz * math.exp(loss + 3e-4 * draw.normal()), 3e-4 * hz)  # type: ignore[arg-type]
+        for plane, order, hz in HZ
+    )
+    time = START + timedelta(days=WEEK * week - 50)
+    test = ModalTest(f"w{week}", modes, DECK, time, 12.0)
+    path = workspace.spool / f"w{week}.modes.json"
+    path.write_text(dump(modes_document([test])))
+
+
+def test_a_lost_stiffness_of_the_deck_is_told_and_shown(
+    workspace: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for week in range(LOST_FROM + 4):
+        write_week(workspace, week)
+    ingest(workspace)
+
+    with workspace.store() as store:
+        assert len(store.watch.list_all(DECK)) == LOST_FROM + 4 - 3  # three are the baseline
+        told = [each.alert for each in store.alerts.list_all(DECK) if each.alert.change]
+        drifts = store.watch.list_drifts(DECK, f"w{LOST_FROM + 3}")
+    assert told
+    assert "of Deck ha" in told[0].message
+    assert told[0].tension is None
+    assert " " not in told[0].key
+    assert {each.quantity for each in drifts} == {f"frequency {p} {o}" for p, o, _ in HZ}
+    assert all(each.shift_mean == pytest.approx(-0.04, abs=0.006) for each in drifts)
+
+    at = ["--workspace", str(workspace.folder)]
+    assert run([*at, "status"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "structure 100 (Deck): 15 tests" in shown
+    assert "have dropped by" in shown
+    assert run([*at, "report", "--hanger", str(DECK), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["name"] == "Deck"
+    assert report["open_alerts"] == len(report["alerts"]) >= 1
+    assert report["baseline_hz"]["frequency transverse 1"] == pytest.approx(2.0, rel=1e-3)
+    assert run([*at, "report", "--hanger", str(DECK)]) == 0
+    assert "frequency transverse 2" in capsys.readouterr().out
+    assert run([*at, "alerts", "--hanger", str(DECK)]) == 0
+    assert "Deck" in capsys.readouterr().out
+
+
+def test_the_watch_of_a_deck_goes_on_from_what_it_kept(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watch, seen = steps.watch_test, []
+
+    def noted(baseline: object, tests: tuple[list[object], list[object]], *terms: object) -> object:
+        seen.append(len(tests[1]))
+        return watch(baseline, tests, *terms)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(steps, "watch_test", noted)
+    for week in range(7):
+        write_week(workspace, week)
+        ingest(workspace)
+
+    assert seen == [1] * 4  # three made the baseline; each other one alone
+
+
+def test_a_deck_has_a_number_that_no_hanger_has(tmp_path: Path, workspace: Workspace) -> None:
+    config = workspace.folder / "bridge.toml"
+    config.write_text(f"{config.read_text()}\n[[structure]]\nid = 3\n")
+
+    with pytest.raises(BadInput, match="hanger id 3 is given twice"):
+        load_bridge(config)
+
+
+@pytest.mark.parametrize("line", ["length_m = 12.0", 'kind = "rod"'])
+def test_a_structure_has_no_other_keys(workspace: Workspace, line: str) -> None:
+    config = workspace.folder / "bridge.toml"
+    config.write_text(f"{config.read_text()}{line}\n")
+
+    with pytest.raises(BadInput, match="structure"):
+        load_bridge(config)
+
+
+def test_a_hanger_of_any_kind_is_sent_to_the_structures(workspace: Workspace) -> None:
+    config = workspace.folder / "bridge.toml"
+    described = config.read_text().replace("length_m = 12.0", 'length_m = 12.0\nkind = "any"')
+    config.write_text(described)
+
+    with pytest.raises(BadInput) as refused:
+        load_bridge(config)
+
+    assert "[[structure]]" in refused.value.remedy
+
+
+def test_what_asks_for_a_tension_says_that_a_deck_has_none(workspace: Workspace) -> None:
+    with pytest.raises(BadInput, match="has no tension"):
+        workspace.bridge.hanger(DECK)
+    assert workspace.bridge.tested(DECK).name == "Deck"

@@ -1,0 +1,263 @@
+"""The watch without a model: what it tells of daily frequencies of which the truth is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput
+from shm.values import Hanger, ModalTest, Mode
+from shm.watch import WatchedFrequencies, WatchOptions, watch_frequencies
+from shm.watch.frequencies import FrequencyReader, frost_of
+from shm.watch.frequency_watch import FrequencyWatch, measured_levels
+
+START = datetime(2026, 5, 1, 12, tzinfo=UTC)
+MODES = (("transverse", 1, 2.0), ("longitudinal", 1, 2.12), ("transverse", 2, 4.1))
+"""Plane, order and frequency (Hz); the first two are a close pair."""
+Moved = Callable[[int, float, int], float]
+
+
+def unmoved(day: int, warmth_c: float, mode: int) -> float:
+    return 0.0
+
+
+def one_test(
+    day: int, *, moved: Moved = unmoved, warmth_c: float = 15.0, seed: int = 0, noise: float = 4e-4
+) -> ModalTest:
+    """One test: `moved` gives the change of each log frequency."""
+    draw = np.random.default_rng([seed, day])
+    modes = tuple(
+        Mode(
+            plane, order, hz * math.exp(moved(day, warmth_c, j) + noise * draw.normal()), 4e-4 * hz
+        )  # type: ignore[arg-type]
+        for j, (plane, order, hz) in enumerate(MODES)
+    )
+    return ModalTest(f"d{day}", modes, 9, START + timedelta(days=day), warmth_c)
+
+
+def daily(days: Sequence[int], moved: Moved = unmoved, *, seed: int = 0) -> list[ModalTest]:
+    """Tests at the warmth of the season, from 25 C in summer to -5 C in winter."""
+    return [
+        one_test(
+            day, moved=moved, seed=seed, warmth_c=10 + 15 * math.cos(2 * math.pi * (day - 80) / 365)
+        )
+        for day in days
+    ]
+
+
+def watch(tests: Sequence[ModalTest], baseline: int = 30) -> WatchedFrequencies:
+    return watch_frequencies(tests, baseline_tests=baseline, name="Deck")
+
+
+def from_day(first: int, *sizes: float) -> Moved:
+    return lambda day, _, mode: sizes[mode] if day >= first else 0.0
+
+
+# ---------------------------------------------------------------- what is told
+
+
+def test_a_drop_of_all_frequencies_is_told_within_three_weeks_with_its_size() -> None:
+    found = watch(daily(range(121), from_day(90, -0.02, -0.02, -0.02)))
+
+    changes = [each for each in found.alerts if "sudden change" in each.kinds]
+    assert len(changes) == 1
+    told = changes[0]
+    assert START + timedelta(days=90) <= told.time <= START + timedelta(days=111)
+    assert told.message.startswith("The frequencies of Deck have dropped by ")
+    assert told.change is not None
+    first = told.change.moved[0]
+    assert len(first.together) == len(MODES) - 1
+    assert abs(first.shift_mean + 0.02) < 3 * first.shift_sd < 0.006
+
+
+def test_a_change_is_called_at_one_test_alone() -> None:
+    found = watch(daily(range(121), from_day(90, -0.02, -0.02, -0.02)))
+
+    assert sum(each.change.called for each in found.tests) == 1
+
+
+def test_the_one_frequency_that_dropped_is_named() -> None:
+    found = watch(daily(range(121), from_day(90, 0.0, 0.0, -0.02)))
+
+    told = next(each for each in found.alerts if "sudden change" in each.kinds)
+    assert told.message.startswith("The frequency transverse 2 of Deck has dropped by ")
+    shifts = {each.quantity: each.shift_mean for each in found.tests[-1].drifts}
+    assert shifts["frequency transverse 2"] == pytest.approx(-0.02, abs=0.003)
+    assert abs(shifts["frequency transverse 1"]) < 0.004
+
+
+def test_nothing_is_told_where_nothing_changes() -> None:
+    assert not watch(daily(range(150))).alerts
+
+
+def test_the_first_frost_is_no_damage() -> None:
+    def stiffened(day: int, warmth_c: float, mode: int) -> float:
+        return -3e-4 * warmth_c - 2.5e-3 * (1 + mode / 4) * min(warmth_c, 0.0)
+
+    tests = daily(range(60, 330), stiffened)
+    swing = [math.log(each.modes[0].frequency_hz) for each in tests]
+    assert max(swing) - min(swing) > 0.015  # as much as the losses above
+
+    assert not [each for each in watch(tests).alerts if each.change]
+
+
+def test_a_month_of_moisture_is_no_damage() -> None:
+    def moist(day: int, _: float, mode: int) -> float:
+        return -2.5e-3 if 100 <= day < 130 else 0.0
+
+    assert not [each for each in watch(daily(range(150), moist)).alerts if each.change]
+
+
+def test_a_structure_tested_once_a_month_waits_for_no_further_test() -> None:
+    months = range(0, 30 * 16, 30)
+    found = watch(daily(months, from_day(300, -0.04, -0.04, -0.04)), baseline=6)
+
+    evidence = {each.test: each.change.evidence_years for each in found.tests}
+    assert evidence["d270"] < 1 < 20 < evidence["d330"]  # the second test that shows it
+    told = next(each for each in found.alerts if each.change)
+    assert told.test == "d360"
+
+
+def test_its_urgency_names_no_traffic_and_no_hammer() -> None:
+    found = watch(daily(range(121), from_day(90, -0.06, -0.06, -0.06)))
+
+    for alert in found.alerts:
+        assert "within a week" in alert.message
+        assert "traffic" not in alert.message
+        assert "hammer" not in alert.message
+    assert any("beyond threshold" in each.kinds for each in found.alerts)
+
+
+# ---------------------------------------------------------------- reading
+
+
+def test_a_pool_is_the_median_of_its_tests_at_their_mean_temperature() -> None:
+    reader = FrequencyReader([one_test(0, noise=0.0)])
+    shifts = {1: 0.001, 2: 0.002, 3: 0.05}
+    pool = [
+        one_test(day, moved=lambda d, _, mode: shifts[d], warmth_c=float(day), noise=0.0)
+        for day in shifts
+    ]
+
+    found = reader.reading(pool, START)
+
+    assert found.modes is not None
+    assert found.modes.values == pytest.approx([0.002] * 3, abs=1e-9)
+    assert found.temperature_c == 2.0
+    alone = reader.reading(pool[:1], START).modes
+    assert alone is not None
+    assert (found.modes.variances < alone.variances).all()
+
+
+def test_two_close_modes_that_were_exchanged_are_put_right() -> None:
+    reader = FrequencyReader([one_test(0, noise=0.0)])
+    first, second, third = one_test(1, noise=0.0).modes
+    exchanged = (
+        replace(first, frequency_hz=second.frequency_hz),
+        replace(second, frequency_hz=first.frequency_hz),
+        third,
+    )
+
+    found = reader.reading([ModalTest("x", exchanged)], START).modes
+
+    assert found is not None
+    assert found.values == pytest.approx([0.0] * 3, abs=1e-9)
+
+
+def test_orders_that_a_missing_mode_made_too_low_are_put_right() -> None:
+    reader = FrequencyReader([one_test(0, noise=0.0)])
+    _, second, third = one_test(1, noise=0.0).modes
+    lower = (second, replace(third, order=1))  # transverse 1 was missed
+
+    found = reader.reading([ModalTest("x", lower)], START).modes
+
+    assert found is not None
+    index = [*reader.modes].index(("transverse", 2))
+    assert found.values[index] == pytest.approx(0.0, abs=1e-9)
+    assert math.isinf(found.variances[[*reader.modes].index(("transverse", 1))])
+
+
+def test_a_true_loss_of_one_mode_is_no_exchange() -> None:
+    reader = FrequencyReader([one_test(0, noise=0.0)])
+    lost = one_test(1, moved=lambda d, w, mode: -0.05 * (mode == 1), noise=0.0)
+
+    found = reader.reading([lost], START).modes
+
+    assert found is not None
+    assert sorted(found.values) == pytest.approx([-0.05, 0.0, 0.0], abs=1e-9)
+
+
+def test_frost_counts_below_zero_alone() -> None:
+    found = frost_of(np.array([20.0, -10.0, math.nan]), 1.5)
+
+    assert found.kelvin[0] == pytest.approx(0.0, abs=1e-6)
+    assert found.kelvin[1] == pytest.approx(-10.0, abs=1e-6)
+    assert found.sd[0] < 1e-6 < found.sd[1] < found.sd[2]
+
+
+def test_first_tests_without_modes_are_refused() -> None:
+    with pytest.raises(BadInput, match="no mode"):
+        FrequencyReader([ModalTest("x", ())])
+
+
+def test_tests_need_times_and_as_many_as_the_baseline() -> None:
+    with pytest.raises(BadInput, match="no time"):
+        watch([ModalTest("x", one_test(0).modes)], baseline=1)
+    with pytest.raises(BadInput, match="fewer"):
+        watch([one_test(0)], baseline=2)
+
+
+def test_what_is_kept_of_them_has_no_tension() -> None:
+    found = measured_levels([one_test(0, noise=0.0)], seed=1)
+
+    assert dict(zip(found.names, found.samples[0], strict=True)) == pytest.approx(
+        {f"frequency {plane} {order}": hz for plane, order, hz in MODES}
+    )
+
+
+# ---------------------------------------------------------------- going on
+
+
+def dated(tests: Sequence[ModalTest]) -> list[tuple[ModalTest, datetime]]:
+    return [(each, each.time) for each in tests if each.time is not None]
+
+
+def test_going_on_from_what_was_kept_is_the_same_as_going_over_all() -> None:
+    tests = dated(daily(range(100), from_day(80, -0.02, -0.02, -0.02)))
+    one = FrequencyWatch(tests[:30], Hanger.without_model(9), WatchOptions())
+    now, other, told, told_again = one.begin(), one.keep(one.begin()), [], []
+    for each in tests[30:]:
+        now, alert = one.after(now, each)
+        resumed = one.resume(other)
+        assert resumed is not None
+        resumed, again = one.after(resumed, each)
+        other = one.keep(resumed)
+        told += [alert.message] if alert else []
+        told_again += [again.message] if again else []
+
+    assert told
+    assert told == told_again
+    assert one.keep(now) == other
+
+
+def test_what_another_watch_kept_is_not_gone_on_from() -> None:
+    tests = dated(daily(range(40)))
+    hanger = Hanger.without_model(9)
+    one = FrequencyWatch(tests[:30], hanger, WatchOptions())
+    other = FrequencyWatch(tests[:20], hanger, WatchOptions())
+
+    assert other.resume(one.keep(one.begin())) is None
+
+
+def test_an_older_test_than_the_last_is_refused() -> None:
+    tests = dated(daily(range(40)))
+    watching = FrequencyWatch(tests[:30], Hanger.without_model(9), WatchOptions())
+    now, _ = watching.after(watching.begin(), tests[35])
+
+    with pytest.raises(BadInput, match="later"):
+        watching.after(now, tests[34])
