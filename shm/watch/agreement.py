@@ -110,7 +110,7 @@ def _known_before(
         test.id: test
         for tests in (beside.came[0], beside.dated[0])
         for test in tests
-        if _is_later(newest, test) and test.id not in beside.held
+        if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
     }
     return [_read(reader, test, options) for test in earlier.values()]
 
