@@ -3,48 +3,25 @@
 from __future__ import annotations
 
 import json
-import math
-from datetime import timedelta
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from shm.bridge import load_bridge
-from shm.documents import dump
 from shm.errors import BadInput
-from shm.modes_document import modes_document
 from shm.pipeline import steps
 from shm.store import Workspace
-from shm.values import ModalTest, Mode
 from shm_cli.main import run
 from tests.helpers.flows import ingest
-from tests.helpers.workspaces import START, make_workspace
-
-DECK = 100
-HZ = (("transverse", 1, 2.0), ("longitudinal", 1, 3.1), ("transverse", 2, 4.7))
-WEEK, LOST_FROM = 7, 11
+from tests.helpers.structures import DECK, HZ, LOST_FROM, with_a_deck, write_week
+from tests.helpers.workspaces import make_workspace
 
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
     settings = {"baseline_tests": 3}
     made = make_workspace(tmp_path / "bridge", hooks={"mail": ["true"]}, settings=settings)
-    config = made.folder / "bridge.toml"
-    config.write_text(f'{config.read_text()}\n[[structure]]\nid = {DECK}\nname = "Deck"\n')
-    return Workspace.open(made.folder)
-
-
-def write_week(workspace: Workspace, week: int) -> None:
-    draw, loss = np.random.default_rng(week), -0.04 * (week >= LOST_FROM)
-    modes = tuple(
-        Mode(plane, order, hz * math.exp(loss + 3e-4 * draw.normal()), 3e-4 * hz)  # type: ignore[arg-type]
-        for plane, order, hz in HZ
-    )
-    time = START + timedelta(days=WEEK * week - 50)
-    test = ModalTest(f"w{week}", modes, DECK, time, 12.0)
-    path = workspace.spool / f"w{week}.modes.json"
-    path.write_text(dump(modes_document([test])))
+    return with_a_deck(made)
 
 
 def test_a_lost_stiffness_of_the_deck_is_told_and_shown(
