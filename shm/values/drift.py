@@ -22,7 +22,7 @@ FREQUENCY = "frequency "
 """Begins the names of frequencies that are watched by themselves: `frequency transverse 1`."""
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
-_ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
+ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -187,7 +187,7 @@ class Change:
     @property
     def is_baseline_alone(self) -> bool:
         """Whether it is the baseline that does not fit, as far as anybody can say."""
-        return self.against_baseline >= _ENOUGH_AGAINST and not self.called
+        return self.against_baseline >= ENOUGH_AGAINST and not self.called
 
     @property
     def called(self) -> bool:

@@ -163,7 +163,7 @@ class StateSums:
             changing,
             self._softened(state, rows),
             state.variances[rows] + own,
-            max(int((rows < self.options.baseline_tests).sum()), 1),
+            int((rows < self.options.baseline_tests).sum()),
         )
 
     def effects(self, state: WatchState) -> FloatArray:

@@ -26,6 +26,7 @@ from shm.values import (
     WatchedQuantity,
     WatchedTest,
 )
+from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, Structure, structure_of
 from shm.watch.change_layout import Told
 from shm.watch.change_point import (
@@ -40,13 +41,13 @@ from shm.watch.conditions import (
 )
 from shm.watch.isolated_tests import counted, outlier_probability
 from shm.watch.options import WatchOptions
-from shm.watch.persistence import Stays, what_stays
+from shm.watch.persistence import what_stays
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
 from shm.watch.state_sums import StateSums
 from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 4
+_VERSION = 5
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
@@ -165,22 +166,45 @@ class Watcher:
         rows = _counting(state)
         if not state.counted[-1]:
             evidence = self._evidence(state, rows)
-        causes, stays = evidence, Stays(math.inf)
-        if evidence.log_evidence > math.log(_LOOKED_AT * self.options.limit_years):
-            # How sure it is that anything changed is bounded; which cause it was is for all to say.
-            causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-            course = self.sums.course(state, rows, causes.called)
-            stays = what_stays(causes, course, self.options.limit_years)
-            evidence = replace(evidence, log_most=stays.log_years)
-        found = self._said(state, reading, evidence, causes, stays.against_baseline)
+        evidence, causes, against = self._bounded_by_what_stays(state, evidence)
+        if against >= ENOUGH_AGAINST:
+            # Else everything since would be one change, and hide the next.
+            state = self._without_baseline(state)
+            evidence = self._evidence(state, _counting(state))
+            evidence, causes, _ = self._bounded_by_what_stays(state, evidence)
+        own = slice(self.options.baseline_tests)
+        if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
+            against = int(state.counted.sum())
+        found = self._said(state, reading, evidence, causes, against)
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            begun = np.append(state.called, [_begun(causes, rows, found.change)], axis=0)
+            call = _begun(causes, _counting(state), found.change)
+            begun = np.append(state.called, [call], axis=0)
             sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
             state = replace(state, called=begun, called_precision=sizes, still_same=still)
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
+
+    def _bounded_by_what_stays(
+        self, state: WatchState, evidence: Evidence
+    ) -> tuple[Evidence, Evidence, int]:
+        """As far as it stays, by which causes are weighed, and tests against the baseline."""
+        if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
+            return evidence, evidence, 0
+        # How sure it is that anything changed is bounded; which cause it was is for all to say.
+        rows = _counting(state)
+        causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
+        course = self.sums.course(state, rows, causes.called)
+        stays = what_stays(causes, course, self.options.limit_years)
+        bounded = replace(evidence, log_most=stays.log_years)
+        return bounded, causes, 0 if causes.called else stays.against_baseline
+
+    def _without_baseline(self, state: WatchState) -> WatchState:
+        """The state in which a baseline that stands alone does not count."""
+        counted = state.counted.copy()
+        counted[: self.options.baseline_tests] = False
+        return replace(state, counted=counted)
 
     def _said(
         self,

@@ -79,7 +79,20 @@ def test_a_baseline_of_one_test_that_stands_alone_is_said_and_calls_nothing() ->
     assert not found.calls
     assert found.tests[-1].change.is_baseline_alone
     assert counts[-1] >= 20
-    assert sum(count >= 4 for count in counts) > 10
+    assert sum(count >= 4 for count in counts) > 15
+
+
+def test_a_baseline_that_stands_alone_hides_no_later_loss() -> None:
+    readings = vans(QUIET.readings(2), [0], by=0.08)
+    for test in range(16, 24):
+        readings = [*readings[:test], *shifted(readings, test, [-0.05])[test:]]
+
+    found, _ = against(readings)
+
+    (call,) = found.calls
+    assert 17 <= call.index <= 19
+    assert call.change.moved[0].shift_mean == pytest.approx(-0.05, abs=0.01)
+    assert found.tests[-1].change.is_baseline_alone
 
 
 def test_a_sound_baseline_is_never_said_to_stand_alone() -> None:
