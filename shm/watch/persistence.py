@@ -33,8 +33,14 @@ _SLIPPED, _SLIPPED_AS_FROM = 0.15, 20.0
 _SEEM, _AS_FROM = 0.03, 5.0
 # Of a log frequency: no load that passes does as much, but a blunder may.
 _LARGE, _LARGE_SEEM = 0.04, 0.01
-# Years: vans come with tests, not with time; a long wait before two tests makes them no surer.
-_WAITED = 1 / 12
+# Of a log frequency: what only another hanger's test does, if it is no change; one in 10,000 first
+# tests, since it fitted the description.
+_GROSS, _GROSS_BEFORE = 0.08, 1e-4
+# Judgement: tests that are odd for other reasons agree with each other by chance.
+_ODD_ALIKE = 0.03
+# Years: vans come with tests, not with time; a long wait before two tests makes them no surer, and
+# visits in haste make a change that stays no less likely.
+_LEAST_WAITED, _MOST_WAITED = 7 / 365.25, 1 / 12
 # Hypotheses that are asked: none that others beat by 20 to 1 (technical: of so many at most).
 _LEADING, _BEATEN_NATS = 12, 3.0
 _TELLING = 0.5  # of a change: a test that is less sure of it by itself says nothing
@@ -121,10 +127,14 @@ def _of_change(
     likely -= scipy.special.betaln(showing, not_showing)
     those_after = np.where(does, np.log(odd), np.log1p(-odd)).sum()
     early = before >= _SHOWN
-    those_before = np.where(early, math.log1p(-_SEEM), math.log(max(seem, _SEEM))).sum()
-    waited = float(np.minimum(evidence.waited, _WAITED) @ evidence.shares.sum(axis=(1, 2, 3, 4)))
+    odd_before = _GROSS_BEFORE if largest > _GROSS else max(seem, _SEEM)
+    those_before = np.where(early, math.log1p(-_SEEM), math.log(odd_before)).sum()
+    those_before += max(int((~early).sum()) - 1, 0) * math.log(_ODD_ALIKE)
+    each = np.clip(evidence.waited, _LEAST_WAITED, _MOST_WAITED)
+    waited = float(each @ evidence.shares.sum(axis=(1, 2, 3, 4)))
     log_years = math.log(waited) + float(likely - np.logaddexp(those_after, those_before))
-    return log_years, bool(those_before > those_after), int(does.sum())
+    is_baseline_odd = largest <= _GROSS and bool(those_before > those_after)
+    return log_years, is_baseline_odd, int(does.sum())
 
 
 def _shown(

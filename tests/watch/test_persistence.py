@@ -82,6 +82,19 @@ def test_a_baseline_of_one_test_that_stands_alone_is_said_and_calls_nothing() ->
     assert sum(count >= 4 for count in counts) > 15
 
 
+@pytest.mark.parametrize("by", [-0.08, -0.7])
+def test_a_loss_after_a_baseline_of_one_test_and_one_that_agrees_is_called(by: float) -> None:
+    for seed in range(3):
+        (called,) = calls(vans(QUIET.readings(seed), list(range(2, 24)), by))
+        assert called <= 5
+
+
+def test_a_gross_loss_right_after_a_baseline_of_one_test_is_called() -> None:
+    for seed in range(3):
+        (called,) = calls(vans(QUIET.readings(seed), list(range(1, 24)), -0.7))
+        assert called <= 5
+
+
 def test_a_baseline_that_stands_alone_hides_no_later_loss() -> None:
     readings = vans(QUIET.readings(2), [0], by=0.08)
     for test in range(16, 24):
