@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.values import FloatArray, IntArray, WatchedQuantity, is_ratio
+from shm.values import Change, FloatArray, IntArray, WatchedQuantity, is_ratio
 from shm.watch.causes import Structure
 from shm.watch.change_layout import Told
-from shm.watch.change_point import Sums, sums_of
+from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
 from shm.watch.conditions import OF_ONE_VISIT_YEARS, Warmth, warmth_of
 from shm.watch.isolated_tests import Seen
 from shm.watch.options import WatchOptions
@@ -18,6 +18,8 @@ from shm.watch.persistence import Course
 from shm.watch.quantities import MeasuredMode
 from shm.watch.scatter import differences, learnt
 from shm.watch.watch_state import WatchState
+
+_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,3 +183,25 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
     """Over the usual one, NaN where unknown."""
     known = np.isfinite(log_amplitude)
     return log_amplitude - (float(np.median(log_amplitude[known])) if known.any() else 0.0)
+
+
+def begun_of(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
+    """The likeliest first test of a called change, when it began, and whether it goes on."""
+    share = evidence.shares.sum(axis=(1, 2, 3, 4))
+    first = int(evidence.beginnings[int(share.argmax())])
+    is_ramp = bool(change.sudden < 0.5)
+    return [float(rows[first]), float(evidence.years[first - 1]), float(is_ramp)]
+
+
+def size_of(evidence: Evidence) -> FloatArray:
+    """Precision (n + q, n + q) of a called change's size: each cause as probable as it was then."""
+    layout = evidence.layout
+    least = np.concatenate(
+        [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
+    )
+    covariance = np.diag(least**2)
+    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
+    for direction, by_size in zip(evidence.directions, shares, strict=True):
+        for share, size in zip(by_size, SIZES, strict=True):
+            covariance += share * size**2 * direction.factor @ direction.factor.T
+    return np.asarray(np.linalg.inv(covariance))

@@ -30,7 +30,6 @@ from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, Structure, structure_of
 from shm.watch.change_layout import Told
 from shm.watch.change_point import (
-    SIZES,
     Evidence,
     evidence_of,
 )
@@ -43,7 +42,7 @@ from shm.watch.isolated_tests import counted, outlier_probability
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import what_stays
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
-from shm.watch.state_sums import StateSums
+from shm.watch.state_sums import StateSums, begun_of, size_of
 from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
@@ -51,7 +50,6 @@ _VERSION = 5
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
-_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,13 +173,19 @@ class Watcher:
         own = slice(self.options.baseline_tests)
         if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
             against = int(state.counted.sum())
-        found = self._said(state, reading, evidence, causes, against)
+            # How far it is since the baseline stays open all the same.
+            whole = self._with_baseline(state)
+            since = self._evidence(whole, _counting(whole))
+            since, all_causes, _ = self._bounded_by_what_stays(whole, since)
+        else:
+            since, all_causes = evidence, causes
+        found = self._said(state, reading, (evidence, causes, against), (since, all_causes))
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            call = _begun(causes, _counting(state), found.change)
+            call = begun_of(causes, _counting(state), found.change)
             begun = np.append(state.called, [call], axis=0)
-            sizes = np.append(state.called_precision, [_size_of(causes)], axis=0)
+            sizes = np.append(state.called_precision, [size_of(causes)], axis=0)
             state = replace(state, called=begun, called_precision=sizes, still_same=still)
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
@@ -206,15 +210,22 @@ class Watcher:
         counted[: self.options.baseline_tests] = False
         return replace(state, counted=counted)
 
+    def _with_baseline(self, state: WatchState) -> WatchState:
+        counted = state.counted.copy()
+        counted[: self.options.baseline_tests] = True
+        none = state.called[:0], state.called_precision[:0]
+        return replace(state, counted=counted, called=none[0], called_precision=none[1])
+
     def _said(
         self,
         state: WatchState,
         reading: Reading,
-        evidence: Evidence,
-        causes: Evidence,
-        against_baseline: int,
+        changes: tuple[Evidence, Evidence, int],
+        shifts: tuple[Evidence, Evidence],
     ) -> WatchedTest:
-        """What people are told after the newest test."""
+        """What people are told after the newest test: by the evidence of changes, that by which
+        causes are weighed, and tests against the baseline; and of shifts since the baseline."""
+        evidence, causes, against_baseline = changes
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
         subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
         last, effects = state.tests - 1, self.sums.effects(state)
@@ -225,8 +236,7 @@ class Watcher:
             temperature_c=reading.temperature_c,
             drifts=drifted(
                 subject,
-                evidence,
-                causes,
+                *shifts,
                 reading,
                 effects,
                 is_baseline=state.tests <= self.options.baseline_tests,
@@ -369,28 +379,6 @@ def _counting(state: WatchState) -> IntArray:
     """The tests that count; as long as none does, the newest, which then says nothing."""
     rows = np.flatnonzero(state.counted)
     return rows if len(rows) else np.array([state.tests - 1])
-
-
-def _begun(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
-    """The likeliest first test of a called change, when it began, and whether it goes on."""
-    share = evidence.shares.sum(axis=(1, 2, 3, 4))
-    first = int(evidence.beginnings[int(share.argmax())])
-    is_ramp = bool(change.sudden < 0.5)
-    return [float(rows[first]), float(evidence.years[first - 1]), float(is_ramp)]
-
-
-def _size_of(evidence: Evidence) -> FloatArray:
-    """Precision (n + q, n + q) of a called change's size: each cause as probable as it was then."""
-    layout = evidence.layout
-    least = np.concatenate(
-        [np.full(layout.n, 1e-5), 1e-3 * layout.prior_sd[layout.n :][: layout.q]]
-    )
-    covariance = np.diag(least**2)
-    shares = np.maximum(evidence.shares.sum(axis=(0, 1, 2)), _LEAST_SHARE)
-    for direction, by_size in zip(evidence.directions, shares, strict=True):
-        for share, size in zip(by_size, SIZES, strict=True):
-            covariance += share * size**2 * direction.factor @ direction.factor.T
-    return np.asarray(np.linalg.inv(covariance))
 
 
 def _told(quantity: WatchedQuantity) -> list[object]:
