@@ -35,7 +35,6 @@ SIZES = np.array([1.0, 6.0])
 LOG_SHARES = np.log([0.9, 0.1])
 _ABSENT = 1e8  # technical: the variance of a mode that was not measured; no log frequency is 1e4
 _A_WEEK_YEARS = 7 / 365.25
-_NEGLIGIBLE = 1e-6  # of all masses: what it adds is not told
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,11 +134,6 @@ class Evidence:
     def by_direction(self) -> FloatArray:
         """Probability (D,) of each direction, given a change."""
         return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
-
-    def leading(self, shares: FloatArray) -> list[tuple[int, ...]]:
-        """The changes that make up nearly all of `shares`, as indices."""
-        kept = shares > _NEGLIGIBLE * max(float(shares.max(initial=0.0)), 1e-300)
-        return [tuple(each) for each in np.argwhere(kept).tolist()]
 
     def change_at(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Mean (n + q,) and factor (n + q, r) of the covariance of one change, as of the last test.

@@ -33,7 +33,6 @@ class WatchState:
     variances: FloatArray
     slopes: FloatArray
     per_kelvin: FloatArray
-    coordinates: FloatArray
     years: FloatArray
     temperature_c: FloatArray
     log_amplitude: FloatArray

@@ -122,7 +122,6 @@ class Watcher:
             variances=np.zeros((0, n)),
             slopes=np.zeros((0, n, q)),
             per_kelvin=np.zeros((0, n)),
-            coordinates=np.zeros((0, q)),
             years=np.zeros(0),
             temperature_c=np.zeros(0),
             log_amplitude=np.zeros(0),
@@ -198,7 +197,9 @@ class Watcher:
             return evidence, evidence, 0
         # How sure it is that anything changed is bounded; which cause it was is for all to say.
         rows = _counting(state)
-        causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
+        causes = evidence
+        if (state.weight[rows] != 1).any():
+            causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         course = self.sums.course(state, rows, causes.called)
         stays = what_stays(causes, course, self.options.limit_years)
         bounded = replace(evidence, log_most=stays.log_years)
@@ -290,7 +291,6 @@ class Watcher:
             "variances": variances,
             "slopes": slopes,
             "per_kelvin": softening,
-            "coordinates": reading.mean,
             "years": years,
             "temperature_c": reading.temperature_c,
             "log_amplitude": level,

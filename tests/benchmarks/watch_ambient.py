@@ -26,13 +26,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.stats import beta, gamma
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.modes_document import parse_modes  # noqa: E402
 from shm.watch import watch_frequencies  # noqa: E402
+from tests.benchmarks.watch_trial.outcomes import is_alert, rate, share  # noqa: E402
 from tests.worlds.network_seasons import START, StiffnessLoss, ambient  # noqa: E402
 
 SCENARIOS = {"quiet": (0.0, 0.0)} | {
@@ -42,7 +42,6 @@ SCENARIOS = {"quiet": (0.0, 0.0)} | {
 }
 """Size of the loss in one mode, and the share of it in the others."""
 
-NOTICES = ("repeat the test", "check the modes")
 DAYS_A_YEAR = 365.25
 AFTER_DAYS = 150.0  # a loss is followed for so long
 
@@ -75,22 +74,8 @@ def solved(task: tuple[str, int, float, int]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def share(hits: int, count: int) -> str:
-    """A share with its 90 % interval (Clopper and Pearson)."""
-    low = beta.ppf(0.05, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.95, hits + 1, count - hits) if hits < count else 1.0
-    return f"{hits} of {count}: {hits / max(count, 1):.2f} ({low:.2f} to {high:.2f})"
-
-
-def rate(hits: int, years: float) -> str:
-    """Events a year with a 90 % interval (Garwood)."""
-    low = gamma.ppf(0.05, hits) / years if hits else 0.0
-    high = gamma.ppf(0.95, hits + 1) / years
-    return f"{hits} in {years:.0f}: {hits / years:.3f} ({low:.3f} to {high:.3f})"
-
-
 def alarms(row: dict[str, Any]) -> list[dict[str, Any]]:
-    return [a for a in row["alerts"] if not set(a["kinds"]) <= set(NOTICES)]
+    return [a for a in row["alerts"] if is_alert(a)]
 
 
 def told(scenario: str, rows: Sequence[dict[str, Any]]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -74,3 +75,15 @@ def measured(
 def common_of(log10_k: Sequence[float]) -> float:
     """log10 of the stiffness of springs alike that give as much."""
     return float(common_stiffness(np.array([log10_k]))[0])
+
+
+def misnamed(test: ModalTest, plane: Plane, order: int) -> ModalTest:
+    """With the mode above instead of that of `order`."""
+    known = {(mode.plane, mode.order): mode.frequency_hz for mode in test.modes}
+    modes = tuple(
+        replace(mode, frequency_hz=known[plane, order + 1])
+        if (mode.plane, mode.order) == (plane, order)
+        else mode
+        for mode in test.modes
+    )
+    return replace(test, modes=modes)

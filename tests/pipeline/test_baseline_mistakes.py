@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,10 @@ from shm.report.contents import status
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import summary
 from shm.store import Workspace
-from shm.values import ModalTest, Plane, Posterior
+from shm.values import ModalTest, Posterior
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, ingest
+from tests.helpers.modelled_tests import misnamed
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 
 
@@ -55,22 +57,6 @@ def times(factor: float) -> Any:
     return changed
 
 
-def misnamed(plane: Plane, order: int) -> Any:
-    """The mode above is taken for this one."""
-
-    def changed(test: ModalTest) -> ModalTest:
-        known = {(mode.plane, mode.order): mode.frequency_hz for mode in test.modes}
-        modes = tuple(
-            replace(mode, frequency_hz=known[plane, order + 1])
-            if (mode.plane, mode.order) == (plane, order)
-            else mode
-            for mode in test.modes
-        )
-        return replace(test, modes=modes)
-
-    return changed
-
-
 @pytest.fixture
 def updated_from(monkeypatch: pytest.MonkeyPatch) -> list[list[ModalTest]]:
     """The tests that each selection was made from."""
@@ -89,8 +75,9 @@ def updated_from(monkeypatch: pytest.MonkeyPatch) -> list[list[ModalTest]]:
 def test_a_mistaken_mode_enters_neither_the_posterior_nor_the_watch_and_the_origin_names_it(
     workspace: Workspace, updated_from: list[list[ModalTest]]
 ) -> None:
+    wrong = partial(misnamed, plane="transverse", order=2)
     for number in range(4):
-        spool(workspace, number, misnamed("transverse", 2) if number == 2 else None)
+        spool(workspace, number, wrong if number == 2 else None)
     spool(workspace, 9)
     ingest(workspace)
 
@@ -148,8 +135,9 @@ def test_a_new_baseline_is_checked_as_the_first_one_was(
         return quick_update.update(tests, model, options)
 
     monkeypatch.setattr(rebaselining, "update", quick)
+    wrong = partial(misnamed, plane="longitudinal", order=3)
     for number in range(8):
-        spool(workspace, number, misnamed("longitudinal", 3) if number == 6 else None)
+        spool(workspace, number, wrong if number == 6 else None)
     ingest(workspace)
     order = Order(START + timedelta(days=3.5), "a new pin", "engineer")
     with workspace.store() as store:
@@ -167,8 +155,9 @@ def test_a_new_baseline_is_checked_as_the_first_one_was(
 def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(
     workspace: Workspace,
 ) -> None:
+    wrong = partial(misnamed, plane="transverse", order=3)
     for number in range(8):
-        spool(workspace, number, misnamed("transverse", 3) if number > 3 else None)
+        spool(workspace, number, wrong if number > 3 else None)
     ingest(workspace)
     with workspace.store() as store:
         alerts = [each.alert for each in store.alerts.list_all(3)]

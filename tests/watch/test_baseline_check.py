@@ -12,7 +12,7 @@ from shm.models import DESCRIPTION, described
 from shm.values import BaselineCheck, Hanger, ModalTest, Plane
 from shm.watch.baseline_check import check_baseline
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.modelled_tests import EVERYTHING, frequencies, measured
+from tests.helpers.modelled_tests import EVERYTHING, frequencies, measured, misnamed
 
 THETA = (1.05, 0.99, 7.4, 7.1, 7.9, 7.3)
 MODEL = described("beam2", HANGER_3)
@@ -27,18 +27,6 @@ def baseline(tests: int, seed: int = 0) -> list[ModalTest]:
         hz = frequencies(theta) * np.exp(5e-4 * rng.standard_normal((2, 6)))
         found.append(replace(measured(hz, rng=rng), id=f"t{n}"))
     return found
-
-
-def misnamed(test: ModalTest, plane: Plane, order: int) -> ModalTest:
-    """With the mode above instead of that of `order`."""
-    known = {(mode.plane, mode.order): mode.frequency_hz for mode in test.modes}
-    modes = tuple(
-        replace(mode, frequency_hz=known[plane, order + 1])
-        if (mode.plane, mode.order) == (plane, order)
-        else mode
-        for mode in test.modes
-    )
-    return replace(test, modes=modes)
 
 
 def told(tests: Sequence[ModalTest]) -> list[tuple[str, str, int]]:
