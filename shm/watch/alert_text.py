@@ -334,7 +334,9 @@ def _probabilities(test: WatchedTest, change: Change | None, beyond: Sequence[Dr
         others = [each for each in change.moved if each not in groups[0]]
         if len(groups) == 1 and groups[0][0].probability < _SURE and others:
             said.append((others[0].probability, _that([others[0]])))
-        said.append((change.probability, "that anything changed"))
+        # What is beyond its threshold has changed, whatever the newest tests add.
+        anything = max([change.probability, *(each.probability for each in beyond)])
+        said.append((anything, "that anything changed"))
         is_sudden = change.sudden >= 0.5
         way = "suddenly" if is_sudden else "slowly"
         said.append((max(change.sudden, 1 - change.sudden), f"that it came {way}"))

@@ -64,12 +64,14 @@ _CORRELATION = 0.8
 class Columns:
     """What causes do to the log frequencies of the baseline's `modes` (n,), per unit (n,).
 
-    `sensors` (n, n) is the covariance that sensors of 0.3 kg, put elsewhere each time, give.
+    `sensors` (n, n) is the covariance that sensors of 0.3 kg, put elsewhere each time, give,
+    `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean.
     """
 
     modes: tuple[MeasuredMode, ...]
     by_cause: dict[str, FloatArray]
     sensors: FloatArray
+    loosening: tuple[FloatArray, ...] = ()
 
 
 def columns_of(
@@ -210,8 +212,11 @@ def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list
     own = _joint_moves(quantities)
     found = []
     for members, root in own:
-        factor = np.zeros((n + q, len(members)))
-        factor[n:] = steps[:, None] * root
+        patterns = [columns.loosening[j] for j in members if columns.loosening]
+        beside = np.vstack([np.zeros((0, n)), *patterns]).T
+        factor = np.zeros((n + q, len(members) + beside.shape[1]))
+        factor[n:, : len(members)] = steps[:, None] * root
+        factor[:n, len(members) :] = beside
         alone = members == (0,) and quantities[0].name == TENSION
         share = _SHARES[TENSION] if alone else _SHARES[SPRINGS] / max(len(own) - 1, 1)
         name = TENSION if alone else SPRINGS

@@ -219,6 +219,15 @@ def evidence_of(
     )  # fmt: skip
 
 
+def log_probability_of_called(
+    sums: Sums, years: FloatArray, layout: Layout, called: Sequence[Told]
+) -> float:
+    """Of all tests, if nothing changed beyond what was `called`, over all scatters."""
+    suffix = [_suffix(_times(sums.square, years**k)) for k in range(3)]
+    pulls = [_suffix(_times(sums.cross, years**k)) for k in range(2)]
+    return _total(_null(sums, years, layout, called, suffix, pulls)[2])
+
+
 def _seen(
     years: FloatArray,
     beginnings: IntArray,

@@ -35,23 +35,42 @@ from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
+# Judgement: for the same reason a tenth of what an end does looks like another tension.
+_TRADED = 0.1
 _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
     """What all tests of one hanger share; `start` is the time of the first reading, and
-    `baseline_years` from it the mean of the baseline's."""
+    `baseline_years` from it the mean of the baseline's. `effects` (r, n + q) are what a change does
+    to the frequencies that owners look at: of each plane the first, then the mean."""
 
     quantities: tuple[WatchedQuantity, ...]
     hanger: Hanger
     options: WatchOptions
     start: datetime
     baseline_years: float
+    effects: FloatArray
 
     def at(self, years: float) -> datetime:
         """The time so many years from the start."""
         return self.start + timedelta(days=years * DAYS_PER_YEAR)
+
+    def left_open(self, means: FloatArray) -> FloatArray:
+        """Standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
+
+        A share of each, as far as the baseline's own stiffness and tension are open; and of what
+        the ends do to the frequencies some part may be tension's, or the other way round.
+        """
+        own = np.array([each.scale_sd for each in self.quantities]) * means
+        is_tension = np.array([each.name == TENSION for each in self.quantities])
+        if is_tension.any() and not is_tension.all():
+            of_ends = np.abs(means[:, ~is_tension]).sum(axis=1, keepdims=True)
+            first = len(self.effects.T) - len(self.quantities)
+            of_tension = self.effects[1::2, first:][:, is_tension].mean()
+            own[:, is_tension] = np.hypot(own[:, is_tension], _TRADED * of_ends / of_tension)
+        return np.asarray(own)
 
 
 def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
@@ -67,14 +86,12 @@ def changed(
     reading: Reading,
     before: float,
     outlier: float,
-    effects: FloatArray,
     *,
     against_baseline: int,
 ) -> Change:
     """The change since the last call; `before` is the probability that there was one earlier, and
     `causes` the evidence by which causes are weighed, no test's say being bounded. `outlier` is
-    that of this test being a blunder. `effects` (r, n + q) are what a change does to the
-    frequencies that owners look at."""
+    that of this test being a blunder."""
     now = probability_of_change(evidence, subject.options)
     began_after, began_by = _began(subject, causes, reading)
     return Change(
@@ -84,30 +101,29 @@ def changed(
         sudden=_sudden(causes),
         began_after=began_after,
         began_by=began_by,
-        moved=_moved(subject.quantities, causes),
+        moved=_moved(subject, causes),
         outlier_probability=outlier,
-        material_probability=_material(subject, causes, effects),
+        material_probability=_material(subject, causes),
         against_baseline=against_baseline,
     )
 
 
-def _material(subject: Subject, evidence: Evidence, effects: FloatArray) -> float:
-    """The probability that a change, if there is one, moves one of the frequencies of `effects` by
-    more than what is to be told."""
+def _material(subject: Subject, evidence: Evidence) -> float:
+    """The probability that a change, if there is one, moves one of the frequencies that owners look
+    at by more than what is to be told."""
     if not len(evidence.beginnings):
         return 0.0
     weights, changes = _leading(evidence, np.ones(len(evidence.directions), bool))
-    return float(weights @ _materials(subject, evidence, changes, effects))
+    return float(weights @ _materials(subject, evidence, changes))
 
 
 def _materials(
     subject: Subject,
     evidence: Evidence,
     changes: Sequence[tuple[int, ...]],
-    effects: FloatArray,
 ) -> FloatArray:
     """The same (changes,) of each."""
-    least, found = subject.options.least_frequency_shift, []
+    effects, least, found = subject.effects, subject.options.least_frequency_shift, []
     for each in changes:
         mean, factor = evidence.change_at(each)
         middle = effects @ mean
@@ -139,7 +155,7 @@ def _began(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[date
     )
 
 
-def _moved(quantities: Sequence[WatchedQuantity], evidence: Evidence) -> tuple[Moved, ...]:
+def _moved(subject: Subject, evidence: Evidence) -> tuple[Moved, ...]:
     """Each quantity as one that changed, and each other cause, the likeliest first.
 
     A spring precedes the tension that is as likely: a part of its loss may be read as tension.
@@ -151,25 +167,21 @@ def _moved(quantities: Sequence[WatchedQuantity], evidence: Evidence) -> tuple[M
     parts = [
         *(
             np.array([j in each.members for each in evidence.directions])
-            for j in _numbers(quantities)
+            for j in range(len(subject.quantities))
         ),
         *(np.array([each.name == cause for each in evidence.directions]) for cause in causes),
     ]
-    names = [*(each.name for each in quantities), *causes]
+    names = [*(each.name for each in subject.quantities), *causes]
     probability = np.array([min(float(by_direction[part].sum()), 1.0) for part in parts])
     is_tension = [name == TENSION for name in names]
     order = np.lexsort([np.array(is_tension), -probability.round(_DIGITS)]).tolist()
     return tuple(
-        _as_changed(quantities, evidence, names, j, parts[j], float(probability[j])) for j in order
+        _as_changed(subject, evidence, names, j, parts[j], float(probability[j])) for j in order
     )
 
 
-def _numbers(quantities: Sequence[WatchedQuantity]) -> range:
-    return range(len(quantities))
-
-
 def _as_changed(
-    quantities: Sequence[WatchedQuantity],
+    subject: Subject,
     evidence: Evidence,
     names: Sequence[str],
     j: int,
@@ -184,12 +196,13 @@ def _as_changed(
     found = [evidence.change_at(each) for each in changes]
     n = evidence.layout.n
     together, alike = _company(evidence, part, names, names[j])
-    if j < len(quantities):
-        mean = np.array([each[0][n + j] for each in found])
+    if j < len(subject.quantities):
+        quantity = subject.quantities[j]
+        means = np.array([each[0][n:] for each in found])
         sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
-        sd = np.hypot(sd, quantities[j].scale_sd * mean)
-        shift = shift_of_mixture(quantities[j], weights, mean, sd)
-        end, plane = quantities[j].end, quantities[j].plane
+        sd = np.hypot(sd, subject.left_open(means)[:, j])
+        shift = shift_of_mixture(quantity, weights, means[:, j], sd)
+        end, plane = quantity.end, quantity.plane
     else:
         means = np.array([each[0][:n].mean() for each in found])
         square = np.array([float((each[1][:n].mean(axis=0) ** 2).sum()) for each in found])
@@ -254,7 +267,6 @@ def drifted(
     evidence: Evidence,
     causes: Evidence,
     reading: Reading,
-    effects: FloatArray,
     *,
     is_baseline: bool,
 ) -> tuple[Drift, ...]:
@@ -263,7 +275,7 @@ def drifted(
     Mean and sd are those of a quantity that has changed: averaged over "nothing has", a small shift
     would pass for none, and be surer the smaller it is. The probability of a shift beyond the
     threshold is averaged over all; where springs trade with the tension, and no frequency moves by
-    more than what is to be told (`effects`), nothing is beyond. As long as no test since the
+    more than what is to be told, nothing is beyond. As long as no test since the
     baseline says anything, a shift is as open as before any.
     """
     probability = probability_of_change(evidence, subject.options)
@@ -284,18 +296,20 @@ def drifted(
     all_weights = np.concatenate([none, probability * weights]) if len(weights) else none
     all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
     sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
-    scale = np.array([each.scale_sd for each in subject.quantities])
-    all_sds = np.hypot(np.concatenate([sds_of_null.reshape(-1, q), sds]), scale * all_means)
+    all_sds = np.hypot(
+        np.concatenate([sds_of_null.reshape(-1, q), sds]), subject.left_open(all_means)
+    )
     told = np.ones(len(all_weights))
     if len(changes) and not evidence.called:
-        told[len(none) :] = _materials(subject, evidence, changes, effects)
+        told[len(none) :] = _materials(subject, evidence, changes)
     found = []
     for j, quantity in enumerate(subject.quantities):
         chosen = (all_weights, all_means, all_sds)
         if not evidence.called and len(evidence.beginnings):
             part = np.array([j in each.members for each in evidence.directions])
             own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
-            chosen = (*own[:2], np.hypot(own[2], scale * own[1])) if len(own[0]) else chosen
+            if len(own[0]):
+                chosen = (*own[:2], np.hypot(own[2], subject.left_open(own[1])))
         elif not evidence.called and not is_baseline:
             sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
             chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)

@@ -11,6 +11,7 @@ its upper range, where 0.3 decades do nothing; a change there would be ruled out
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -44,6 +45,10 @@ _STIFFNESS_STEP_DECADES = 0.3  # a factor of 2
 _INVISIBLE = 1e-5  # of a frequency: a thirtieth of the best identification's sd
 _NODES_PER_DECADE = 4  # technical: frequencies are smooth in log k, and refined between
 _FINER = 10  # technical: points between two nodes
+# Judgement: bars with forks and turnbuckles go otherwise than their description, and how far their
+# frequencies go with a change is known to a tenth at best.
+_MODEL_OFF = 0.1
+_SLACK = 0.02  # judgement: of the baseline's tension, below it only its own weight strains it
 _TENSION_NODES = 201  # technical: interpolated between
 # Below this a rise is the model's rounding: nodes as near as that are one.
 _ROUNDING = 1e-10
@@ -171,9 +176,10 @@ def _like(x: float | FloatArray, found: float | FloatArray) -> float | FloatArra
 
 
 def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuantity:
-    """The tension, as far as the class's prior reaches."""
+    """The tension, as far as the class's prior reaches, and down to a slack hanger."""
     column = model.parameter_names.index(_TENSION_RATIO)
     lower, upper = (ends[column] / base[column] for ends in (model.prior.lower, model.prior.upper))
+    lower = min(lower, _SLACK)
     between = np.linspace(min(np.log(lower), 0.0), max(np.log(upper), 0.0), _TENSION_NODES)
     coordinates = np.union1d(between, 0.0)
     mean_n = float(baseline.tension_n.mean())
@@ -347,7 +353,7 @@ def _rising(mean: FloatArray, at: int) -> list[int]:
 
 def _off_by(ratios: FloatArray) -> float:
     """Root mean square of ratios (n,) less 1; off by all of itself is not known at all."""
-    return min(float(np.sqrt(np.mean((ratios - 1) ** 2))), 1.0)
+    return min(math.hypot(float(np.sqrt(np.mean((ratios - 1) ** 2))), _MODEL_OFF), 1.0)
 
 
 def _spring_step(response: _Response, samples: FloatArray) -> float:

@@ -48,11 +48,11 @@ from shm.values import (
 )
 from shm.watch.causes import columns_of
 from shm.watch.linear_reading import LinearReading, SeenModes
+from shm.watch.loosening import loosening_of
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
     MeasuredMode,
     base_point,
-    log_frequencies,
     moved,
     shift_of,
     watched_quantities,
@@ -68,6 +68,7 @@ _SLOPE_STEP = 0.1
 _LEAST_SLOPE_STEP = 1e-7
 _PULL_SD_IN_STEPS = 10.0
 _MOST_STEPS = 12
+_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
 # In units of the reading's variance: a last step of a tenth of its standard deviation is taken
 # along with the reading, which is linear about the place before it.
 _SETTLED = 1e-2
@@ -81,9 +82,8 @@ _BEYOND = 0.05
 # joint that gives. Judgement, the better end of what repeated tests of real hangers show.
 _MODE_SCATTER = 1e-3
 _SENSOR_KG = 0.3  # judgement: two accelerometers with magnets and cable
-_UNEVEN_DECADES = 0.5  # technical: of a joint that loosens at one end alone
-_UNEVEN_SD = 3.0  # judgement, in units of that: it goes with the square
-_UNEVEN = 0.5  # of tests with a mode that seems mistaken, judgement: an end has moved alone
+_LOOSENED_STEPS = 6.0  # judgement: of the largest change of an end that is looked for
+_LOOSENED = 0.5  # of tests with a mode that seems mistaken, judgement: an end has loosened
 # Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
 _LEAST_MISTAKE = 0.006
 _ROUNDS = 3  # technical: of "which modes are sound" and "where they lie"
@@ -120,7 +120,10 @@ class Reader:
             )
         self.modes: tuple[MeasuredMode, ...] = tuple(sorted(keys))
         self.quantities = watched_quantities(baseline, hanger, self.modes)
-        self.columns = columns_of(self._model, self._base, hanger, self.modes)
+        loosening = loosening_of(self._model, self._base, hanger, self.modes, self.quantities)
+        self.columns = replace(
+            columns_of(self._model, self._base, hanger, self.modes), loosening=loosening
+        )
         self._columns = [_columns(each, self._model) for each in self.quantities]
         self._scale: FloatArray = np.array([each.step_sd for each in self.quantities])
         self._pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
@@ -130,7 +133,7 @@ class Reader:
         self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
-        self._uneven = self._unevenness()
+        self._loosening = np.vstack(self.columns.loosening).T
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
@@ -194,22 +197,26 @@ class Reader:
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        plain = self._sound_by(seen, self._uneven[:, :0])
-        if plain.sound.all():
+        still, none = np.zeros(len(self.quantities)), self._loosening[:, :0]
+        found = self._sound_by(seen, none, still)
+        if found.sound.all():
             return every
-        found = plain
-        if self._uneven.size:
-            uneven = self._sound_by(seen, self._uneven)
-            if uneven.log_evidence + math.log(_UNEVEN) > plain.log_evidence:
-                found = uneven
+        slack = self._sound_by(seen, none, self._far_start(seen))
+        if slack.log_evidence > found.log_evidence:
+            found = slack
+        if self._loosening.size:
+            loose = self._sound_by(seen, self._loosening, still)
+            if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
+                found = loose
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: SeenModes, more: FloatArray) -> SoundModes:
-        """Which modes are sound where the quantities, and `more` (modes, k), may have moved."""
+    def _sound_by(self, seen: SeenModes, more: FloatArray, start: FloatArray) -> SoundModes:
+        """Which modes are sound where the quantities, and `more` (modes, k), may have moved; the
+        quantities are sought from `start` (q,) on."""
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
-        pull = np.append(self._pull, np.full(more.shape[1], 1 / _UNEVEN_SD**2))
-        x = np.zeros(len(self.quantities))
+        pull = np.append(self._pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
+        x = start
         for _ in range(_ROUNDS):
             linear = self._linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
@@ -218,22 +225,6 @@ class Reader:
             x = np.clip(found.x[: len(x)], self._lowest - _BEYOND, self._highest + _BEYOND)
         is_near = np.abs(off - slopes @ found.x) < _LEAST_MISTAKE
         return replace(found, sound=found.sound | is_near)
-
-    def _unevenness(self) -> FloatArray:
-        """What log frequencies (modes, pairs) do as one of two springs that move together softens
-        and the other stiffens: no quantity, but no mistake either.
-        """
-        pairs = [columns for columns in self._columns if len(columns) > 1]
-        theta = np.tile(self._base, (1 + len(pairs), 1))
-        prior = self._model.prior
-        for row, (soft, *others) in zip(theta[1:], pairs, strict=True):
-            row[soft] -= _UNEVEN_DECADES
-            row[others] += _UNEVEN_DECADES
-        theta = np.clip(
-            theta, np.minimum(prior.lower, self._base), np.maximum(prior.upper, self._base)
-        )
-        found = log_frequencies(self._model, theta, self.modes)
-        return np.asarray((found[1:] - found[0]).T)
 
     def _is_warmth_known(self, test: ModalTest) -> bool:
         return math.isfinite(test.temperature_c) and math.isfinite(self.reference_temperature_c)
@@ -281,9 +272,31 @@ class Reader:
             variance=sd**2 + self._allowance**2,
         )
 
+    def _far_start(self, seen: SeenModes) -> FloatArray:
+        """Where the tension alone fits best, over all that its table holds: half of the modes may
+        be anywhere."""
+        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
+        places = np.zeros((_STARTS, len(self.quantities)))
+        places[:, 0] = first
+        off = np.abs(seen.log_frequency - self._predicted(places, seen))
+        return np.asarray(places[int(np.median(off, axis=1).argmin())])
+
     def _settled(self, seen: SeenModes) -> LinearReading:
-        """The likelihood about where it is largest, or very nearly; steps that overshoot halve."""
-        best = self._linear(np.zeros(len(self.quantities)), seen)
+        """The likelihood about where it is largest, or very nearly.
+
+        Sought from the baseline on; where that fits badly, from where the tension alone fits best,
+        too: on the way to a slack hanger a descent may lose itself among stiffnesses.
+        """
+        near = self._descended(np.zeros(len(self.quantities)), seen)
+        misfit = float(near.residual @ near.residual)
+        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
+            return near
+        far = self._descended(self._far_start(seen), seen)
+        return far if far.cost < near.cost else near
+
+    def _descended(self, start: FloatArray, seen: SeenModes) -> LinearReading:
+        """The same from `start` (q,) on; steps that overshoot halve."""
+        best = self._linear(start, seen)
         step = best.step
         for _ in range(_MOST_STEPS):
             if best.gain(step) < _SETTLED:

@@ -32,6 +32,7 @@ from shm.watch.change_layout import Told
 from shm.watch.change_point import (
     Evidence,
     evidence_of,
+    log_probability_of_called,
 )
 from shm.watch.conditions import (
     OF_ONE_VISIT_YEARS,
@@ -46,10 +47,11 @@ from shm.watch.state_sums import StateSums, begun_of, size_of
 from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 5
+_VERSION = 6
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
+_CLEARLY_NATS = 3.0  # 20 to 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +160,7 @@ class Watcher:
                 f"The watch was given test {reading.test} after one that is later.",
                 remedy="Sort the tests by time.",
             )
-        state = self._with(state, reading)
+        state = self._rejudged(self._with(state, reading))
         state, evidence = self._bounded(state)
         rows = _counting(state)
         if not state.counted[-1]:
@@ -228,9 +230,15 @@ class Watcher:
         causes are weighed, and tests against the baseline; and of shifts since the baseline."""
         evidence, causes, against_baseline = changes
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
-        subject = Subject(self.quantities, self.hanger, self.options, state.start, of_baseline)
-        last, effects = state.tests - 1, self.sums.effects(state)
-        outlier = self._outlier(state, last)
+        subject = Subject(
+            self.quantities,
+            self.hanger,
+            self.options,
+            state.start,
+            of_baseline,
+            self.sums.effects(state),
+        )
+        outlier = self._outlier(state, state.tests - 1)
         return WatchedTest(
             test=reading.test,
             time=reading.time,
@@ -239,7 +247,6 @@ class Watcher:
                 subject,
                 *shifts,
                 reading,
-                effects,
                 is_baseline=state.tests <= self.options.baseline_tests,
             ),
             change=changed(
@@ -249,7 +256,6 @@ class Watcher:
                 reading,
                 1 - state.still_same,
                 outlier,
-                effects,
                 against_baseline=against_baseline,
             ),
             creep_per_year=self._creep(evidence),
@@ -306,14 +312,25 @@ class Watcher:
         later = replace(later, counted=counts)
         return replace(later, scatter_variance=self.sums.scatter(later))
 
+    def _rejudged(self, state: WatchState) -> WatchState:
+        """The last called change a step or a ramp, as the tests since make clear.
+
+        At the call a ramp has hardly begun: frozen as a step, all that comes later would be new.
+        """
+        if not len(state.called):
+            return state
+        other = replace(state, called=state.called.copy())
+        other.called[-1, 2] = 1 - other.called[-1, 2]
+        rows = _counting(state)
+        sums, years = self.sums.sums(state, rows), state.years[rows]
+        as_it_is, otherwise = (
+            log_probability_of_called(sums, years, self.structure.layout, _called(each, rows))
+            for each in (state, other)
+        )
+        return other if otherwise - as_it_is > _CLEARLY_NATS else state
+
     def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
         """Of the tests `rows`."""
-        called = [
-            Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
-            for (first, years, is_ramp), precision in zip(
-                state.called.tolist(), state.called_precision, strict=True
-            )
-        ]
         first = int((rows < self.options.baseline_tests).sum())
         return evidence_of(
             self.sums.sums(state, rows),
@@ -321,7 +338,7 @@ class Watcher:
             max(first, 1),
             self.structure.layout,
             self.structure.directions,
-            called,
+            _called(state, rows),
             self.options.beginnings,
         )
 
@@ -379,6 +396,16 @@ def _counting(state: WatchState) -> IntArray:
     """The tests that count; as long as none does, the newest, which then says nothing."""
     rows = np.flatnonzero(state.counted)
     return rows if len(rows) else np.array([state.tests - 1])
+
+
+def _called(state: WatchState, rows: IntArray) -> list[Told]:
+    """The called changes, as the tests `rows` see them."""
+    return [
+        Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
+        for (first, years, is_ramp), precision in zip(
+            state.called.tolist(), state.called_precision, strict=True
+        )
+    ]
 
 
 def _told(quantity: WatchedQuantity) -> list[object]:

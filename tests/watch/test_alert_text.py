@@ -41,9 +41,8 @@ def change(
 def drift(test: str, probability: float, quantity: str = "tension", shift: float = -0.08) -> Drift:
     limit = 0.05 if quantity == "tension" else 0.5
     baseline, value = (711e3, 711e3 * (1 + shift)) if quantity == "tension" else (7.0, 7.0 + shift)
-    return Drift(
-        3, test, START, quantity, baseline, value, shift, abs(shift) / 10, limit, probability
-    )
+    sd = abs(shift) / (10 if probability >= 0.7 else 3)
+    return Drift(3, test, START, quantity, baseline, value, shift, sd, limit, probability)
 
 
 def day(
@@ -66,6 +65,13 @@ def only(*watched: WatchedTest) -> Alert:
 
 
 # ---------------------------------------------------------------- when
+
+
+def test_a_called_loss_that_is_clearly_beyond_its_threshold_asks_for_today_at_once() -> None:
+    """A call says that something changed: what is beyond then need not wait for a further test."""
+    message = only(day(1), day(2, change(called=True), probability=0.7)).message
+    assert "beyond its threshold. Repeat the hammer test today" in message
+    assert "probability 0.97 that tension is beyond its threshold" in message
 
 
 def test_nothing_called_and_nothing_beyond_is_no_alert() -> None:
@@ -205,7 +211,7 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
     assert message == (
         "Hanger 3: tension fell by 8.2 ± 1.1 %. Repeat the hammer test within a week; if the loss "
         "stays, inspect its anchorages and the rod, and compare the hangers beside it (`shm drift "
-        "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. Tension is now 654.1 kN, "
+        "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. Tension is now 654 kN, "
         "711 kN at the baseline. Details: ± is half the 90 % interval; probability 0.97 that "
         "tension changed, 0.90 that anything changed, 0.98 that it came suddenly, 0.30 that "
         "tension is beyond its threshold of 5 %; mean time between false alarms at least 200 years."
@@ -215,7 +221,7 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
 @pytest.mark.parametrize(
     ("baseline_n", "said"),
     [
-        (5.4, "Tension is now 4.968 N, 5.4 N at the baseline."),
+        (5.4, "Tension is now 4.97 N, 5.4 N at the baseline."),
         (20e3, "Tension is now 18.40 kN, 20 kN at the baseline."),
         (12e6, "Tension is now 11.04 MN, 12 MN at the baseline."),
         (10.5e6, "Tension is now 9.66 MN, 10.5 MN at the baseline."),
@@ -376,7 +382,7 @@ def test_a_further_change_is_said_to_be_one() -> None:
     first, second = alerts_of(calls, HANGER_3)
     assert "again" not in first.message
     assert second.message.startswith("Hanger 3 changed again: tension rose by 0.90 ± 0.25 %.")
-    assert "Tension is now 654.1 kN, 711 kN at the baseline." in second.message
+    assert "Tension is now 654 kN, 711 kN at the baseline." in second.message
 
 
 def test_beyond_the_threshold_speaks_of_the_called_change_that_went_the_same_way() -> None:

@@ -328,6 +328,22 @@ def test_a_mistaken_mode_is_found_though_the_springs_have_moved(
     assert [reader.modes[n] for n in np.flatnonzero(misled.modes.mistaken)] == [(PLANES[0], 3)]
 
 
+@pytest.mark.parametrize("left", [0.3, 0.05, 0.03])
+@pytest.mark.parametrize("stiffness", [1.0, 6.0, 30.0])
+def test_a_slack_hanger_is_read_as_slack(left: float, stiffness: float) -> None:
+    """Thick bars, too, whose frequencies hang on their ends more than on the tension."""
+    thick = replace(HANGER_3, second_moment_m4=stiffness * HANGER_3.second_moment_m4)
+    theta = (1.0, 1.0, 7.0, 7.6, 8.6, 6.4)
+    baseline = frequencies(theta, "beam2", thick)
+    own = Reader(posterior(theta, "beam2", thick), [measured(baseline)], thick)
+    slack = frequencies((left, *theta[1:]), "beam2", thick)
+    reading = own.reading(measured(slack), WHEN)
+
+    assert reading.modes is not None
+    assert not reading.modes.mistaken.any()
+    assert np.exp(reading.mean[0]) == pytest.approx(left, abs=0.05)
+
+
 def test_where_most_modes_fit_no_state_the_test_says_little(reader: Reader) -> None:
     frequency_hz = frequencies(SPRUNG)
     wild = frequency_hz * np.exp(np.random.default_rng(3).normal(0, 0.1, frequency_hz.shape))

@@ -169,6 +169,19 @@ def test_a_loss_that_goes_on_is_followed_after_its_call() -> None:
     assert drift.shift_sd < 0.02
 
 
+def test_a_loss_that_goes_on_is_followed_whatever_it_was_called_as() -> None:
+    """Called as a step or as a ramp by the few tests that there were: those since decide."""
+    history = History(tests=70, change_at=CHANGE_AT, ramp=[-0.03], outliers=0)
+    found = watch(history)
+    assert found.calls
+    (shift,) = last(found.tests).drifts
+    readings = history.readings(0)
+    years = (readings[-1].time - readings[CHANGE_AT].time).days / 365.25
+    truth = math.expm1(-0.03 * years)
+    assert abs(shift.shift_mean - truth) < 2.6 * shift.shift_sd
+    assert abs(shift.shift_mean - truth) < 0.15 * abs(truth)
+
+
 def test_the_beginning_lies_in_its_interval() -> None:
     history = History(tests=CHANGE_AT + 6, change_at=CHANGE_AT, step=lost(0.05))
     readings = history.readings(0)
