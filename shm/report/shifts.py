@@ -9,10 +9,10 @@ from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.force_units import ForceUnit, force_unit
+from shm.watch.change_words import factor
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _UNMOVED = 0.01  # of the threshold: no test tells so little
-_LARGEST_FACTOR = 1e3  # judgement: beyond, an end is as good as clamped or free
 
 
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
@@ -48,16 +48,6 @@ def threshold_cell(row: Drift) -> str:
     if is_ratio(row.quantity):
         return f"{100 * row.threshold:.3g} %"
     return f"{factor(-row.threshold)} or {factor(row.threshold)} times"
-
-
-def factor(decades: float) -> str:
-    """How many times what it was: `0.50`, `3.2`."""
-    value = 10 ** min(decades, 300.0)
-    if value > _LARGEST_FACTOR:
-        return "more than 1000"
-    if value < 1 / _LARGEST_FACTOR:
-        return "less than 0.001"
-    return f"{value:.2f}" if value < 2 else f"{value:.1f}" if value < 10 else f"{value:.0f}"
 
 
 def _ratio(interval: Interval) -> tuple[str, str]:
