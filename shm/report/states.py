@@ -112,7 +112,7 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
         history.reference_temperature_c,
         outlier > 0.5,
         tuple(_over_time(each, history, hanger) for each in watched.reader.quantities),
-        tuple(_called(call) for call in calls),
+        tuple(CalledChange(call.began_after, call.began_by, called_words(call)) for call in calls),
         history.temperature_coefficients(),
     )
 
@@ -135,10 +135,6 @@ def _over_time(
         level - reach,
         level + reach,
     )
-
-
-def _called(change: Change) -> CalledChange:
-    return CalledChange(change.began_after, change.began_by, called_words(change))
 
 
 def called_words(change: Change) -> str:
