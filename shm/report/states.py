@@ -28,8 +28,8 @@ from shm.watch.state import StateOptions, set_free, states
 class QuantityOverTime:
     """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
 
-    The tension is in N, a stiffness log10 of it. `title` is what people call it, `unit` that of a
-    stiffness. Thresholds are values, not shifts; NaN where there is none.
+    The tension is in N, a stiffness log10 of it. `title` is what people call it. Thresholds
+    are values, not shifts; NaN where there is none.
     """
 
     name: str
@@ -40,7 +40,6 @@ class QuantityOverTime:
     baseline: float
     lower_threshold: float
     upper_threshold: float
-    unit: str = "N m/rad"
 
     @property
     def is_tension(self) -> bool:
