@@ -6,13 +6,14 @@ import math
 
 from shm.bridge import load_hanger
 from shm.gap import GapOptions, diagnose
+from shm.models.effects import EFFECTS
 from shm.modes_document import load_modes
 from shm.values import Diagnosis, TensionEstimate
 from shm_cli.common import markdown
 from shm_cli.thesis import HANGER_FILE, PRINTINGS
 
 _END_FLEXIBILITY = ("rotational_end_flexibility", "translational_end_flexibility")
-_ALL = "all 19 effects"
+_ALL = f"all {len(EFFECTS)} effects"
 _CASES = (
     ("beam1", _ALL, ()),
     ("beam1", "without end flexibility", _END_FLEXIBILITY),

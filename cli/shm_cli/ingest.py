@@ -288,7 +288,14 @@ def show_peeks(files: Sequence[Path], as_json: bool) -> int:
         show({"files": [asdict(look) for look in looks]})
     else:
         for look in looks:
-            _show_look(look)
+            if look.channels:
+                show_table(_table(look))
+            else:
+                click.echo(_title(look))
+            if look.left_out:
+                click.echo(f"left out: {', '.join(look.left_out)}")
+            for problem in look.problems:
+                click.echo(f"problem: {problem}", err=True)
     return BadInput.exit_code if any(look.problems for look in looks) else 0
 
 
@@ -313,17 +320,6 @@ def _modes(path: Path) -> Peek:
         time=first.time,
         temperature_c=first.temperature_c,
     )
-
-
-def _show_look(look: Peek) -> None:
-    if look.channels:
-        show_table(_table(look))
-    else:
-        click.echo(_title(look))
-    if look.left_out:
-        click.echo(f"left out: {', '.join(look.left_out)}")
-    for problem in look.problems:
-        click.echo(f"problem: {problem}", err=True)
 
 
 def _table(look: Peek) -> Table:

@@ -20,6 +20,7 @@ from shm.resources import KILLING, memory_in_use, memory_of_machine, one_thread_
 from shm.settings import Settings
 
 _LOOK_S = 0.1  # technical: how seldom memory is read of a step that takes seconds
+_STILLBORN = 3  # technical: once is chance; each takes a second of imports
 AGAIN_S = 5.0
 """Technical: after so long a place to work in is looked for again; files wait meanwhile."""
 _MOST_OF_MEMORY = 0.8
@@ -62,6 +63,7 @@ class Workers(Executor):
     """
 
     def __init__(self, count: int, prepare: Callable[[], object] | None = None):
+        self._count = count
         self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
         self._prepare, self._idle, self._ended = prepare, list[_Worker](), False
         self._changing = threading.Lock()  # of what is at rest, and whether any more may begin
@@ -101,7 +103,7 @@ class Workers(Executor):
             return self._idle.pop() if self._idle and not fresh else _Worker(self._prepare)
 
     def _run(self, step: Callable[[], T], *, fresh: bool) -> T:
-        while True:
+        for _ in range(self._count + _STILLBORN):  # all at rest may have been killed there
             worker = self._worker(fresh=fresh)
             try:
                 found: T = worker.do(step)
@@ -115,6 +117,7 @@ class Workers(Executor):
                     worker.end()
                 else:
                     self._rest(worker)
+        raise _none_begins("each ended before it took on a step")
 
     def _rest(self, worker: _Worker) -> None:
         with self._changing:
@@ -140,11 +143,7 @@ class _Worker:
         try:
             self._process.start()
         except (OSError, EOFError) as error:
-            raise ShmError(
-                f"no process can be begun to work in: {error!r}.",
-                remedy="See memory and processes of this machine; it is tried again.",
-                retry_after_s=AGAIN_S,
-            ) from error
+            raise _none_begins(repr(error)) from error
         finally:
             theirs.close()
 
@@ -189,6 +188,14 @@ class _Worker:
         self._process.join(_LOOK_S)
         self._process.kill()
         self._process.join()
+
+
+def _none_begins(why: str) -> ShmError:
+    return ShmError(
+        f"no process can be begun to work in: {why}.",
+        remedy="See memory and processes of this machine; it is tried again.",
+        retry_after_s=AGAIN_S,
+    )
 
 
 def _work(pipe: Connection, prepare: Callable[[], object] | None) -> None:

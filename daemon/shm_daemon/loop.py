@@ -242,11 +242,14 @@ class Daemon:
     def _scan(self) -> None:
         self._heed_description()
         self._refuse_other_disks()
+        whole = self._tracker.whole(scan(self._flow.workspace.spool, self._pulse))
         until, sharing = time.monotonic() + _RECEIVING_S, Sharing(self._pulse)
-        for path in self._tracker.whole(scan(self._flow.workspace.spool, self._pulse)):
-            if self._wakeup.stopped or time.monotonic() > until:
+        for path in whole:
+            if self._wakeup.stopped:
                 break
             self._receive(path, sharing)
+            if time.monotonic() > until:  # after one at least, however slow the disk is
+                break
         pause = min(
             self._flow.workspace.settings.spool_scan_seconds, self._tracker.seconds_to_next()
         )

@@ -11,16 +11,11 @@ import numpy as np
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.misfit import Change, Misfit
 from shm.gap.problem import GapProblem
-from shm.models.effects import EFFECTS, Parameter, parameters_of
+from shm.models.effects import EFFECTS, Effect, Parameter, parameters_of
 from shm.values import BoolArray, FloatArray
 
 _SMALL_SHARE = 0.25  # of a size's range, in which effects are linear still and well above rounding
 _EXTENT = 0.05  # judgement: of the length, a corroded stretch: shorter than half a wave of any mode
-_KINDS = {
-    "point_mass": "point mass",
-    "intermediate_support": "lateral spring",
-    "section_loss": "section loss",
-}
 _END = "rotational_end_flexibility"
 # Technical: a size of 0 has no slope; slopes by a change of 5 %; a step that led up is tried anew
 # at less than half. They cost passes and change no optimum.
@@ -64,7 +59,7 @@ class LocalCause:
 
 def local_causes(problem: GapProblem) -> tuple[LocalCause, ...]:
     """Those that may sit anywhere, in all planes that were measured."""
-    return tuple(_anywhere(problem, name, kind) for name, kind in _KINDS.items())
+    return tuple(_anywhere(problem, each) for each in EFFECTS.values() if each.localised_as)
 
 
 def flexible_ends(problem: GapProblem) -> tuple[LocalCause, ...]:
@@ -72,12 +67,12 @@ def flexible_ends(problem: GapProblem) -> tuple[LocalCause, ...]:
     return tuple(_flexible_end(problem, end) for end in problem.hanger.supports.ends("clamped"))
 
 
-def _anywhere(problem: GapProblem, name: str, kind: str) -> LocalCause:
+def _anywhere(problem: GapProblem, effect: Effect) -> LocalCause:
     survey = problem.observations.design.survey
-    hypothesis = Hypothesis(((name, EFFECTS[name].variants(problem.hanger, survey)[0]),))
+    hypothesis = Hypothesis(((effect.name, effect.variants(problem.hanger, survey)[0]),))
     size = _size(problem, hypothesis)
     small = float(size.value(np.array(_SMALL_SHARE)))
-    return LocalCause(kind, hypothesis, np.zeros(0), small, size.upper)
+    return LocalCause(effect.localised_as, hypothesis, np.zeros(0), small, size.upper)
 
 
 def _flexible_end(problem: GapProblem, end: int) -> LocalCause:

@@ -175,8 +175,3 @@ class AsMade(Model):
 
     def _column(self, theta: FloatArray, name: str) -> FloatArray:
         return np.asarray(theta[:, self.parameter_names.index(name)])
-
-
-def is_of_the_bar_as_made(names: tuple[str, ...]) -> bool:
-    """Whether the parameters of a posterior are those of the bar as made."""
-    return SECTION in names

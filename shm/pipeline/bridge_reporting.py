@@ -153,12 +153,12 @@ def _pattern_or_why(store: Store, order: Sequence[int]) -> tuple[BridgePattern |
         return None, f"Over the bridge nothing can be compared: {reason.message}"
 
 
-def latest_drifts(store: Store, hanger: int, model: str | None = None) -> tuple[Drift, ...]:
+def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     """The shifts of a hanger's latest test from the baseline in force.
 
     None where no test has been compared with it, as after the hanger was given a new one.
     """
-    baseline = store.watch.baseline(hanger, model)
+    baseline = store.watch.baseline(hanger)
     told = store.watch.list_detected_and_latest(baseline) if baseline else ()
     return told[-1].watched.drifts if told else ()
 

@@ -39,7 +39,8 @@ class RemoteFile:
             except StoreError as error:
                 return cls(None, None, str(error))
         content, sidecar = (
-            _bytes(archive, part, fits) for part in (file.archived_as, file.sidecar_as)
+            (archive.folder / part).read_bytes() if fits and part is not None else None
+            for part in (file.archived_as, file.sidecar_as)
         )
         return cls(content, sidecar)
 
@@ -57,7 +58,3 @@ class RemoteFile:
             if self.sidecar is not None:
                 sidecar_path(path).write_bytes(self.sidecar)
             yield path
-
-
-def _bytes(archive: Archive, relative: str | None, fits: bool) -> bytes | None:
-    return (archive.folder / relative).read_bytes() if fits and relative is not None else None

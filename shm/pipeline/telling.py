@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 
 from shm.store import Delivery, News, Silence
 from shm.store.stored_silences import silenced_until
-from shm.values import TENSION, Alert, Drift
+from shm.values import Alert, Drift, is_ratio, kind_of
 
 _MOST_WINDOWS = 5
 """Judgement: while alike alerts keep coming a message waits for 5 windows, by default the 5 minutes
@@ -138,7 +138,7 @@ def _condition(alert: Alert) -> tuple[object, ...]:
     if not alert.drifts:
         return (alert.kinds,)
     lead = alert.drifts[0]
-    return (alert.kinds, lead.quantity == TENSION, lead.shift_mean < 0)
+    return (alert.kinds, kind_of(lead.quantity), lead.shift_mean < 0)
 
 
 # ---------------------------------------------------------------- what a message says
@@ -197,7 +197,7 @@ def _of_several(deliveries: Sequence[Delivery]) -> str:
             )
         return f"{len(alerts)} hangers: {kinds}: {named}. {alerts[0].message}"
     largest = max(leads, key=lambda drift: abs(drift.shift_mean))
-    name, way = _moved(largest)
+    name, way = kind_of(largest.quantity).noun, "fell" if largest.shift_mean < 0 else "rose"
     # As urgent as each alert by itself: a loss beyond its threshold is for today.
     is_loss = "beyond threshold" in alerts[0].kinds and largest.shift_mean < 0
     soon = "today" if is_loss else "within a week"
@@ -213,13 +213,8 @@ def _message_of(alerts: Sequence[Alert], hanger: int) -> str:
     return next(alert.message for alert in alerts if alert.hanger == hanger)
 
 
-def _moved(lead: Drift) -> tuple[str, str]:
-    name = "tension" if lead.quantity == TENSION else "end stiffness"
-    return name, "fell" if lead.shift_mean < 0 else "rose"
-
-
 def _amount(lead: Drift) -> str:
-    if lead.quantity == TENSION:
+    if is_ratio(lead.quantity):
         return f"{100 * abs(lead.shift_mean):.1f} %"
     return f"{10 ** abs(lead.shift_mean):.1f} times"
 

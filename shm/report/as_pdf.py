@@ -153,8 +153,9 @@ def _counted() -> Flowable:
     return CallerMacro(drawCallable=fill_in)
 
 
-def _cut(text: str, room: float = WIDTH / 2 - 4 * mm) -> str:
+def _cut(text: str) -> str:
     """As much of `text` as stands on its half of the line."""
+    room = WIDTH / 2 - 4 * mm
     if _width(text, _PLAIN, _LINE_SIZE) <= room:
         return text
     while text and _width(f"{text}…", _PLAIN, _LINE_SIZE) > room:

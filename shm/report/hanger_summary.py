@@ -15,7 +15,6 @@ from shm.report.hanger_status import WATCH_PROBABILITY, Status
 from shm.report.intervals import Interval
 from shm.report.outdated_baseline import discarded, redescribed
 from shm.report.shifts import shift_cells, threshold_cell
-from shm.report.states import CalledChange
 from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
 from shm.values.stated_tension import stated
 from shm.watch.alert_action import action_words
@@ -41,7 +40,7 @@ def summary(data: HangerReport) -> str:
         _change(data),
         data.creep.words if data.creep else "",
         in_period(data),
-        _over_the_bridge(data),
+        f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else "",
         _model(data),
         _gap(data),
         *advice(data),
@@ -176,10 +175,6 @@ def _unseen(data: HangerReport) -> str:
     return ""
 
 
-def _over_the_bridge(data: HangerReport) -> str:
-    return f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else ""
-
-
 def _shift(drift: Drift) -> str:
     verb = "risen" if drift.shift_mean > 0 else "fallen"
     _, shift, span, threshold, _ = shift_cells(drift)
@@ -197,13 +192,10 @@ def in_period(data: HangerReport) -> str:
     tests = formatting.counted(len(data.trend), "test")
     raised = formatting.counted(len(data.alerts), "alert")
     called = formatting.listed(
-        [each.words for each in _called_in(data)] or ["no change was detected"]
+        [each.words for each in data.states.within(data.period).changes]
+        or ["no change was detected"]
     )
     return f"In the period {data.period}: {tests}, {raised}; {called}; {_course(data)}."
-
-
-def _called_in(data: HangerReport) -> tuple[CalledChange, ...]:
-    return data.states.within(data.period).changes
 
 
 def _course(data: HangerReport) -> str:

@@ -13,10 +13,11 @@ from shm.report.intervals import Interval
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
 from shm.report.quality_table import quality_table
-from shm.report.shifts import factor, shift_cells, shift_table
+from shm.report.shifts import shift_cells, shift_table
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
+from shm.watch.change_words import factor
 
 
 def numbers(data: HangerReport) -> tuple[Table, ...]:

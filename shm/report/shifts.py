@@ -7,12 +7,12 @@ import math
 from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.report.paper import Table
-from shm.values import NAN, TENSION, Drift
+from shm.values import NAN, Drift, is_ratio, kind_of
 from shm.values.force_units import ForceUnit, force_unit
+from shm.watch.change_words import factor
 from shm.watch.neighbours import BridgePattern, HangerRow
 
 _UNMOVED = 0.01  # of the threshold: no test tells so little
-_LARGEST_FACTOR = 1e3  # judgement: beyond, an end is as good as clamped or free
 
 
 def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
@@ -23,11 +23,11 @@ def shift_cells(row: Drift) -> tuple[str, str, str, str, str]:
     interval = Interval.normal(row.shift_mean, row.shift_sd)
     # Of the baseline's own test, and where the data leave no room for a shift.
     unmoved = row.shift_sd < _UNMOVED * row.threshold and abs(row.shift_mean) < row.threshold / 2
-    size, span = _tension(interval) if row.quantity == TENSION else _stiffness(interval)
+    size, span = _ratio(interval) if is_ratio(row.quantity) else _stiffness(interval)
     return (
         formatting.quantity(row.quantity),
         "no change seen" if unmoved else size,
-        _about_none(row) if unmoved else span,
+        kind_of(row.quantity).unmoved if unmoved else span,
         threshold_cell(row),
         formatting.probability(row.probability),
     )
@@ -43,28 +43,14 @@ def shift_unit(pattern: BridgePattern) -> tuple[ForceUnit, int]:
     return unit, unit.decimals(largest_n)
 
 
-def _about_none(row: Drift) -> str:
-    return "about 0 %" if row.quantity == TENSION else "about 1.00 times"
-
-
 def threshold_cell(row: Drift) -> str:
-    """`5 %` of a tension, `0.32 or 3.2 times` of a stiffness."""
-    if row.quantity == TENSION:
+    """`5 %` of a tension or a frequency, `0.32 or 3.2 times` of a stiffness."""
+    if is_ratio(row.quantity):
         return f"{100 * row.threshold:.3g} %"
     return f"{factor(-row.threshold)} or {factor(row.threshold)} times"
 
 
-def factor(decades: float) -> str:
-    """How many times what it was: `0.50`, `3.2`."""
-    value = 10 ** min(decades, 300.0)
-    if value > _LARGEST_FACTOR:
-        return "more than 1000"
-    if value < 1 / _LARGEST_FACTOR:
-        return "less than 0.001"
-    return f"{value:.2f}" if value < 2 else f"{value:.1f}" if value < 10 else f"{value:.0f}"
-
-
-def _tension(interval: Interval) -> tuple[str, str]:
+def _ratio(interval: Interval) -> tuple[str, str]:
     percent = interval.scaled(100)
     return f"{formatting.mean(percent, True)} %", f"{formatting.span(percent, True)} %"
 

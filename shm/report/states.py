@@ -28,8 +28,8 @@ from shm.watch.state import StateOptions, set_free, states
 class QuantityOverTime:
     """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
 
-    The tension is in N, a stiffness log10 of it. `title` is what people call it, `unit` that of a
-    stiffness. Thresholds are values, not shifts; NaN where there is none.
+    The tension is in N, a stiffness log10 of it. `title` is what people call it. Thresholds
+    are values, not shifts; NaN where there is none.
     """
 
     name: str
@@ -40,7 +40,6 @@ class QuantityOverTime:
     baseline: float
     lower_threshold: float
     upper_threshold: float
-    unit: str = "N m/rad"
 
     @property
     def is_tension(self) -> bool:
@@ -112,7 +111,7 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
         history.reference_temperature_c,
         outlier > 0.5,
         tuple(_over_time(each, history, hanger) for each in watched.reader.quantities),
-        tuple(_called(call) for call in calls),
+        tuple(CalledChange(call.began_after, call.began_by, called_words(call)) for call in calls),
         history.temperature_coefficients(),
     )
 
@@ -135,10 +134,6 @@ def _over_time(
         level - reach,
         level + reach,
     )
-
-
-def _called(change: Change) -> CalledChange:
-    return CalledChange(change.began_after, change.began_by, called_words(change))
 
 
 def called_words(change: Change) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,9 @@ from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.report.states import StatesOverTime
-from shm.values import TENSION, FloatArray, TemperatureCoefficient
+from shm.values import FloatArray, TemperatureCoefficient, kind_of
 
 TITLE = "Change with the temperature"
-_PERCENT_A_DECADE = 100 * math.log(10)
 _WIDE_K = 10.0
 _FEWEST = 3
 """Of two tests at two temperatures nobody can tell a swing from a change."""
@@ -48,7 +46,7 @@ def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
     return [
         {
             "quantity": each.quantity,
-            "unit": f"{'fraction' if each.quantity == TENSION else 'decades'} per K",
+            "unit": f"{kind_of(each.quantity).shift_unit} per K",
             "mean": each.mean,
             "sd": each.sd,
             "prior_sd": each.prior_sd,
@@ -62,7 +60,7 @@ def temperature_documents(states: StatesOverTime) -> list[dict[str, Any]]:
 def _row(each: TemperatureCoefficient, title: str, why_not_known: str) -> tuple[str, ...]:
     if why_not_known:
         return (title, f"not known: {why_not_known}", "")
-    scale = 100.0 if each.quantity == TENSION else _PERCENT_A_DECADE
+    scale = kind_of(each.quantity).percent_a_unit
     change = Interval.normal(each.mean, each.sd).scaled(scale)
     sd = f"{scale * each.sd:.{formatting.decimals(change.width)}f}"
     return (

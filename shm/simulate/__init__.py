@@ -16,7 +16,7 @@ from shm.simulate.campaign import (
     campaign_with_truth,
     realised,
 )
-from shm.simulate.detectable import at_share, scaled_to, scaled_together, size_of
+from shm.simulate.detectable import at_share, scaled_to, size_of
 from shm.simulate.disturbances import DISTURBANCES, Planted
 from shm.simulate.effects import (
     PLANTED,
@@ -64,7 +64,6 @@ __all__ = [
     "planted_modes",
     "realised",
     "scaled_to",
-    "scaled_together",
     "simulated_test",
     "size_of",
     "spread_places_m",

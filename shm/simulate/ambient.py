@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from datetime import datetime
 
 import numpy as np
 import scipy
@@ -17,7 +16,7 @@ from shm.simulate.elements import modes_below, plane_modes
 from shm.simulate.logger import Line, logged
 from shm.simulate.response import poles_of
 from shm.simulate.state import HammerPlan, HangerState, check
-from shm.values import NAN, PLANES, ComplexArray, FloatArray, Hanger, Recording
+from shm.values import PLANES, ComplexArray, FloatArray, Hanger, Recording
 
 _HIGHEST = 0.4  # of the sampling rate: what the logger passes
 
@@ -40,14 +39,7 @@ class AmbientPlan:
 
 
 def ambient_test(
-    hanger: Hanger,
-    state: HangerState,
-    plan: AmbientPlan,
-    rng: np.random.Generator,
-    *,
-    time: datetime | None = None,
-    temperature_c: float = NAN,
-    source: str = "simulated",
+    hanger: Hanger, state: HangerState, plan: AmbientPlan, rng: np.random.Generator
 ) -> Recording:
     """A recording of `acc_1` (transverse), `acc_2` (longitudinal) and so on, without force.
 
@@ -66,7 +58,7 @@ def ambient_test(
         for number, plane in enumerate(PLANES)
     ]  # fmt: skip
     channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
-    return Recording(source, channels, plan.sampling_rate_hz, hanger.id, time, temperature_c)
+    return Recording("simulated", channels, plan.sampling_rate_hz, hanger.id)
 
 
 def _as_one_hit(plan: AmbientPlan) -> HammerPlan:

@@ -155,7 +155,14 @@ def _realised(
 ) -> tuple[CampaignTruth, list[PlantedModes]]:
     """The truth, and the modes without error of each test."""
     tests = plan.tests(hanger)
-    truth = _drawn_truth(hanger, state, effects, plan, rng)
+    deviations, factor = _drawn_deviations(hanger, plan, rng)
+    sensors: tuple[SensorError, ...] = ()
+    if plan.reality is not None:
+        waves = drawn_waves(plan.reality, rng)
+        deviations = replace(deviations, section_waves=waves if plan.as_made else ())
+        sensors = drawn_sensors(plan.reality, plan.places_m(hanger), rng)
+    tension_n = state.tension_n * factor
+    truth = CampaignTruth(tension_n, deviations, tuple(effects), sensors=sensors)
     exact = [_of_test(hanger, state, truth, plan, test) for test in tests]
     return replace(truth, frequencies=_frequencies(tests, exact, plan)), exact
 
@@ -170,23 +177,6 @@ def _frequencies(
         if plane in plan.planes
         for order in range(plan.modes)
     )
-
-
-def _drawn_truth(
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    plan: CampaignPlan,
-    rng: np.random.Generator,
-) -> CampaignTruth:
-    deviations, factor = _drawn_deviations(hanger, plan, rng)
-    sensors: tuple[SensorError, ...] = ()
-    if plan.reality is not None:
-        waves = drawn_waves(plan.reality, rng)
-        deviations = replace(deviations, section_waves=waves if plan.as_made else ())
-        sensors = drawn_sensors(plan.reality, plan.places_m(hanger), rng)
-    tension_n = state.tension_n * factor
-    return CampaignTruth(tension_n, deviations, tuple(effects), sensors=sensors)
 
 
 def _shift(tests: Sequence[ModalTest], temperature_c: float) -> float:

@@ -86,23 +86,6 @@ def scaled_to(
     return at_share((low[0] + high[0]) / 2 / _SHARES, hanger, effect)
 
 
-def scaled_together(
-    size: float,
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    plan: CampaignPlan,
-) -> tuple[PlantedEffect, ...] | None:
-    """Each effect by itself scaled to a size; None where one of them cannot be so large."""
-    found = []
-    for effect in effects:
-        scaled = scaled_to(size, hanger, state, effect, plan)
-        if scaled is None:
-            return None
-        found.append(scaled)
-    return tuple(found)
-
-
 def _between(low: tuple[int, float], high: tuple[int, float]) -> int:
     """Where a line through two (number, value) would be 0, but in the inner three quarters."""
     wide = high[0] - low[0]

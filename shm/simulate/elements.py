@@ -81,7 +81,9 @@ def plane_modes(
     stiffness, mass = _matrices(nodes, [pieces[index] for index in owner], state.tension_n)
     springs = state.springs_n_m_rad(plane)
     free = np.delete(np.arange(2 * len(nodes)), _held(2 * len(nodes), springs))
-    stiffness = _with_springs(stiffness, springs)
+    diagonal = np.zeros(stiffness.shape[0])
+    diagonal[[1, -1]] = [0.0 if math.isinf(spring) else spring for spring in springs]
+    stiffness = stiffness + diags_array(diagonal)
     squares, vectors = _lowest(stiffness[free][:, free], mass[free][:, free], modes)
     full = np.zeros((2 * len(nodes), modes))
     full[free] = vectors
@@ -147,12 +149,6 @@ def _held(unknowns: int, springs: tuple[float, float]) -> list[int]:
     """Unknowns that are zero: both end deflections, and the slopes of clamped ends."""
     deck, arch = (math.isinf(spring) for spring in springs)
     return [0, unknowns - 2, *([1] if deck else []), *([unknowns - 1] if arch else [])]
-
-
-def _with_springs(stiffness: Any, springs: tuple[float, float]) -> Any:
-    diagonal = np.zeros(stiffness.shape[0])
-    diagonal[[1, -1]] = [0.0 if math.isinf(spring) else spring for spring in springs]
-    return stiffness + diags_array(diagonal)
 
 
 def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArray]:

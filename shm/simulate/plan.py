@@ -10,6 +10,7 @@ from shm.values import PLANES, AddedMass, Hanger, ModalTest, Plane
 
 # Fractions of the length, from the deck and from a lift, near no node of the lowest eight modes.
 _PLACES = (0.13, 0.29, 0.45, 0.66)
+_MASS_PLACE = 0.3
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class CampaignPlan:
     """What is measured, under which conditions and how well.
 
     One test at each temperature at the reference level, one at each further level at the middle
-    temperature, and one there with a known mass of `mass_share` of the hanger's at `mass_place` of
+    temperature, and one there with a known mass of `mass_share` of the hanger's at 0.3 of
     its length (share 0: none). A NaN temperature or amplitude is one that nobody noted. `sensors`
     (1 to 4) places hold an accelerometer each, unless `sensors_x_m` names them; one that is not
     biaxial measures in the hit plane. `frequency_sd` is a fraction; `shape_sd` a share of the
@@ -35,7 +36,6 @@ class CampaignPlan:
     temperatures_c: tuple[float, ...] = (-5.0, 10.0, 25.0)
     amplitudes: tuple[float, ...] = (0.3, 1.0, 2.0)
     mass_share: float = 0.02
-    mass_place: float = 0.3
     frequency_sd: float = 1e-4
     shape_sd: float = 0.005
     damping_sd: float = 0.1
@@ -63,7 +63,7 @@ class CampaignPlan:
         if self.mass_share:
             own = hanger.mass_per_length_kg_m * hanger.length_m
             conditions.append((middle, usual))
-            masses.append(AddedMass(self.mass_share * own, self.mass_place * hanger.length_m))
+            masses.append(AddedMass(self.mass_share * own, _MASS_PLACE * hanger.length_m))
         return tuple(
             ModalTest(f"t{i + 1}", (), hanger.id, None, warmth, level, mass)
             for i, ((warmth, level), mass) in enumerate(zip(conditions, masses, strict=True))

@@ -184,7 +184,7 @@ def _wavy(bar: Bar, waves: tuple[float, ...]) -> Profile:
     )
 
 
-def drawn_hanger(rng: np.random.Generator, *, number: int = 1) -> tuple[Hanger, HangerState]:
+def drawn_hanger(rng: np.random.Generator) -> tuple[Hanger, HangerState]:
     """A steel rod of 6 to 15 m and 80 to 140 mm, clamped, with its true tension.
 
     That is 150 to 900 kN and 0.15 to 0.5 of the yield force of S355 steel, log-uniform between the
@@ -197,7 +197,7 @@ def drawn_hanger(rng: np.random.Generator, *, number: int = 1) -> tuple[Hanger, 
     tension_n = float(np.exp(rng.uniform(low, high)))
     nominal_n = 1e3 * round(tension_n * math.exp(_NOMINAL_OFF * rng.standard_normal()) / 1e3)
     hanger = Hanger(
-        id=number,
+        id=1,
         length_m=round(float(rng.uniform(*_LENGTH_M)), 1),
         elastic_modulus_pa=_MODULUS_PA,
         area_m2=area_m2,

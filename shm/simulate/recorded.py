@@ -32,6 +32,7 @@ _PEAK_PASSED = 0.9914
 _SAME_PLACE_M = 1e-6  # rounding of one number that went two ways
 _ALONE = 2
 """Of the usual places, the one that moves well in the first mode, too."""
+_FORCE_SCATTER = 0.02
 _BEFORE, _SCATTER = 0.04, 0.01
 """Of a hit's slot: when the hammer falls, and by how much later it may."""
 
@@ -47,7 +48,6 @@ class Recorder:
     hits: int = 5
     samples_a_hit: int = 2560
     reference_force_n: float = 1000.0
-    force_scatter: float = 0.02
     acceleration_noise_m_s2: float = 0.01
     force_noise_n: float = 0.5
 
@@ -155,7 +155,7 @@ class _Crew:
             sensors_x_m=tuple(each.x_m + each.off_m for each in self.sensors),
             hammer_angle_deg=90.0 * PLANES.index(plane),
             peak_force_n=level * recorder.reference_force_n / _PEAK_PASSED,
-            peak_force_scatter=recorder.force_scatter,
+            peak_force_scatter=_FORCE_SCATTER,
             pulse_seconds=_PULSE_SAMPLES / rate,
             pre_trigger_s=_BEFORE * seconds,
             hit_time_scatter_s=_SCATTER * seconds,

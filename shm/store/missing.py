@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -180,7 +180,6 @@ def _by_documents(connection: Connection) -> Iterator[MissingRow]:
 
 
 _Documents = Iterable[tuple[Row[Any], dict[str, Any]]]
-_Told = Callable[[Connection, _Documents], Iterator[MissingRow]]
 
 
 def _documents(connection: Connection, name: str, columns: Iterable[str]) -> _Documents:

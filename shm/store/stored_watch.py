@@ -191,13 +191,11 @@ class Watch(Repository):
             rows = connection.execute(query.order_by(tests.c.time, tests.c.id)).all()
         return tuple(WatchedName(row.id, row.name, row.time) for row in rows)
 
-    def list_drifts(self, hanger: int | None = None, test: str | None = None) -> tuple[Drift, ...]:
-        """Shifts from the baseline, by time; of one hanger or test where named."""
+    def list_drifts(self, hanger: int | None = None) -> tuple[Drift, ...]:
+        """Shifts from the baseline, by time; of one hanger where named."""
         query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
-        if test is not None:
-            query = query.where(tests.c.name == test)
         with self.reading() as connection:
             rows = connection.execute(query.order_by(drifts.c.time, drifts.c.id)).all()
         return tuple(_drift(row) for row in rows)

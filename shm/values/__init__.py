@@ -42,6 +42,7 @@ from shm.values.drift import (
     WatchedTest,
     is_frequency,
     is_ratio,
+    kind_of,
 )
 from shm.values.hanger import (
     EffectPrior,
@@ -207,6 +208,7 @@ __all__ = [
     "is_frequency",
     "is_ratio",
     "is_test_id",
+    "kind_of",
     "leads",
     "printable",
 ]

@@ -26,14 +26,45 @@ ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
+@dataclass(frozen=True)
+class QuantityKind:
+    """What all watched quantities of a kind have in common: what people call one, and its shifts.
+
+    A small shift is `percent_a_unit` times as many percent of the quantity.
+    """
+
+    noun: str
+    shift_unit: Literal["fraction", "decades"]
+    percent_a_unit: float
+    unmoved: str
+
+    @property
+    def is_ratio(self) -> bool:
+        """Whether shifts of a quantity are fractions of it."""
+        return self.shift_unit == "fraction"
+
+
+_KINDS = {
+    TENSION: QuantityKind("tension", "fraction", 100.0, "about 0 %"),
+    FREQUENCY: QuantityKind("frequency", "fraction", 100.0, "about 0 %"),
+    "": QuantityKind("end stiffness", "decades", 100 * math.log(10), "about 1.00 times"),
+}
+"""By how their names begin, the first that fits. What else may move frequencies is no quantity of a
+hanger but a cause: an effect of the catalogue with `over_time`."""
+
+
+def kind_of(quantity: str) -> QuantityKind:
+    return next(kind for begins, kind in _KINDS.items() if quantity.startswith(begins))
+
+
 def is_frequency(quantity: str) -> bool:
     """Whether a watched quantity is a frequency itself, of a structure without a model."""
-    return quantity.startswith(FREQUENCY)
+    return kind_of(quantity) is _KINDS[FREQUENCY]
 
 
 def is_ratio(quantity: str) -> bool:
     """Whether shifts of a quantity are fractions of it: of the tension and frequencies they are."""
-    return quantity == TENSION or is_frequency(quantity)
+    return kind_of(quantity).is_ratio
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,13 +123,13 @@ def _factor_words(decades: float) -> str:
 
 
 def factor(decades: float) -> str:
-    """Of what it was: `0.50`, `3.2`."""
+    """How many times what it was: `0.50`, `1.06`, `3.2`."""
     times = 10 ** min(decades, 10.0)
     if times > _LARGEST_FACTOR:
         return "more than 1000"
     if times < 1 / _LARGEST_FACTOR:
         return "less than 0.001"
-    return f"{times:.2f}" if times < 1 else f"{times:.1f}" if times < 10 else f"{times:.0f}"
+    return f"{times:.2f}" if times < 2 else f"{times:.1f}" if times < 10 else f"{times:.0f}"
 
 
 def size_words(each: Moved | Drift) -> str:

@@ -140,6 +140,15 @@ def test_where_no_process_can_be_begun_no_file_is_to_blame(
     assert workers.submit_fresh(os.getpid).result(60)
 
 
+def test_where_each_process_ends_at_once_no_file_is_to_blame_and_none_is_begun_for_ever() -> None:
+    with children_ended():
+        workers = Workers(1, partial(os._exit, 1))
+        with pytest.raises(ShmError, match="each ended before") as refusal:
+            workers.submit(os.getpid).result(60)
+        workers.shutdown(wait=False, cancel_futures=True)
+    assert refusal.value.retry_after_s
+
+
 def _grow() -> int:
     held, most = [], memory_of_machine()
     while len(held) << 26 < most:

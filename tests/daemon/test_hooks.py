@@ -84,7 +84,7 @@ def test_what_a_hook_answers_is_told(tmp_path: Path) -> None:
 
 
 def test_a_hook_that_does_not_listen_has_not_failed(tmp_path: Path) -> None:
-    a_notifier(tmp_path)(CommandHook("mail", ("true",)), an_alert())
+    assert a_notifier(tmp_path)(CommandHook("mail", ("true",)), an_alert()) == "exit code 0"
 
 
 def test_a_hook_that_hangs_is_ended_with_all_its_children(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from shm.store.checking import check_store
 from shm.store.stored_recordings import Recordings
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import why_turn_failed
+from shm_daemon.spool import Look, scan
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
@@ -173,6 +174,20 @@ def test_nothing_is_taken_while_a_folder_is_on_another_disk(
     away.rename(workspace.archive.folder)
     until(lambda: counts(workspace) == {Stage.DONE: 2})
     assert why_turn_failed(workspace) == ""
+
+
+def test_files_are_taken_however_long_it_takes_to_look_through_the_spool(
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow_scan(spool: Path, meanwhile: Callable[[], object]) -> dict[Path, Look]:
+        time.sleep(0.1)
+        return scan(spool, meanwhile)
+
+    monkeypatch.setattr("shm_daemon.loop._RECEIVING_S", 0.01)
+    monkeypatch.setattr("shm_daemon.loop.scan", slow_scan)
+    write_test(workspace.spool / "a.modes.json", workspace)
+    serve()
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
 
 
 def test_a_turn_that_fails_is_shown_until_one_goes_well(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -187,8 +188,9 @@ def test_a_store_that_is_out_holds_messages_up_and_loses_none(
 
 
 def test_without_a_broker_named_nothing_is_begun(tmp_path: Path) -> None:
+    before = threading.enumerate()
     with messages(make_workspace(tmp_path / "bridge")):
-        pass
+        assert threading.enumerate() == before
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,8 @@ def test_a_hanger_tells_its_tension_with_its_interval(client: httpx.Client) -> N
     assert tension["q05"] < tension["q50"] < tension["q95"]
     assert tension["mean"] == pytest.approx(SLOW_LOSS[-1] * state["nominal_tension_n"], rel=0.03)
     assert state["tests"] == len(SLOW_LOSS)
-    assert state["open_alerts"] >= 0
+    alerts = client.get("/api/alerts", params={"hanger": 3, "open": True}).json()["alerts"]
+    assert state["open_alerts"] == len(alerts) > 0
     assert {shift["quantity"] for shift in state["shifts"]} >= {"tension"}
 
 

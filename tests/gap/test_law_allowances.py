@@ -49,7 +49,9 @@ def test_what_passes_for_an_effect_may_be_off_wherever_the_effect_may() -> None:
     """Or an effect that is off by the level would be beyond doubt."""
     for effect in ("section_loss", "geometric_hardening"):
         problem, baseline, fit = _fits(effect)
-        for allowed in allowances(problem, baseline, fit):
+        found = allowances(problem, baseline, fit)
+        assert found
+        for allowed in found:
             assert allowed.share.unknown >= allowed.share.own / 2
 
 

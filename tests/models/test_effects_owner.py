@@ -40,7 +40,11 @@ def test_a_spring_of_the_other_end_can_be_narrowed_too() -> None:
 
 
 def test_an_angle_may_have_a_negative_bound() -> None:
-    check_effect_priors(with_prior("skewed_principal_axes", "angle_deg", -45, 10))
+    own = with_prior("skewed_principal_axes", "angle_deg", -45, 10)
+    check_effect_priors(own)
+    found = parameters_of("skewed_principal_axes", own, Variant("deck end", ends=(0,)))
+    angle = next(each for each in found if each.name == "angle_deg")
+    assert (angle.lower, angle.upper) == (-45, 10)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +66,3 @@ def test_a_range_that_cannot_be_is_refused_with_what_to_do(prior: tuple, complai
         check_effect_priors(with_prior(*prior))
     assert "hanger 3" in str(refusal.value)
     assert refusal.value.remedy
-
-
-def test_a_hanger_without_ranges_is_fine() -> None:
-    check_effect_priors(HANGER_3)

@@ -21,7 +21,6 @@ from shm.simulate import (
     planted_modes,
     realised,
     scaled_to,
-    scaled_together,
     size_of,
 )
 from shm.simulate.bar import bar_modes
@@ -269,13 +268,15 @@ def test_a_deck_with_a_second_mode_far_above_is_one_mass_on_a_spring(hanger: Han
     np.testing.assert_allclose(own[0], text[0], rtol=2e-3)
 
 
-def test_two_effects_are_each_scaled_to_the_size(hanger: Hanger) -> None:
+@pytest.mark.parametrize("effect", [LOSS, SLIP])
+def test_an_effect_is_scaled_to_a_size_that_it_can_have(
+    hanger: Hanger, effect: PlantedEffect
+) -> None:
     plan = replace(QUICK, shapes=False, amplitudes=(0.3, 1.0, 2.0))
-    found = scaled_together(8.0, hanger, STATE, (LOSS, SLIP), plan)
+    found = scaled_to(8.0, hanger, STATE, effect, plan)
     assert found is not None
-    for each in found:
-        assert size_of(hanger, STATE, (each,), plan) == pytest.approx(8.0, rel=0.021)
-    assert scaled_together(1e9, hanger, STATE, (LOSS, SLIP), plan) is None
+    assert size_of(hanger, STATE, (found,), plan) == pytest.approx(8.0, rel=0.021)
+    assert scaled_to(1e9, hanger, STATE, effect, plan) is None
 
 
 def test_a_turned_sensor_counts_beside_the_turn_that_any_sensor_has(hanger: Hanger) -> None:

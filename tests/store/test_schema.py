@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from contextlib import closing
 from datetime import timedelta
 from pathlib import Path
 
@@ -190,8 +191,10 @@ def test_an_upgrade_from_an_unknown_schema_says_so(tmp_path: Path) -> None:
 def test_upgrading_twice_changes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "shm.db"
     Store.create(path).close()
-    Store.upgrade(path)
-    Store.open(path).close()
+    with closing(sqlite3.connect(path)) as store:
+        before = list(store.iterdump())
+        Store.upgrade(path)
+        assert list(store.iterdump()) == before
 
 
 def test_what_is_not_a_database_is_refused(tmp_path: Path) -> None:

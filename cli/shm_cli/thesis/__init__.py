@@ -31,6 +31,3 @@ DEVIATION_FROM_NOMINAL = {
     "solid2": 0.01,
 }
 """Table 6.1: most probable tension over nominal tension, less 1."""
-
-EXACT_FIRST_FREQUENCY_HZ = {12.0: 5.58, 9.817: 7.67}
-"""First clamped-beam frequency at 711 kN by length, right where tables A.6 and A.7 are not."""

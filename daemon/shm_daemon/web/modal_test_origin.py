@@ -52,7 +52,7 @@ def steps(view: TestView) -> Table:
             "test" if step.test else "file",
             _second(step.at),
             _after(step.at, then),
-            _version(step.version),
+            f"shm {step.version}" if step.version else "not noted",
         )
         for step, then in zip(found, before, strict=False)
     )
@@ -105,10 +105,6 @@ def _after(at: datetime, then: datetime | None) -> str:
         if seconds < 3600
         else f"{formatting.plain(seconds / 3600)} h"
     )
-
-
-def _version(version: str | None) -> str:
-    return f"shm {version}" if version else "not noted"
 
 
 def _size(size_bytes: int) -> str:

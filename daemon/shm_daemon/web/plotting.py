@@ -36,20 +36,16 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, np.ndarray):
-        return _listed(value)
+        if value.dtype.kind == "f" and not np.isfinite(value).all():
+            return np.where(np.isfinite(value), value, None).tolist()  # type: ignore[call-overload]
+        if value.dtype.kind == "M":
+            return value.astype(str).tolist()
+        return plain(value.tolist()) if value.dtype.kind == "O" else value.tolist()
     if isinstance(value, str | bool) or value is None:
         return value.value if isinstance(value, Enum) else value
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return _single(value)
-
-
-def _listed(values: np.ndarray[Any, Any]) -> Any:
-    if values.dtype.kind == "f" and not np.isfinite(values).all():
-        return np.where(np.isfinite(values), values, None).tolist()  # type: ignore[call-overload]
-    if values.dtype.kind == "M":
-        return values.astype(str).tolist()
-    return plain(values.tolist()) if values.dtype.kind == "O" else values.tolist()
 
 
 def _single(value: Any) -> Any:

@@ -123,6 +123,7 @@ class Effect:
     depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
     would not have. `other_laws` says in words by which other laws, about as likely as its own, the
     same parameters may act. `over_time` is None of an effect that the watch does not look for.
+    `localised_as` is what one is called that a diagnosis looks for at each place along the hanger.
     """
 
     name: ClassVar[str]
@@ -135,6 +136,7 @@ class Effect:
     of_the_hanger: ClassVar[bool] = True
     other_laws: ClassVar[tuple[str, ...]] = ()
     over_time: ClassVar[OverTime | None] = None
+    localised_as: ClassVar[str] = ""
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         """Why these data cannot show the effect, a sentence for people; empty where they can."""

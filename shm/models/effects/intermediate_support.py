@@ -21,6 +21,7 @@ class IntermediateSupport(Effect):
 
     name = "intermediate_support"
     title = "Held between the ends"
+    localised_as = "lateral spring"
     phrase = "an intermediate support of {stiffness_n_m} at {x_m}"
     source = "Grossi and Albarracín (2003), Eigenfrequencies of generally restrained beams."
     seen_by = ("frequencies of low orders", "the other plane", "shapes")

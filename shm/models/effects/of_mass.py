@@ -63,6 +63,7 @@ class UnknownPointMass(Effect):
 
     name = "point_mass"
     title = "A mass at one place"
+    localised_as = "point mass"
     phrase = "a point mass of {mass_kg} at {x_m}"
     over_time = OverTime(
         fell="a mass was added",

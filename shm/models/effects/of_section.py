@@ -87,6 +87,7 @@ class SectionLoss(Effect):
 
     name = "section_loss"
     title = "Lost section over a stretch"
+    localised_as = "section loss"
     phrase = "a loss of {loss} of the section around {x_m}, over {extent_m}"
     over_time = OverTime(
         fell="section was lost over a stretch",

@@ -173,12 +173,8 @@ def _stiffness(gradients: list[list[csr_array]], material: Material) -> csr_arra
     total = shear * _each_axis(gradients[0][0] + gradients[1][1] + gradients[2][2])
     for i, j in product(range(3), repeat=2):
         block = lame * gradients[i][j] + shear * gradients[j][i]
-        total = total + kron(block, _unit(i, j), format="csr")
+        total = total + kron(block, csr_array(([1.0], ([i], [j])), shape=(3, 3)), format="csr")
     return csr_array(total)
-
-
-def _unit(i: int, j: int) -> csr_array:
-    return csr_array(([1.0], ([i], [j])), shape=(3, 3))
 
 
 def _each_axis(matrix: csr_array) -> csr_array:

@@ -48,7 +48,9 @@ def _draw_shifts(pattern: BridgePattern) -> Figure | None:
     figure = style.new_figure(_INCHES)
     above, below = style.stacked(figure, (1.0, 1.0))
     places = _places(pattern)
-    scale = _scale(pattern)
+    widest = max(abs(100 * row.shift_fraction) for row in pattern.rows)
+    limit = max(widest, _LEAST_RANGE_PERCENT)
+    scale = Normalize(-limit, limit)
     _elevation(above, pattern, places, scale)
     _bars(below, pattern, places, scale)
     _colour_bar(figure, [above, below], scale)
@@ -69,12 +71,6 @@ def _places(pattern: BridgePattern) -> dict[int, float]:
 
 def _in_metres(pattern: BridgePattern) -> bool:
     return all(math.isfinite(row.position_m) for row in pattern.rows)
-
-
-def _scale(pattern: BridgePattern) -> Normalize:
-    widest = max(abs(100 * row.shift_fraction) for row in pattern.rows)
-    limit = max(widest, _LEAST_RANGE_PERCENT)
-    return Normalize(-limit, limit)
 
 
 def _colours(rows: Sequence[HangerRow], scale: Normalize) -> list[tuple[float, ...]]:

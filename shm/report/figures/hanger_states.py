@@ -85,7 +85,7 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
 def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
     """What turns its values into those of its axis, and their unit: that of a tension fits it."""
     if not quantity.is_tension:
-        return 1.0, quantity.unit
+        return 1.0, "N m/rad"
     unit = force_unit(quantity.baseline, *quantity.filtered.middle.tolist())
     return 1 / unit.newtons, unit.name
 

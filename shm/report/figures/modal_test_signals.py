@@ -12,11 +12,11 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures.specification import envelope_places, peak_places
 from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 
-# Layout: channels drawn beside the sound one, bins of the fading; and what stands for a level of 0.
-_MOST_FAULTY = 2
+# Layout: channels drawn, and of these at most that are not sound.
+_MOST_CHANNELS, _MOST_FAULTY = 4, 2
 
 
-def shown_rows(sheet: ModalTestReport, most: int) -> list[int]:
+def shown_rows(sheet: ModalTestReport) -> list[int]:
     """Rows of the accelerations to draw: a few that were left out, then of each plane in turn
     the first, the last, those between."""
     channels = sheet.recordings[0].accelerations
@@ -24,7 +24,7 @@ def shown_rows(sheet: ModalTestReport, most: int) -> list[int]:
     faulty = [row for row, channel in enumerate(channels) if channel.name in faults]
     sound = [row for row in range(len(channels)) if row not in faulty]
     chosen = faulty[:_MOST_FAULTY]
-    chosen += _in_turn(channels, sound)[: max(1, most - len(chosen))]
+    chosen += _in_turn(channels, sound)[: max(1, _MOST_CHANNELS - len(chosen))]
     return sorted(chosen)
 
 

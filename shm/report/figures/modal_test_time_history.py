@@ -37,7 +37,6 @@ from shm.report.figures.specification import (
 )
 from shm.values import FloatArray
 
-_MOST_CHANNELS = 4
 _MOST_NUMBERS = 40
 _ZOOM_INCHES = 1.9
 _MOTION_NEAR_S = (-0.05, 0.3)
@@ -54,7 +53,7 @@ def _draw(shown: Shown) -> Specification | None:
     sheet, records = shown.sheet, shown.sheet.recordings
     if not records or not records[0].accelerations:
         return None
-    rows: list[int | None] = list(shown_rows(sheet, _MOST_CHANNELS))
+    rows: list[int | None] = list(shown_rows(sheet))
     if records[0].force is not None:
         rows = [None, *rows]
     panels = [_history(sheet, row, is_top=place == 0) for place, row in enumerate(rows)]
@@ -205,7 +204,7 @@ def _zoom(
 def _caption(shown: Shown) -> str:
     sheet = shown.sheet
     channels = len(sheet.recordings[0].accelerations)
-    some = formatting.some(len(shown_rows(sheet, _MOST_CHANNELS)), channels, "accelerations")
+    some = formatting.some(len(shown_rows(sheet)), channels, "accelerations")
     kind = "Force and accelerations" if sheet.recordings[0].force else "Accelerations"
     hits = (
         " Numbers and lines are the hits, in green those that were used, in red and dashed those "

@@ -139,11 +139,11 @@ def changes(
     ]  # fmt: skip
 
 
-def time_axis(times: Sequence[datetime], label: str = TIME) -> Axis:
+def time_axis(times: Sequence[datetime]) -> Axis:
     """All tests with a little room, at least a day either side."""
     first, last = min(times), max(times)
     margin = max(_MARGIN * (last - first), _LEAST_MARGIN)
-    return Axis(label=label, scale="date", range=(first - margin, last + margin))
+    return Axis(label=TIME, scale="date", range=(first - margin, last + margin))
 
 
 def inner(values: FloatArray) -> FloatArray:

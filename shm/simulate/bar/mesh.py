@@ -132,7 +132,7 @@ def _filled(special: Sequence[float], bar: Bar, elements: int) -> FloatArray:
     The spacing goes over from even to that of `x = L sin(angle)^2` as far as it must.
     """
     share = np.linspace(0, 1, _TABLE)
-    crowded = _crowding(bar, elements)
+    crowded = max(0.0, 1 - _layer_m(bar) * elements / (_ELEMENTS_A_LAYER * bar.length_m))
     place = (1 - crowded) * share + crowded * np.sin(np.pi / 2 * share) ** 2
     place = bar.deck_end_m + bar.length_m * place
     nodes = []
@@ -142,10 +142,6 @@ def _filled(special: Sequence[float], bar: Bar, elements: int) -> FloatArray:
         inner = np.interp(np.linspace(first, last, count + 1)[1:-1], share, place)
         nodes += [[begin], inner]
     return np.concatenate([*nodes, [special[-1]]])
-
-
-def _crowding(bar: Bar, elements: int) -> float:
-    return max(0.0, 1 - _layer_m(bar) * elements / (_ELEMENTS_A_LAYER * bar.length_m))
 
 
 def _layer_m(bar: Bar) -> float:

@@ -15,7 +15,6 @@ from shm.report.figures.time_axes import bounds_of, part, places, single_tests, 
 from shm.report.intervals import Interval
 from shm.report.states import CalledChange, called_words
 from shm.store import EventKind, TrendPoint
-from shm.values import TENSION
 from shm.values.force_units import ForceUnit, force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
@@ -31,7 +30,7 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 def _course(view: HangerView) -> hanger_trend.Course:
     """All that the figure shows; without the state over time where that is still worked out."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
-    found = [] if states is None else [q for q in states.quantities if q.name == TENSION]
+    found = [] if states is None else [q for q in states.quantities if q.is_tension]
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
     return hanger_trend.Course(
