@@ -40,7 +40,7 @@ from shm.watch.alert_text import message_of, message_of_baseline, message_of_odd
 from shm.watch.change_words import suspects
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
+from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.watch_state import WatchState
 from shm.watch.watcher import Watch, Watcher, watched
 
@@ -204,11 +204,11 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
     alert = _alert(news, change, test, hanger, is_further=is_further) or _of_odd(test, hanger, odd)
-    wrong = {(each.plane, each.order) for each in test.mistaken if each.is_notable}
+    wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
     noted = told.noted & wrong
-    if alert is None and wrong - noted:
+    if alert is None and (new := news_of(test.mistaken, noted)):
         # It waits while there is worse to tell.
-        alert, noted = notice_of(test, hanger), frozenset(wrong)
+        alert, noted = notice_of(test, hanger, new), wrong
     alone = told.alone
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
         alert, alone = _of_baseline(test, hanger), True
