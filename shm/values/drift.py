@@ -25,7 +25,7 @@ ENOUGH_MISTAKES = 3
 ENOUGH_FITS = 6
 """Tests in a row that must have such a mode right before it is over: one that is wrong in every
 other test is told once in 65 tests, and with three it would be once in 25."""
-ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
+ENOUGH_AGAINST = 3  # tests: of two a bad day may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 

@@ -18,7 +18,6 @@ from shm.values import (
     AlertKind,
     BoolArray,
     Hanger,
-    ModeReading,
     Plane,
     Reading,
     RepeatedMistake,
@@ -45,7 +44,7 @@ def repeated_mistakes(
     if reading.modes is None:
         return tuple(before)
     known = {(each.plane, each.order): each for each in before}
-    misfit = _off_the_baseline(reading, reading.modes)
+    misfit = off_the_baseline(reading)
     is_wrong = reading.modes.mistaken | misfit
     found = []
     for key, wrong, off, variance in zip(
@@ -62,10 +61,13 @@ def repeated_mistakes(
     return tuple(found)
 
 
-def _off_the_baseline(reading: Reading, modes: ModeReading) -> BoolArray:
-    """Which modes (modes,) lie off the state that a reading fits best, where these are too many to
-    be misnamed; else none.
+def off_the_baseline(reading: Reading) -> BoolArray:
+    """Which of the baseline's modes (modes,) lie off the state that a reading fits best, where
+    these are too many to be misnamed; else none.
     """
+    modes = reading.modes
+    if modes is None:
+        return np.zeros(0, bool)
     measured = np.isfinite(modes.variances)
     off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > _OFF)
     can_tell = measured.sum() > len(reading.mean) + 1
