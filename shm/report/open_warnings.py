@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from shm.report.formatting import listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.watch.alert_text import against_baseline_words
+from shm.watch.mistakes_text import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
@@ -53,13 +54,7 @@ def open_warnings(
         )
     notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
-        since = min(each.since for each in notable)
-        many = len(notable) > 1
-        found.append(
-            f"{listed([str(each) for each in notable]).capitalize()} of hanger {hanger.id} "
-            f"{'have' if many else 'has'} not fitted the other modes since {since:%Y-%m-%d}. "
-            f"Check {'their numbers' if many else 'its number'} at the next planned test."
-        )
+        found.append(warning_words(notable, hanger))
     return tuple(found)
 
 

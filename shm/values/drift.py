@@ -22,7 +22,10 @@ FREQUENCY = "frequency "
 """Begins the names of frequencies that are watched by themselves: `frequency transverse 1`."""
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
-ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
+ENOUGH_FITS = 6
+"""Tests in a row that must have such a mode right before it is over: one that is wrong in every
+other test is told once in 65 tests, and with three it would be once in 25."""
+ENOUGH_AGAINST = 3  # tests: of two a bad day may be to blame
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
@@ -256,12 +259,19 @@ class CreepRate:
 
 @dataclass(frozen=True)
 class RepeatedMistake:
-    """A mode that was taken for a mistaken one in the last `tests` tests that have it, `since`."""
+    """A mode that was taken for a mistaken one in `tests` tests in a row that have it, `since`.
+
+    Once it is notable it stays so until it was right in several tests in a row, of which there have
+    been `fits`; `tests` counts on. `is_misfit` where more modes of the test were wrong than can be
+    misnamed: then it is the test that does not fit.
+    """
 
     plane: Plane
     order: int
     since: datetime
     tests: int
+    fits: int = 0
+    is_misfit: bool = False
 
     def __str__(self) -> str:
         return f"{self.plane} {self.order}"

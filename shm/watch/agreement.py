@@ -31,7 +31,7 @@ from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
 from shm.watch.shift_mixture import beyond, shift_of_mixture
 
-_CLEAR = 3.0
+CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
 lies that far to one side, fewer than are blunders."""
 
@@ -51,7 +51,7 @@ Way = Literal["up", "down"]
 
 
 @dataclass(frozen=True)
-class _Shown:
+class Shown:
     """What one test says of one quantity by itself: its coordinate, the variance of that, and what
     it moves the mean log frequency by."""
 
@@ -103,7 +103,7 @@ def agreement(
 
 def _known_before(
     reader: Reader, newest: ModalTest, beside: Beside, options: WatchOptions
-) -> list[list[_Shown]]:
+) -> list[list[Shown]]:
     """What the last tests of visits before the newest say: what these show already is not new, and
     the watch's to judge."""
     earlier = {
@@ -112,12 +112,17 @@ def _known_before(
         for test in tests
         if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
     }
-    return [_read(reader, test, options) for test in earlier.values()]
+    return [read_alone(reader, test, options) for test in earlier.values()]
 
 
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:
     """Whether the newest was a later visit than the other, by their own clocks."""
     return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
+
+
+def are_of_two_visits(*tests: ModalTest) -> bool:
+    """Whether by their own clocks some of the tests were a later visit than others."""
+    return any(_is_later(one, other) for one in tests for other in tests)
 
 
 def way_of(shift: float) -> Way:
@@ -126,10 +131,10 @@ def way_of(shift: float) -> Way:
 
 
 def _run(
-    tests: Sequence[tuple[ModalTest, Sequence[_Shown | None]]], own: _Shown, j: int
-) -> list[tuple[ModalTest, _Shown]]:
+    tests: Sequence[tuple[ModalTest, Sequence[Shown | None]]], own: Shown, j: int
+) -> list[tuple[ModalTest, Shown]]:
     """Of tests, the nearest first, those up to the first that does not agree in quantity `j`."""
-    found: list[tuple[ModalTest, _Shown]] = []
+    found: list[tuple[ModalTest, Shown]] = []
     for test, all_shown in tests:
         shown = all_shown[j]
         if shown is None or not _agree(own, shown):
@@ -138,7 +143,7 @@ def _run(
     return found
 
 
-def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, _Shown]], are_later: bool) -> bool:
+def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, Shown]], are_later: bool) -> bool:
     """Whether two tests of a run told that they agree: when the second of them came, unless works
     were on then. The run goes away from the newest test: which are second depends on the side."""
     names = [test.id for test, _ in run]
@@ -146,25 +151,25 @@ def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, _Shown]], are_late
     return any(name not in beside.of_works for name in second)
 
 
-def _agree(one: _Shown, other: _Shown) -> bool:
+def _agree(one: Shown, other: Shown) -> bool:
     apart = abs(one.mean - other.mean)
-    return one.mean * other.mean > 0 and apart < _CLEAR * math.sqrt(one.variance + other.variance)
+    return one.mean * other.mean > 0 and apart < CLEAR * math.sqrt(one.variance + other.variance)
 
 
 def _shown(
     reader: Reader, test: ModalTest, hanger: Hanger, options: WatchOptions
-) -> list[_Shown | None]:
+) -> list[Shown | None]:
     """What a test shows of each quantity; None where that is not clear, or below its threshold."""
-    found: list[_Shown | None] = []
-    for quantity, each in zip(reader.quantities, _read(reader, test, options), strict=True):
+    found: list[Shown | None] = []
+    for quantity, each in zip(reader.quantities, read_alone(reader, test, options), strict=True):
         is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity, hanger)
-        is_clear = abs(each.mean) >= _CLEAR * math.sqrt(each.variance)
+        is_clear = abs(each.mean) >= CLEAR * math.sqrt(each.variance)
         is_felt = each.moves >= _LEAST
         found.append(each if is_beyond and is_clear and is_felt else None)
     return found
 
 
-def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown]:
+def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[Shown]:
     """With all that makes tests of an unchanged hanger differ: errors, scatter, temperature."""
     reading = reader.reading(test, datetime.max)
     pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
@@ -177,22 +182,28 @@ def _read(reader: Reader, test: ModalTest, options: WatchOptions) -> list[_Shown
     if reading.modes is not None:
         slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
-        if quantity.name == TENSION:
-            scatter, per_kelvin = _SCATTER, options.tension_per_kelvin_sd
-        else:
-            scatter = _SCATTER_OF_STEP * quantity.step_sd
-            per_kelvin = options.spring_per_kelvin_sd_of_step * quantity.step_sd
+        scatter = scatter_of(quantity)
+        per_kelvin = (
+            options.tension_per_kelvin_sd
+            if quantity.name == TENSION
+            else options.spring_per_kelvin_sd_of_step * quantity.step_sd
+        )
         of_both = 2 * scatter**2  # a baseline of one test scatters as much
         variance = float(covariance[j, j]) + of_both + (per_kelvin * kelvin) ** 2
         mean = float(reading.mean[j])
-        found.append(_Shown(mean, variance, abs(mean * float(slopes[j]))))
+        found.append(Shown(mean, variance, abs(mean * float(slopes[j]))))
     return found
+
+
+def scatter_of(quantity: WatchedQuantity) -> float:
+    """Standard deviation of a test of an unchanged hanger beyond its errors, in the coordinate."""
+    return _SCATTER if quantity.name == TENSION else _SCATTER_OF_STEP * quantity.step_sd
 
 
 def _drift(
     quantity: WatchedQuantity,
     newest: tuple[ModalTest, datetime],
-    both: tuple[_Shown, _Shown],
+    both: tuple[Shown, Shown],
     hanger: Hanger,
 ) -> Drift:
     """Of two tests that agree, as if what they share in error were of each alone: the larger."""

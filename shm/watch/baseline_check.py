@@ -85,7 +85,7 @@ def _mistaken_tests(
                     "another hanger",
                 )
             )
-        elif (~each.modes.sound).sum() > MOST_MISTAKEN * len(each.at) > 0:
+        elif each.fits_no_state:
             out.append(MistakenTest(test.id, "its modes fit none of the other tests'"))
     return tuple(out)
 

@@ -18,7 +18,7 @@ from shm.models import Model
 from shm.models.base import Conditions
 from shm.values import FloatArray, IntArray, ModalTest, Mode
 from shm.watch.baseline_state import Key, Quantities, known_modes, places, plausible
-from shm.watch.mistaken_modes import SoundModes, log_mixture, sound_modes
+from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, log_mixture, sound_modes
 
 _ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
 _MAD = 1.4826  # of a normal law
@@ -67,6 +67,15 @@ class Fitted:
     def off(self) -> float:
         """By what its log frequencies are off the median test's, in the median."""
         return float(np.median(self.of_median[0])) if len(self.at) else 0.0
+
+    @property
+    def fits_no_state(self) -> bool:
+        """Whether its modes fit none of the other tests', more than may be mistaken."""
+        if not self.modes.is_misfit:
+            return False
+        off, slopes, _ = self.linear
+        is_far = np.abs(off - slopes @ self.modes.x) > _LEAST
+        return bool(is_far.sum() > MOST_MISTAKEN * len(self.at))
 
     def common_shift(self, spread: FloatArray) -> float:
         """By what all log frequencies are off alike, 0 where the tension explains it as well.

@@ -36,11 +36,17 @@ from shm.values import (
 )
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState
-from shm.watch.alert_text import message_of, message_of_baseline, message_of_odd, short_name
+from shm.watch.alert_text import message_of, message_of_odd, short_name
 from shm.watch.change_words import suspects
+from shm.watch.lone_baseline import (
+    FEW_TESTS,
+    FIRST_TESTS,
+    alert_of_baseline,
+    first_tests_against,
+)
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.repeated_mistakes import notice_of, repeated_mistakes
+from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.watch_state import WatchState
 from shm.watch.watcher import Watch, Watcher, watched
 
@@ -159,6 +165,9 @@ def watch_newest(
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
+        are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
+        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not told.beyond:
+            agreed = first_tests_against(reader, later[-1], beside, hanger, options)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
@@ -203,31 +212,40 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    alert = _alert(news, change, test, hanger, is_further=is_further) or _of_odd(test, hanger, odd)
-    wrong = {(each.plane, each.order) for each in test.mistaken if each.is_notable}
-    noted = told.noted & wrong
-    if alert is None and wrong - noted:
-        # It waits while there is worse to tell.
-        alert, noted = notice_of(test, hanger), frozenset(wrong)
+    alert = _alert(news, change, test, hanger, is_further=is_further)
     alone = told.alone
+    since_baseline: tuple[Drift, ...] = ()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
-        alert, alone = _of_baseline(test, hanger), True
+        alert, alone = alert_of_baseline(test, hanger), True
+        since_baseline = alert.drifts
+    alert = alert or _of_odd(test, hanger, odd)
+    wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
+    noted = told.noted & wrong
+    if alert is None and (new := news_of(test.mistaken, noted)):
+        # It waits while there is worse to tell.
+        alert, noted = notice_of(test, hanger, new), wrong
     stands = replace(
-        _with_beyond(standing, news.beyond, test.time),
+        _with_beyond(standing, (*news.beyond, *since_baseline), test.time),
         call=call,
         called=called,
         odd=odd,
         mistaken=test.mistaken,
         noted=noted,
         alone=alone,
+        # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
+        agreed=standing.agreed | _conditions(since_baseline),
     )
     return stands, alert
 
 
 def _with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
     """The state with shifts that were told at a test to be beyond their threshold."""
-    news = {(drift.quantity, way_of(drift.shift_mean)): at for drift in beyond}
-    return replace(told, beyond={**told.beyond, **news})
+    return replace(told, beyond={**told.beyond, **dict.fromkeys(_conditions(beyond), at)})
+
+
+def _conditions(drifts: Sequence[Drift]) -> frozenset[tuple[str, Way]]:
+    """Each quantity and the way that it went."""
+    return frozenset((each.quantity, way_of(each.shift_mean)) for each in drifts)
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -241,20 +259,6 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
         test=test.test,
         time=test.time,
         message=message_of_odd(test, hanger, in_a_row),
-        drifts=(),
-        kinds=(kind,),
-    )
-
-
-def _of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
-    """A notice of a baseline that stands alone against the tests since."""
-    kind: AlertKind = "check the baseline"
-    return Alert(
-        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=message_of_baseline(test, hanger),
         drifts=(),
         kinds=(kind,),
     )

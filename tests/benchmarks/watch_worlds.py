@@ -42,6 +42,7 @@ from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # n
 from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
 from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
+from shm.watch.lone_baseline import FEW_TESTS, FIRST_TESTS, first_tests_against  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import save_figure, tables  # noqa: E402
@@ -190,11 +191,13 @@ def agreeing(
 ) -> list[Alert]:
     """What the daemon adds where two tests agree, next to each other and after the `first`
     ones, the baseline's: the first such alert."""
+    options = WatchOptions(baseline_tests=first)
     for n in range(first + 1, len(dated)):
         before = [test for test, _ in reversed(dated[first:n])]
-        found = agreement(
-            watched.reader, dated[n], Beside(came=(before[:3], ())), hanger, WatchOptions(), ()
-        )
+        beside = Beside(came=(before[:3], ()))
+        found = agreement(watched.reader, dated[n], beside, hanger, options, ())
+        if found is None and first <= FEW_TESTS and n - first < FIRST_TESTS:
+            found = first_tests_against(watched.reader, dated[n], beside, hanger, options)
         if found is not None:
             return [found]
     return []

@@ -170,5 +170,5 @@ def test_a_mode_that_three_tests_have_wrong_is_one_notice_and_an_open_warning(
         f"{START + timedelta(days=4):%Y-%m-%d}. Check its number"
     )
     assert report.warnings == line.warnings
-    assert report.warnings[0].startswith("Transverse 3 of hanger 3 has not fitted")
+    assert report.warnings[0].startswith("Hanger 3: transverse 3 has not fitted")
     assert line.status is not Status.STEADY

@@ -1,0 +1,171 @@
+"""A baseline that agrees with none of the tests since: a change right after it, or a disturbed day.
+
+No test can tell which. A loss that is kept for a notice would be silent for as long as nobody looks
+at the baseline, so whatever moved the hanger's own quantities is an alert that says both. What is
+off in another way (a mode, a sensor, nothing known) stays a notice.
+
+The watch itself waits until a change is likelier than all that its tests did before; of a baseline
+of one or two tests it cannot know what that is. So the first tests since are compared with it by
+themselves, too, with the most scatter that is usual and the swing with the temperature allowed for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+import numpy as np
+
+from shm.values import (
+    TENSION,
+    Alert,
+    AlertKind,
+    Beside,
+    Drift,
+    FloatArray,
+    Hanger,
+    ModalTest,
+    WatchedQuantity,
+    WatchedTest,
+)
+from shm.values.drift import ENOUGH_AGAINST
+from shm.values.force_units import force_unit
+from shm.watch.agreement import CLEAR, Shown, are_of_two_visits, read_alone, scatter_of
+from shm.watch.alert_text import message_of_baseline, short_name
+from shm.watch.change_words import is_stiffness, quantity_words, size_words
+from shm.watch.options import WatchOptions
+from shm.watch.posterior_summary import threshold_of
+from shm.watch.quantities import value_at
+from shm.watch.readings import Reader
+from shm.watch.repeated_mistakes import off_the_baseline
+from shm.watch.shift_mixture import beyond, shift_of_mixture
+
+FEW_TESTS = 2
+"""Of a baseline: of three, those that agree outvote the odd one."""
+FIRST_TESTS = 6
+"""Since the baseline, in which a change must be told; then the watch knows its scatter."""
+_KIND: AlertKind = "check the baseline"
+_CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
+_SHOWN = 0.5  # of a shift: half of it or more is nearer to it than to none
+
+
+def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
+    """The alert, with the quantity that most clearly moved; a notice where none clearly did."""
+    clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
+    lead = max(clear, key=_deviations, default=None)
+    message = message_of_baseline(test, hanger)
+    if lead is not None and hanger.is_modelled:
+        message = _message(hanger, lead, test.change.against_baseline)
+    return Alert(
+        key=f"hanger-{hanger.id}:{_KIND.replace(' ', '-')}:{short_name(test.test)}",
+        hanger=hanger.id,
+        test=test.test,
+        time=test.time,
+        message=message,
+        drifts=() if lead is None else (lead,),
+        kinds=(_KIND,) if lead is None else (_rule(lead),),
+    )
+
+
+def first_tests_against(
+    reader: Reader,
+    newest: tuple[ModalTest, datetime],
+    beside: Beside,
+    hanger: Hanger,
+    options: WatchOptions,
+) -> Alert | None:
+    """The alert of a test that with the two before it clearly reads off the baseline, alike.
+
+    None where they do not, there are no two that are watched, all are of one visit, their modes fit
+    no state (a notice says so), or they are off by next to nothing.
+    """
+    unwatched = {*beside.held, *beside.of_works}
+    before = [test for test in beside.came[0] if test.id not in unwatched]
+    tests = [newest[0], *before[: ENOUGH_AGAINST - 1]]
+    if len(tests) < ENOUGH_AGAINST or not are_of_two_visits(*tests):
+        return None
+    if any(off_the_baseline(reader.reading(test, newest[1])).any() for test in tests):
+        return None
+    read = [read_alone(reader, test, options) for test in tests]
+    found = [
+        drift
+        for quantity, shown in zip(reader.quantities, zip(*read, strict=True), strict=True)
+        if (drift := _common(quantity, shown, newest, hanger, options)) is not None
+    ]
+    if not found:
+        return None
+    lead = max(found, key=_deviations)
+    test, time = newest
+    return Alert(
+        key=f"hanger-{hanger.id}:first-tests-against-baseline:{short_name(test.id)}",
+        hanger=hanger.id,
+        test=test.id,
+        time=time,
+        message=_message(hanger, lead, len(tests)),
+        drifts=(lead,),
+        kinds=(_rule(lead),),
+    )
+
+
+def _common(
+    quantity: WatchedQuantity,
+    shown: Sequence[Shown],
+    newest: tuple[ModalTest, datetime],
+    hanger: Hanger,
+    options: WatchOptions,
+) -> Drift | None:
+    """What all tests show of a quantity; None where one does not, or it is not clear."""
+    each: FloatArray = np.array([one.mean for one in shown])
+    mean = float(each.mean())
+    # What tests scatter by is their own, but for the baseline's; the rest may be common to them.
+    own = (1 - 1 / len(shown)) * scatter_of(quantity) ** 2
+    sd = math.sqrt(float(np.mean([one.variance for one in shown])) - own)
+    moves = float(np.mean([one.moves for one in shown]))
+    is_clear = abs(mean) >= CLEAR * sd and moves >= options.least_frequency_shift
+    if not is_clear or (each / mean).min() < _SHOWN:
+        return None
+    one, at = np.ones(1), (np.array([mean]), np.array([sd]))
+    shift, threshold = shift_of_mixture(quantity, one, *at), threshold_of(quantity, hanger)
+    return Drift(
+        hanger=hanger.id,
+        test=newest[0].id,
+        time=newest[1],
+        quantity=quantity.name,
+        baseline=quantity.baseline,
+        value=value_at(quantity, mean),
+        shift_mean=shift.mean,
+        shift_sd=shift.sd,
+        threshold=threshold,
+        probability=beyond(quantity, one, *at, threshold),
+    )
+
+
+def _rule(lead: Drift) -> AlertKind:
+    return "beyond threshold" if lead.may_be_beyond(lead.shift_mean) else "sudden change"
+
+
+def _deviations(drift: Drift) -> float:
+    return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
+
+
+def _message(hanger: Hanger, lead: Drift, tests: int) -> str:
+    """Both that may be, what to do about either, how far it is and how many tests say so."""
+    if is_stiffness(lead.quantity):
+        look = "inspect both ends"
+    elif lead.shift_mean < 0:
+        look = "inspect its anchorages and the rod"
+    else:
+        look = "compare the hangers beside it (`shm drift bridge`)"
+    now = ""
+    if lead.quantity == TENSION:
+        unit = force_unit(lead.value, lead.baseline)
+        was, value = unit.told(lead.baseline), unit.told(lead.value)
+        now = f"Tension was {was} at the baseline, {value} since. "
+    return (
+        f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since its "
+        f"baseline, or the baseline was disturbed. Within a week, {look}, and find out what was "
+        f"different on the day of the baseline. {now}The last {tests} tests agree with each other "
+        "and not with it; no test tells which. If it was disturbed, set another (`shm drift "
+        "rebaseline`)."
+    )

@@ -1,0 +1,141 @@
+"""What the first tests say against a baseline of one or two is an alert that says both causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import timedelta
+
+import numpy as np
+import pytest
+
+from shm.models import build
+from shm.pipeline.ending import why_over
+from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
+from shm.watch import WatchOptions, watch_newest
+from shm.watch.baseline_check import check_baseline
+from shm.watch.lone_baseline import alert_of_baseline
+from shm.watch.watching import DatedTest
+from tests.helpers.modelled_tests import misnamed
+from tests.helpers.nouns import a_change
+from tests.watch.test_agreement import BEGIN, HANGER, a_test, baseline_of
+
+WEEK = timedelta(weeks=1)
+
+
+def weekly(*tensions: float, temperature_c: float = 12.0) -> list[ModalTest]:
+    return [
+        replace(a_test(n, tension, temperature_c), time=BEGIN + n * WEEK)
+        for n, tension in enumerate(tensions)
+    ]
+
+
+def rung(tests: Sequence[ModalTest], baseline_tests: int = 1) -> list[tuple[int, Alert]]:
+    """The alerts of tests that come one by one, each with the number of its test."""
+    first, found = tests[:baseline_tests], []
+    posterior, _ = baseline_of(first[0])
+    dated: list[DatedTest] = [(test, test.time or BEGIN) for test in first]
+    kept = None
+    for n, test in enumerate(tests[baseline_tests:], baseline_tests):
+        before = tests[baseline_tests:n][::-1][:2]
+        newest = watch_newest(
+            posterior,
+            dated,
+            [(test, test.time or BEGIN)],
+            HANGER,
+            WatchOptions(),
+            kept,
+            Beside(came=(before, ()), dated=(before, ())),
+        )
+        assert newest is not None
+        kept = newest.kept
+        if newest.alert and newest.alert.kinds != ("repeat the test",):
+            found.append((n, newest.alert))
+    return found
+
+
+@pytest.mark.parametrize("tension", [0.94, 0.92, 0.85, 1.08])
+def test_a_change_right_after_a_baseline_of_one_is_one_alert_by_the_third_test(
+    tension: float,
+) -> None:
+    ((number, alert),) = rung(weekly(1.0, *[tension] * 9))
+    assert number == 3
+    assert alert.kinds[0] == "beyond threshold"
+    (drift,) = alert.drifts
+    assert drift.shift_mean == pytest.approx(tension - 1, abs=0.02)
+    way = "fell" if tension < 1 else "rose"
+    assert alert.message.startswith(f"Hanger 3: either tension {way} by ")
+    assert "or the baseline was disturbed. Within a week, " in alert.message
+
+
+def test_nothing_is_told_of_a_hanger_that_keeps_still() -> None:
+    assert rung(weekly(1.0, 1.01, 0.99, 1.0, 0.985, 1.01, 1.0, 0.99)) == []
+
+
+def test_tests_that_differ_among_themselves_say_nothing_against_the_baseline() -> None:
+    assert rung(weekly(1.0, 0.93, 1.0, 0.93, 1.0)) == []
+
+
+def test_three_tests_of_one_visit_say_no_more_than_one() -> None:
+    tests = weekly(1.0, *[0.92] * 3)
+    visit = [
+        replace(each, time=BEGIN + WEEK + n * timedelta(hours=1))
+        for n, each in enumerate(tests[1:])
+    ]
+    assert not any("either" in alert.message for _, alert in rung([tests[0], *visit]))
+
+
+def test_what_the_season_may_have_done_is_not_told() -> None:
+    cold = [replace(each, temperature_c=-25.0) for each in weekly(*[0.94] * 5)[1:]]
+    assert [n for n, _ in rung([*weekly(1.0), *cold]) if n < 4] == []
+
+
+def test_a_mistaken_mode_of_the_only_baseline_test_is_no_loss() -> None:
+    tests = weekly(*[1.0] * 8)
+    tests[0] = misnamed(tests[0], "transverse", 2)
+    check = check_baseline(tests[:1], build("beam2", HANGER))
+    assert [(each.plane, each.order) for each in check.modes] == [("transverse", 2)]
+    assert rung([check.kept(tests[0]), *tests[1:]]) == []
+
+
+def alone(*drifts: Drift) -> WatchedTest:
+    change = a_change(probability=0.01, evidence_years=1.0)
+    return WatchedTest("t3", BEGIN, 10.0, drifts, replace(change, against_baseline=3))
+
+
+def drift(quantity: str, mean: float, sd: float) -> Drift:
+    threshold = 0.05 if quantity == "tension" else 0.5
+    return Drift(
+        3, "t3", BEGIN, quantity, 700e3, 700e3 * (1 + mean), mean, sd, threshold, float(np.nan)
+    )
+
+
+def test_a_baseline_that_stands_alone_is_an_alert_of_what_clearly_moved() -> None:
+    moved = alone(drift("log10_k1", -0.3, 0.2), drift("tension", -0.08, 0.01))
+    alert = alert_of_baseline(moved, HANGER)
+    assert alert.kinds == ("beyond threshold",)
+    assert [each.quantity for each in alert.drifts] == ["tension"]
+    assert "either tension fell by 8.0 ± 1.6 %" in alert.message
+    assert "The last 3 tests agree with each other and not with it" in alert.message
+
+
+def test_the_alert_stays_while_one_test_is_disturbed_and_ends_once_the_shift_has_come_back() -> (
+    None
+):
+    alert = alert_of_baseline(alone(drift("tension", -0.08, 0.01)), HANGER)
+
+    def later(mean: float, against: int) -> WatchedTest:
+        test = alone(replace(drift("tension", mean, 0.01), probability=0.001))
+        change = replace(test.change, against_baseline=against)
+        return replace(test, time=BEGIN + WEEK, change=change)
+
+    assert not why_over(alert, later(-0.08, 0), HANGER, gap_stands=False)
+    assert why_over(alert, later(-0.005, 0), HANGER, gap_stands=False)
+
+
+def test_a_small_move_is_a_change_and_none_at_all_a_notice() -> None:
+    small = alert_of_baseline(alone(drift("tension", -0.02, 0.005)), HANGER)
+    assert small.kinds == ("sudden change",)
+    none = alert_of_baseline(alone(drift("tension", -0.02, 0.02)), HANGER)
+    assert none.kinds == ("check the baseline",)
+    assert none.drifts == ()
