@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
@@ -23,6 +23,8 @@ FREQUENCY = "frequency "
 ENOUGH_MISTAKES = 3
 """Tests in a row with the same mode wrong: at one mistake in 25 modes by chance once in 15,000."""
 ENOUGH_AGAINST = 4  # tests: of fewer a bad week may be to blame
+OF_ONE_VISIT = timedelta(days=1.5)
+"""Judgement: tests that far apart or nearer share wind, sensors, loads and operator."""
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 
