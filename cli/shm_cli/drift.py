@@ -19,7 +19,7 @@ from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
-from shm.pipeline.rebaselining import Order, changes_within
+from shm.pipeline.rebaselining import Order, changes_within, still_shown
 from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
 from shm.pipeline.reporting import hanger_states
 from shm.report.bridge_report import pattern_json
@@ -116,7 +116,9 @@ def rebaseline(
     alerts.
 
     With --kind only the alerts end that such an event explains, with a note who said so: a lamp
-    ends those of an added mass, but not of lost tension. The others stay open.
+    ends those of an added mass, but not of lost tension. The others stay open. What was repaired
+    or retensioned must show it in these tests, else nothing is done; a loss that is to stay is
+    "accepted as it is".
 
     \b
     Example: shm drift rebaseline --hanger 3 --since 2026-05-01 --why "pin replaced"
@@ -127,6 +129,8 @@ def rebaseline(
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         within = changes_within(store, hanger_id, order.since)
+        is_accepted = event is None or event.accepts
+        accepted = still_shown(store, hanger, order) if is_accepted else ()
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
         all_alerts = store.alerts.list_all(hanger_id)
@@ -134,7 +138,14 @@ def rebaseline(
     explained = [each.id for each in all_alerts if _is_explained_by(each, made)] if kind else []
     if as_json:
         of_event = {"kind": kind, "alerts_explained": explained, "alerts_open": alerts}
-        show({**_document(made), **of_event, "changes_within": [each.began_by for each in within]})
+        show(
+            {
+                **_document(made),
+                **of_event,
+                "changes_within": [each.began_by for each in within],
+                "accepted": [vars(each) for each in accepted],
+            }
+        )
         return
     if within:
         day = f"{max(each.began_by for each in within):%Y-%m-%d}"
@@ -152,6 +163,9 @@ def rebaseline(
         f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
         f"{tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
     )
+    for one in accepted:
+        said = f"Its tests still show what alert {one.alert} told ({one.words}): from now on that "
+        click.echo(paragraph(f"{said}is taken for its normal state."))
     for each in explained:
         click.echo(f"Alert {each} is explained by it and resolved.")
     if alerts:

@@ -13,7 +13,7 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
-from shm.pipeline.ending import gap_stands, why_over
+from shm.pipeline.ending import gap_stands, seen_again, why_over
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
@@ -22,6 +22,7 @@ from shm.pipeline.telling import Terms, after_works, message_of, plan, works_bef
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
+    Baseline,
     Delivery,
     IdentifiedTest,
     KeptWatch,
@@ -39,6 +40,7 @@ from shm.values.stated_tension import averaged_now
 DELIVERIES = 16  # technical: threads that mostly wait for an answer
 _DELIVERIES_A_HOOK = 4  # technical: a quarter, so that a hook that hangs leaves room for three
 _LONGEST_S = 86400.0  # judgement: a hook mended within a day is told the day after at the latest
+_RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
 _DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
 
 Notifier = Callable[[Hook, Alert], object]
@@ -287,9 +289,6 @@ class Jobs:
         beside = tests_beside(self.store, baseline, test)
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
-        standing = self.store.alerts.list_standing(hanger.id, baseline.id)
-        is_of_gap = any("gap" in each.alert.kinds for each in standing)
-        stands = is_of_gap and gap_stands(baseline.posterior, current)
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -301,15 +300,42 @@ class Jobs:
                 earlier = [each.alert for each in self.store.alerts.list_all(hanger.id)]
                 works = works_before(alert, silences, earlier)
                 alert = alert if works is None else after_works(alert, works)
-            ended = {
-                each.id: why
-                for each in standing
-                if (why := why_over(each.alert, watched, hanger, gap_stands=stands))
-            }
-            now = self.clock()
+            ended, again = self._ended(hanger, baseline, watched, alert)
+            alert, now = again or alert, self.clock()
             return self.store.watch.save(test, baseline, watched, alert, hooks, now, state, ended)
 
         return Step(run, keep)
+
+    def _ended(
+        self, hanger: Hanger, baseline: Baseline, watched: WatchedTest, alert: Alert | None
+    ) -> tuple[dict[int, str], Alert | None]:
+        """Which alerts a test ends, and why; and the resolved one that it shows again, unless the
+        watch itself calls for an alert."""
+        standing = self.store.alerts.list_standing(hanger.id, baseline.id)
+        resolved = self.store.alerts.list_resolved(hanger.id, baseline.id)
+        if not standing and not resolved:
+            return {}, None
+        before = [each.watched for each in self.store.watch.list_recent(baseline, _RECENT_TESTS)]
+        tests = sorted([*before, watched], key=lambda each: each.time)
+
+        def stands(test: WatchedTest) -> bool:
+            try:
+                current = self.store.posteriors.get(hanger.id, test.test)
+            except NothingThere:  # of a class that was dropped: not known to have ended
+                return True
+            return gap_stands(baseline.posterior, current)
+
+        ended = {
+            each.id: why
+            for each in standing
+            if (why := why_over(each.alert, tests, hanger, gap_stands=stands))
+        }
+        # The gap's alert has one key for good: what was raised before is raised no second time.
+        is_news = alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}
+        again = (
+            None if is_news else seen_again(resolved, standing, tests, hanger, gap_stands=stands)
+        )
+        return ended, again
 
     def _deliver(self, notifier: Notifier, delivery: Delivery, message: Alert) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

@@ -7,18 +7,23 @@ tests after that are watched against the result. What was compared with the old 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from shm.errors import NothingThere
+from shm.errors import BadInput, NothingThere
 from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
 from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import update_terms
-from shm.store import Baseline, Stage, Store, StoredTest, Workspace
+from shm.pipeline.watching import dated_tests
+from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
 from shm.values import Change, Hanger
 from shm.watch.events import EventKind, is_explained
+from shm.watch.readings import Reader
+from shm.watch.repair_check import Unrepaired, unrepaired
+from shm.watch.watching import kept_of
 
 
 @dataclass(frozen=True)
@@ -45,8 +50,8 @@ def rebaseline(
     """Updates the tests since then jointly and has later tests compared with them.
 
     Raises NothingThere where the hanger has no baseline, or no test as young as that has been
-    worked through; BadInput where the class in force cannot describe the tests; StoreBusy where
-    another baseline came in meanwhile.
+    worked through; BadInput where the class in force cannot describe the tests, or where works are
+    to have put right what the tests still show; StoreBusy where another baseline came in meanwhile.
     """
     before = store.watch.baseline(hanger.id)
     if before is None:
@@ -55,6 +60,11 @@ def rebaseline(
             remedy="Take in its first tests with `shm ingest FILE`.",
         )
     chosen = _since(store, hanger, order.since)
+    explained = None
+    if order.kind is not None:
+        explained = [each.id for each in _explained(store, hanger, order)]
+        if order.kind.is_remedy and not order.kind.accepts:
+            _refuse_unrepaired(still_shown(store, hanger, order), hanger, order)
     model = before.posterior.model
     terms, lineage = update_terms(hanger, [model], chosen, workspace.settings)
     measured = [test.test for test in chosen]
@@ -68,14 +78,52 @@ def rebaseline(
     )
     posterior = replace(posterior, baseline_check=check)
     why = f"{order.kind.name}: {order.why}" if order.kind else order.why
-    record, explained = (order.who, why, order.since), None
-    if order.kind is not None:
-        explained = [
-            each.id
-            for each in store.alerts.list_all(hanger.id)
-            if is_explained(each.alert, order.kind, order.since)
-        ]
+    record = (order.who, why, order.since)
     return store.watch.rebaseline(before, posterior, chosen, record, lineage, at, explained)
+
+
+def still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired, ...]:
+    """What of the alerts that an order ends its tests still show, against the baseline in force:
+    from then on it is the normal state.
+
+    Raises NothingThere as `rebaseline` does.
+    """
+    before = store.watch.baseline(hanger.id)
+    if before is None:
+        return ()
+    since = [(each.test, each.time) for each in _since(store, hanger, order.since)]
+    kept = kept_of(before.posterior, dated_tests(store, before)[0])
+    of_baseline = [test for test, _ in kept]
+    reader = Reader(before.posterior, of_baseline, hanger)
+    tests = {each.test.id: each.test for each in store.tests.list_all(hanger.id)}
+    told = [
+        (each.id, each.alert, tests.get(each.alert.test))
+        for each in _explained(store, hanger, order)
+    ]
+    kind = order.kind
+    restores = kind is None or kind.restores or kind.accepts
+    return unrepaired((reader, of_baseline), told, since, hanger, restores=restores)
+
+
+def _explained(store: Store, hanger: Hanger, order: Order) -> list[StoredAlert]:
+    """The standing alerts that an order explains; all, where it names no kind of event."""
+    return [
+        each
+        for each in store.alerts.list_standing(hanger.id)
+        if order.kind is None or is_explained(each.alert, order.kind, order.since)
+    ]
+
+
+def _refuse_unrepaired(left: Sequence[Unrepaired], hanger: Hanger, order: Order) -> None:
+    if not left or order.kind is None:
+        return
+    listed = "; ".join(f"alert {each.alert}: {each.words}" for each in left)
+    raise BadInput(
+        f"hanger {hanger.id} is not {order.kind.name} by its tests since {order.since:%Y-%m-%d}: "
+        f"against the baseline of before there still stands {listed}. Nothing was changed.",
+        remedy="Test it after the works and give their day as --since. If it is to stay so, say "
+        '--kind "accepted as it is".',
+    )
 
 
 def changes_within(store: Store, hanger: int, since: datetime) -> tuple[Change, ...]:

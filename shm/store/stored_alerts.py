@@ -109,10 +109,17 @@ class Alerts(Repository):
             query = query.where(alerts.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
+        return self._in_order(query)
+
+    def list_resolved(self, hanger: int, baseline_id: int) -> tuple[StoredAlert, ...]:
+        """Alerts of a hanger against a baseline whose condition has ended, the oldest first."""
+        against = alerts.c.hanger == hanger, alerts.c.baseline_id == baseline_id
+        return self._in_order(stored_alerts.where(resolutions.c.id.is_not(None), *against))
+
+    def _in_order(self, query: sa.Select[Any]) -> tuple[StoredAlert, ...]:
         with self.reading() as connection:
-            return tuple(
-                stored_alert(row) for row in connection.execute(query.order_by(alerts.c.id))
-            )
+            rows = connection.execute(query.order_by(alerts.c.id))
+            return tuple(stored_alert(row) for row in rows)
 
     def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that the condition of an alert ended, and acknowledges it where nobody has.

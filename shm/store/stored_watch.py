@@ -211,6 +211,15 @@ class Watch(Repository):
             query = query.where(watches.c.baseline_id == baseline_id)
         return self._watches(query)
 
+    def list_recent(self, baseline: Baseline, limit: int) -> tuple[StoredWatch, ...]:
+        """The last so many watches against a baseline, by time."""
+        of_one = watches.c.hanger == baseline.hanger, watches.c.baseline_id == baseline.id
+        query = sa.select(watches.c.id).where(*of_one, in_force(watches))
+        latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(limit)
+        with self.reading() as connection:
+            ids = connection.scalars(latest).all()
+        return self._watches(ids)
+
     def latest(self, excluding: Collection[int] = ()) -> dict[int, StoredWatch]:
         """What the watch says of each hanger's latest test against its baseline in force.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
@@ -26,6 +26,8 @@ ENOUGH_FITS = 6
 """Tests in a row that must have such a mode right before it is over: one that is wrong in every
 other test is told once in 65 tests, and with three it would be once in 25."""
 ENOUGH_AGAINST = 3  # tests: of two a bad day may be to blame
+OF_ONE_VISIT = timedelta(days=1.5)
+"""Judgement: tests that far apart or nearer share wind, sensors, loads and operator."""
 _INFORMED = 0.7  # judgement: half of the prior's variance is gone (1 / sqrt 2)
 
 

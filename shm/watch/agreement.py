@@ -200,16 +200,28 @@ def scatter_of(quantity: WatchedQuantity) -> float:
     return _SCATTER if quantity.name == TENSION else _SCATTER_OF_STEP * quantity.step_sd
 
 
+def drifts_of(
+    reader: Reader, tests: Sequence[tuple[ModalTest, datetime]], hanger: Hanger
+) -> tuple[Drift, ...]:
+    """What tests of one state show by themselves, whatever was known before: how far each quantity
+    is off the baseline of `reader`."""
+    read = [read_alone(reader, test, WatchOptions()) for test, _ in tests]
+    return tuple(
+        _drift(quantity, tests[-1], shown, hanger)
+        for quantity, shown in zip(reader.quantities, zip(*read, strict=True), strict=True)
+    )
+
+
 def _drift(
     quantity: WatchedQuantity,
     newest: tuple[ModalTest, datetime],
-    both: tuple[Shown, Shown],
+    alike: Sequence[Shown],
     hanger: Hanger,
 ) -> Drift:
-    """Of two tests that agree, as if what they share in error were of each alone: the larger."""
-    weights = [1 / each.variance for each in both]
-    x = float(np.average([each.mean for each in both], weights=weights))
-    sd = math.sqrt(max(each.variance for each in both))
+    """Of tests that agree, as if what they share in error were of each alone: the larger."""
+    weights = [1 / each.variance for each in alike]
+    x = float(np.average([each.mean for each in alike], weights=weights))
+    sd = math.sqrt(max(each.variance for each in alike))
     alone = np.ones(1)
     at = alone * x, alone * sd
     shift, threshold = shift_of_mixture(quantity, alone, *at), threshold_of(quantity, hanger)

@@ -10,10 +10,11 @@ from datetime import datetime
 import numpy as np
 
 from shm.values import NAN, FloatArray
+from shm.values.drift import OF_ONE_VISIT
 from shm.watch.options import WatchOptions
 
 DAYS_PER_YEAR = 365.25  # Julian
-OF_ONE_VISIT_YEARS = 1.5 / DAYS_PER_YEAR  # judgement: tests that share wind, sensors and operator
+OF_ONE_VISIT_YEARS = OF_ONE_VISIT.total_seconds() / 86400 / DAYS_PER_YEAR
 _SEASON_YEARS = 60 / DAYS_PER_YEAR  # judgement: so many days are of one season
 
 

@@ -18,11 +18,14 @@ _SPRINGS = "end stiffness"
 @dataclass(frozen=True)
 class EventKind:
     """A kind of event. `explains` are quantities and causes that it changes, `end stiffness` for
-    all springs; `is_remedy` says whether it ends what was found before it."""
+    all springs; `is_remedy` says whether it ends what was found before it, `restores` whether
+    that is gone then and not only other than it was. Who `accepts` a state explains all of it."""
 
     name: str
     explains: frozenset[str]
     is_remedy: bool = False
+    restores: bool = False
+    accepts: bool = False
 
 
 EVENT_KINDS = {
@@ -35,7 +38,9 @@ EVENT_KINDS = {
             "repaired",
             frozenset({TENSION, _SPRINGS, "section_loss", "bending_stiffness"}),
             is_remedy=True,
+            restores=True,
         ),
+        EventKind("accepted as it is", frozenset(), is_remedy=True, accepts=True),
     )
 }
 """A small vocabulary: each word decides which alerts end; `--why` tells the rest."""
@@ -50,6 +55,8 @@ def is_explained(alert: Alert, kind: EventKind, since: datetime) -> bool:
     began_by = alert.change.began_by if alert.change else alert.time
     if not kind.is_remedy and began_by < since:
         return False
+    if kind.accepts:
+        return not {"gap", "held"} & set(alert.kinds)
     if "beyond threshold" in alert.kinds:
         return all(_is_of(each.quantity, kind) for each in alert.drifts)
     if alert.change is None:

@@ -11,6 +11,8 @@ from shm.pipeline import rebaselining
 from shm.store import Store, StoredAlert, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers import quick_update
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import write_test
 
 LOSS = 2
 """The number of the alert; the first asks to repeat the test that showed the loss first."""
@@ -119,8 +121,65 @@ def test_the_new_baseline_as_a_document(shm: Shm, workspace: Path) -> None:
     assert document["since"] == "2026-05-31T09:00:00Z"
 
 
-def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) -> None:
+def after_works(folder: Path, tension: float) -> None:
+    """A test of the day after the loss was told."""
+    opened = Workspace.open(folder, {})
+    write_test(opened.spool / "t3.modes.json", opened, day=61, tension=tension)
+    ingest(opened)
+
+
+@pytest.mark.parametrize("kind", ["retensioned", "repaired"])
+@pytest.mark.parametrize("is_tested", [False, True])
+def test_works_that_no_test_shows_end_no_alert(
+    shm: Shm, workspace: Path, kind: str, is_tested: bool
+) -> None:
+    # The tests since that day still show the loss: it would become the normal state.
+    if is_tested:
+        after_works(workspace, 0.8)
+    since = "2026-07-01" if is_tested else "2026-06-30"
+    ended = shm("--workspace", workspace, *ANEW, "--since", since, "--kind", kind)
+    assert ended.code == 3, ended.err
+    said = " ".join(ended.err.split())
+    assert f"hanger 3 is not {kind} by its tests since {since}" in said
+    assert "alert 2: tension fell by 20" in said
+    assert '--kind "accepted as it is"' in said
+    with Workspace.open(workspace, {}).store() as store:
+        stored = loss_in(store)
+        baseline = store.watch.baseline(3)
+    assert (stored.resolution, stored.acknowledgement) == (None, None)
+    assert baseline is not None
+    assert baseline.since is None, "the former baseline stays"
+
+
+def test_a_loss_that_is_accepted_as_it_is_ends_on_record(shm: Shm, workspace: Path) -> None:
     ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--who", "Jansen",
+                "--kind", "accepted as it is", "--json")  # fmt: skip
+    assert ended.code == 0, ended.err
+    assert ended.document["alerts_explained"] == [LOSS]
+    (accepted,) = ended.document["accepted"]
+    assert accepted["alert"] == LOSS
+    assert accepted["words"].startswith("tension fell by 20")
+    with Workspace.open(workspace, {}).store() as store:
+        resolution = loss_in(store).resolution
+    assert resolution is not None
+    assert (resolution.who, resolution.why) == (
+        "Jansen", "new baseline: accepted as it is: pin replaced",
+    )  # fmt: skip
+
+
+def test_retensioned_to_less_than_before_is_another_tension_all_the_same(
+    shm: Shm, workspace: Path
+) -> None:
+    after_works(workspace, 0.88)
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--kind", "repaired")
+    assert ended.code == 3, "most of the loss is left"
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--kind", "retensioned")
+    assert ended.code == 0, ended.err
+
+
+def test_an_event_ends_the_alerts_that_it_explains(shm: Shm, workspace: Path) -> None:
+    after_works(workspace, 1.0)
+    ended = shm("--workspace", workspace, *ANEW, "--since", "2026-07-01", "--who", "Jansen",
                 "--kind", "retensioned", "--json")  # fmt: skip
     assert ended.code == 0, ended.err
     document = ended.document
@@ -155,6 +214,7 @@ def test_after_it_the_shift_from_the_old_baseline_is_shown_no_more(
     shm: Shm, workspace: Path
 ) -> None:
     told = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30").out
+    assert "Its tests still show what alert 2 told (tension fell by 20" in " ".join(told.split())
     assert "Take note of them: `shm alerts ack 2`." in told
     shown = shm("--workspace", workspace, "drift").out
     assert " ".join(shown.split()) == (
