@@ -9,6 +9,7 @@ the ends of the baseline. What none of these does is "unexplained": every mode b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -42,6 +43,8 @@ _SHARES = {
 }
 # Places along the hanger, a share of the length: a uniform bar is the same from either end.
 _PLACES = (0.06, 0.13, 0.2, 0.28, 0.36, 0.43, 0.5)
+_APART = 0.035  # to half way between two places, among which a mass is anywhere
+_LAMP_UNITS = 3.0  # judgement: lamps and cables are a few per cent of a hanger, no longer linear
 _STRETCHES = ((0.08, 0.15), (0.25, 0.15), (0.5, 0.15), (0.3, 0.4))
 # One unit of each cause: what there is as a rule; six times as much is looked for, too.
 _MASS_SHARE = 0.01
@@ -62,7 +65,8 @@ _CORRELATION = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What causes do to the log frequencies of the baseline's `modes` (n,), per unit (n,).
+    """What causes do to the log frequencies of the baseline's `modes` (n,), one unit or one sd of
+    each: (places, r, n) by name.
 
     `sensors` (n, n) is the covariance that sensors of 0.3 kg, put elsewhere each time, give,
     `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean.
@@ -92,10 +96,15 @@ def columns_of(
     still = log_hz(bar)
     mass_kg = float(hanger.mass_per_length_kg_m * length_m[0])
 
-    def by_mass(place: float) -> FloatArray:
-        small = _STEP_TO * _MASS_SHARE * mass_kg
-        laden = replace(bar, masses=(*bar.masses, PointMass(place * length_m, small * one)))
-        return (log_hz(laden) - still) / _STEP_TO
+    def by_mass(place: float, units: float = _STEP_TO) -> FloatArray:
+        put_on_kg = units * _MASS_SHARE * mass_kg
+        laden = replace(bar, masses=(*bar.masses, PointMass(place * length_m, put_on_kg * one)))
+        return (log_hz(laden) - still) / units
+
+    def about(place: float) -> FloatArray:
+        """At a place, and what the way to its neighbours adds: one sd (2, n)."""
+        low, here, high = (by_mass(place + way, _LAMP_UNITS) for way in (-_APART, 0, _APART))
+        return np.array([here, (high - low) / 2 / math.sqrt(3)])
 
     def by_loss(place: float, extent: float) -> FloatArray:
         left = 1 - _STEP_TO * _LOSS
@@ -114,11 +123,10 @@ def columns_of(
     return Columns(
         tuple(modes),
         {
-            POINT_MASS: np.array([by_mass(place) for place in _PLACES]),
-            SECTION_LOSS: np.array([by_loss(*each) for each in _STRETCHES]),
-            BENDING_STIFFNESS: (log_hz(stiffer) - still)[None],
-            TIMEBASE: np.full((1, len(modes)), _CLOCK),
-            SENSOR_MASS: sensors,
+            POINT_MASS: np.array([about(place) for place in _PLACES]),
+            SECTION_LOSS: np.array([by_loss(*each) for each in _STRETCHES])[:, None],
+            BENDING_STIFFNESS: (log_hz(stiffer) - still)[None, None],
+            TIMEBASE: np.full((1, 1, len(modes)), _CLOCK),
         },
         spread.T @ spread / len(spread),
     )
@@ -182,7 +190,7 @@ def structure_of(
     scattering = np.hstack(
         [
             axes[:, kept] * np.sqrt(strength[kept]),
-            columns.by_cause[BENDING_STIFFNESS].T,
+            columns.by_cause[BENDING_STIFFNESS][0].T,
             np.ones((n, 1)),
             np.eye(n),
         ]
@@ -200,7 +208,7 @@ def structure_of(
         directions=tuple(_directions(quantities, columns)),
         quantities=tuple(quantities),
         scattering=scattering,
-        stiffening=columns.by_cause[BENDING_STIFFNESS][0] / _STIFFER,
+        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
         scatter_variance=sds**2,
         scales=np.array(options.scatter_scales),
     )
@@ -226,8 +234,8 @@ def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list
     for cause in (POINT_MASS, SECTION_LOSS, BENDING_STIFFNESS, TIMEBASE):
         places = columns.by_cause[cause]
         for place in places:
-            factor = np.zeros((n + q, 1))
-            factor[:n, 0] = place
+            factor = np.zeros((n + q, len(place)))
+            factor[:n] = place.T
             log_prior = float(np.log(_SHARES[cause] / len(places)))
             may_ramp = cause != TIMEBASE
             found.append(Direction(cause, factor, (), log_prior, may_ramp))

@@ -391,7 +391,7 @@ def test_tests_of_one_day_say_no_more_than_one() -> None:
 
 
 def test_a_mass_put_on_is_named_and_not_taken_for_tension() -> None:
-    of_mass = columns().by_cause[POINT_MASS][4]
+    of_mass, _ = columns().by_cause[POINT_MASS][4]
     history = History(tests=CHANGE_AT + 4, change_at=CHANGE_AT, outliers=0, mode_step=3 * of_mass)
 
     moved = watch(history).calls[0].change.moved
@@ -483,7 +483,7 @@ def test_results_do_not_hang_on_the_order_of_modes() -> None:
     ]
     turned = Columns(
         MODES[::-1],
-        {name: places[:, ::-1] for name, places in columns().by_cause.items()},
+        {name: places[:, :, ::-1] for name, places in columns().by_cause.items()},
         columns().sensors[::-1, ::-1],
     )
 
