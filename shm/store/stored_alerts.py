@@ -61,11 +61,19 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 class Alerts(Repository):
     """Alerts and the outbox."""
 
-    def list_all(self, hanger: int | None = None) -> tuple[StoredAlert, ...]:
-        """All alerts, or those of one hanger, as they were raised and acknowledged."""
+    def list_all(
+        self, hanger: int | None = None, baseline_id: int | None = None, *, standing: bool = False
+    ) -> tuple[StoredAlert, ...]:
+        """Alerts as they were raised and acknowledged, the oldest first; of a hanger, against a
+        baseline where these are named, and only those whose condition stands where that is asked.
+        """
         query = stored_alerts.order_by(alerts.c.id)
+        if standing:
+            query = query.where(resolutions.c.id.is_(None))
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(alerts.c.baseline_id == baseline_id)
         with self.reading() as connection:
             return tuple(stored_alert(row) for row in connection.execute(query))
 
@@ -98,21 +106,6 @@ class Alerts(Repository):
         if not found:
             raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
         return found[0]
-
-    def list_standing(
-        self, hanger: int | None = None, baseline_id: int | None = None
-    ) -> tuple[StoredAlert, ...]:
-        """Alerts whose condition has not ended, the oldest first; of a hanger, against a baseline
-        where these are named."""
-        query = stored_alerts.where(resolutions.c.id.is_(None))
-        if hanger is not None:
-            query = query.where(alerts.c.hanger == hanger)
-        if baseline_id is not None:
-            query = query.where(alerts.c.baseline_id == baseline_id)
-        with self.reading() as connection:
-            return tuple(
-                stored_alert(row) for row in connection.execute(query.order_by(alerts.c.id))
-            )
 
     def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that the condition of an alert ended, and acknowledges it where nobody has.
