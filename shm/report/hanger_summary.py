@@ -47,14 +47,11 @@ def summary(data: HangerReport) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-_MOST_CHANGES = 3  # what a sentence bears
-
-
 def _redescribed(data: HangerReport) -> str:
     """That the description has changed since the baseline, and what to do; empty where not."""
     if not data.redescribed:
         return ""
-    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
+    changed, more = data.redescribed[:_MOST_NAMED], data.redescribed[_MOST_NAMED:]
     named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
     number = data.hanger.id
     return (
