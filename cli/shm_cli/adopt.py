@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from typing import Any
 
 import rich_click as click
@@ -22,11 +21,9 @@ from shm_cli.common import (
     show,
     show_table,
     table,
+    who_option,
+    why_option,
 )
-from shm_cli.parameter_types import Words
-
-_why_option = click.option("--why", type=Words(), required=True, help="For the record.")
-_who_option = click.option("--who", show_default="the user's name", help="For the record.")
 
 
 @click.command()
@@ -47,8 +44,8 @@ _who_option = click.option("--who", show_default="the user's name", help="For th
     shell_complete=completion.models,
     help="A model class.",
 )
-@_why_option
-@_who_option
+@why_option
+@who_option
 @json_option
 @click.pass_context
 def adopt(
@@ -58,7 +55,7 @@ def adopt(
     at: tuple[str, ...],
     baseline: str,
     why: str,
-    who: str | None,
+    who: str,
     as_json: bool,
 ) -> None:
     """Make an effect part of a hanger's model class.
@@ -70,7 +67,7 @@ def adopt(
     \b
     Example: shm gap adopt --hanger 3 --effect point_mass --why "clamp of the lamp at 3.4 m"
     """
-    wish = Wish(effects, at, baseline, why, who or getpass.getuser())
+    wish = Wish(effects, at, baseline, why, who)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("adopting") as progress:
@@ -118,8 +115,8 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bo
 @click.command()
 @hanger_option(required=True)
 @click.option("--number", type=int, show_default="the only one in force", help="Which adoption.")
-@_why_option
-@_who_option
+@why_option
+@who_option
 @json_option
 @click.pass_context
 def drop(
@@ -127,7 +124,7 @@ def drop(
     hanger_id: int,
     number: int | None,
     why: str,
-    who: str | None,
+    who: str,
     as_json: bool,
 ) -> None:
     """Undo an adoption, on the record.
@@ -140,7 +137,7 @@ def drop(
     with opened_store(ctx) as (workspace, store):
         workspace.bridge.hanger(hanger_id)
         chosen = _chosen(store, hanger_id, number)
-        made = store.posteriors.drop_adoption(chosen.id, why, who or getpass.getuser(), utc_now())
+        made = store.posteriors.drop_adoption(chosen.id, why, who, utc_now())
         model = store.posteriors.selected_models()[hanger_id]
     if as_json:
         show(_document(made))

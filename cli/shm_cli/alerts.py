@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import getpass
 import os
 import time
 from collections.abc import Collection
@@ -31,6 +30,7 @@ from shm_cli.common import (
     show,
     show_table,
     table,
+    who_option,
 )
 from shm_cli.parameter_types import Words
 from shm_cli.silences import silence, silences, unsilence
@@ -40,11 +40,11 @@ from shm_cli.silences import silence, silences, unsilence
 @click.argument("alert_id", type=int, metavar="ID")
 @click.option("--why", type=Words(), required=True, help="What came of it, for the record.")
 @click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
-@click.option("--who", show_default="the user's name", help="For the record.")
+@who_option
 @json_option
 @click.pass_context
 def acknowledge(
-    ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str | None, as_json: bool
+    ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str, as_json: bool
 ) -> None:
     """Take note of an alert, on the record.
 
@@ -58,7 +58,7 @@ def acknowledge(
     """
     with opened_store(ctx) as (_, store):
         note = store.alerts.resolve if resolved else store.alerts.acknowledge
-        noted = note(alert_id, who or getpass.getuser(), why, utc_now())
+        noted = note(alert_id, who, why, utc_now())
     if as_json:
         show({"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)})
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import os
 import shutil
 import sys
@@ -19,6 +20,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     SpinnerColumn,
     TextColumn,
     TimeElapsedColumn,
@@ -35,6 +37,7 @@ from shm.modes_document import load_modes
 from shm.plausibility.bars import Known, doubt_of
 from shm.values import Hanger, ModalTest
 from shm_cli import completion
+from shm_cli.parameter_types import Words
 
 if TYPE_CHECKING:
     from shm.report.paper import Table as Texts
@@ -47,6 +50,19 @@ _READABLE = 100
 F = TypeVar("F", bound=Callable[..., Any])
 
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+why_option = click.option("--why", type=Words(), required=True, help="For the record.")
+who_option = click.option(
+    "--who",
+    callback=lambda *given: given[-1] or getpass.getuser(),
+    show_default="the user's name",
+    help="For the record.",
+)
+figures_option = click.option(
+    "--figures",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Write each figure as a PNG here.",
+)
 seed_option = click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed."
 )
@@ -329,25 +345,20 @@ def advancing_bar() -> Iterator[Callable[[str, float], None]]:
 
 
 def _fraction_bar() -> Progress:
-    console = Console(stderr=True)
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TextColumn("time left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
+    return _bar(TextColumn("{task.percentage:>3.0f} %"))
 
 
 def counting_bar() -> Progress:
     """A bar on stderr that counts things done."""
+    return _bar(MofNCompleteColumn())
+
+
+def _bar(done: ProgressColumn) -> Progress:
     console = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
+        done,
         TextColumn("time left"),
         TimeRemainingColumn(),
         console=console,

@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -41,8 +40,10 @@ from shm_cli.common import (
     show_table,
     show_texts,
     table,
+    who_option,
+    why_option,
 )
-from shm_cli.parameter_types import NewFile, Words
+from shm_cli.parameter_types import NewFile
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
@@ -95,8 +96,8 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     type=click.Choice(list(EVENT_KINDS)),
     help="What was done: ends only the alerts that this explains.",
 )
-@click.option("--why", type=Words(), required=True, help="For the record.")
-@click.option("--who", show_default="the user's name", help="For the record.")
+@why_option
+@who_option
 @json_option
 @click.pass_context
 def rebaseline(
@@ -105,7 +106,7 @@ def rebaseline(
     since: datetime,
     kind: str | None,
     why: str,
-    who: str | None,
+    who: str,
     as_json: bool,
 ) -> None:
     """Compare a hanger with itself as it is since some day.
@@ -125,7 +126,7 @@ def rebaseline(
     Example: shm drift rebaseline --hanger 7 --since 2026-05-03 --kind retensioned --why "to 640 kN"
     """
     event = EVENT_KINDS[kind] if kind else None
-    order = Order(since.replace(tzinfo=UTC), why, who or getpass.getuser(), event)
+    order = Order(since.replace(tzinfo=UTC), why, who, event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
         within = changes_within(store, hanger_id, order.since)

@@ -25,6 +25,7 @@ from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
     drawing,
+    figures_option,
     hanger_file_option,
     hanger_option,
     json_option,
@@ -94,12 +95,7 @@ def command() -> None:
     metavar="FILE",
     help="Write a page with all figures here.",
 )
-@click.option(
-    "--figures",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Write each figure as a PNG here.",
-)
+@figures_option
 @json_option
 @click.pass_context
 def diagnose(

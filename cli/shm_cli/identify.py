@@ -26,6 +26,7 @@ from shm.values import Hanger, Recording
 from shm_cli.common import (
     counting_bar,
     drawing,
+    figures_option,
     hanger_file_option,
     hanger_option,
     json_option,
@@ -121,12 +122,7 @@ _DEFAULT = Settings()
     metavar="SHEET.html",
     help="Write a page with all figures here; one test only.",
 )
-@click.option(
-    "--figures",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Write each figure as a PNG here.",
-)
+@figures_option
 @hanger_option()
 @hanger_file_option
 @json_option

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from datetime import datetime
 
 import rich_click as click
@@ -10,11 +9,17 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Silence
-from shm_cli.common import hanger_option, json_option, opened_store, show, show_table, table
+from shm_cli.common import (
+    hanger_option,
+    json_option,
+    opened_store,
+    show,
+    show_table,
+    table,
+    who_option,
+)
 from shm_cli.held import Time
 from shm_cli.parameter_types import Words
-
-_WHO = click.option("--who", show_default="the user's name", help="For the record.")
 
 
 @click.command()
@@ -24,7 +29,7 @@ _WHO = click.option("--who", show_default="the user's name", help="For the recor
 @click.option("--until", type=Time(), required=True, help="When it ends, as 2026-12-01.")
 @click.option("--maintenance", is_flag=True, help="Planned works: tests of then are not watched.")
 @click.option("--why", type=Words(), required=True, help="For the record.")
-@_WHO
+@who_option
 @json_option
 @click.pass_context
 def silence(
@@ -35,7 +40,7 @@ def silence(
     until: datetime,
     maintenance: bool,
     why: str,
-    who: str | None,
+    who: str,
     as_json: bool,
 ) -> None:
     """Hold messages to hooks back until a time.
@@ -57,7 +62,7 @@ def silence(
         made = store.silences.make(
             hanger_id,
             (since or now, until),
-            who or getpass.getuser(),
+            who,
             why,
             now,
             is_maintenance=maintenance,
@@ -106,10 +111,10 @@ def silences(ctx: click.Context, as_json: bool) -> None:
 
 @click.command()
 @click.argument("silence_id", type=int, metavar="ID")
-@_WHO
+@who_option
 @json_option
 @click.pass_context
-def unsilence(ctx: click.Context, silence_id: int, who: str | None, as_json: bool) -> None:
+def unsilence(ctx: click.Context, silence_id: int, who: str, as_json: bool) -> None:
     """End a silence now, on the record.
 
     \b
@@ -117,7 +122,7 @@ def unsilence(ctx: click.Context, silence_id: int, who: str | None, as_json: boo
     """
     now = utc_now()
     with opened_store(ctx) as (_, store):
-        ended = store.silences.end(silence_id, who or getpass.getuser(), now)
+        ended = store.silences.end(silence_id, who, now)
     if as_json:
         show(silence_row(ended, now))
         return

@@ -10,6 +10,7 @@ from shm.gap.contract import Hypothesis
 from shm.gap.coordinates import Branch
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
+from shm.inference.coordinates import log_normal
 from shm.values import BoolArray, FloatArray
 
 _DIFFERENCE = 1e-4  # technical: forward differences err by half of it times the curvature
@@ -83,8 +84,3 @@ class Landscape:
         likelihood = np.where(np.isfinite(slopes).all(axis=(1, 2)), likelihood, -np.inf)
         slopes[np.abs(slopes) > _STEEPEST] = 0.0
         return Views(w, residual[0], slopes, likelihood + log_normal(w))
-
-
-def log_normal(z: FloatArray) -> FloatArray:
-    """Log of the standard normal density (n,) at `z` (n, d)."""
-    return np.asarray(-0.5 * (z**2).sum(axis=1) - 0.5 * z.shape[1] * np.log(2 * np.pi))

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shm.gap.coordinates import Branch
-from shm.gap.objective import Landscape, Views, log_normal
+from shm.gap.objective import Landscape, Views
+from shm.inference.coordinates import log_normal
 from shm.values import BoolArray, FloatArray
 
 # Judgement, as Marquardt's method mostly goes to the same optima: steps of at most one standard

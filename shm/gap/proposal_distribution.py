@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch, Straight
-from shm.gap.objective import log_normal
+from shm.inference.coordinates import log_normal
 from shm.inference.mixture import Normal, TMixture
 from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray, IntArray

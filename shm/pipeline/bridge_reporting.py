@@ -89,7 +89,7 @@ class _Kept:
             of_readable(store.watch.latest, damaged),
             of_readable(store.watch.detected_changes, damaged),
             store.alerts.open_counts(),
-            store.alerts.list_standing(),
+            store.alerts.list_all(standing=True),
             damaged,
             warnings_of(workspace, store, hangers),
         )

@@ -289,6 +289,12 @@ class Jobs:
         beside = tests_beside(self.store, baseline, test)
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
+<<<<<<< HEAD
+=======
+        standing = self.store.alerts.list_all(hanger.id, baseline.id, standing=True)
+        is_of_gap = any("gap" in each.alert.kinds for each in standing)
+        stands = is_of_gap and gap_stands(baseline.posterior, current)
+>>>>>>> leftovers
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
@@ -311,8 +317,8 @@ class Jobs:
     ) -> tuple[dict[int, str], Alert | None]:
         """Which alerts a test ends, and why; and the resolved one that it shows again, unless the
         watch itself calls for an alert."""
-        standing = self.store.alerts.list_standing(hanger.id, baseline.id)
-        resolved = self.store.alerts.list_resolved(hanger.id, baseline.id)
+        standing = self.store.alerts.list_all(hanger.id, baseline.id, standing=True)
+        resolved = self.store.alerts.list_all(hanger.id, baseline.id, standing=False)
         if not standing and not resolved:
             return {}, None
         before = [each.watched for each in self.store.watch.list_recent(baseline, _RECENT_TESTS)]

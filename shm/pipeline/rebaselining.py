@@ -109,7 +109,7 @@ def _explained(store: Store, hanger: Hanger, order: Order) -> list[StoredAlert]:
     """The standing alerts that an order explains; all, where it names no kind of event."""
     return [
         each
-        for each in store.alerts.list_standing(hanger.id)
+        for each in store.alerts.list_all(hanger.id, standing=True)
         if order.kind is None or is_explained(each.alert, order.kind, order.since)
     ]
 

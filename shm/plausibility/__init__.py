@@ -11,7 +11,6 @@ from shm.plausibility.bars import of_another_bar, of_other_signals
 from shm.plausibility.candidate import (
     Candidate,
     Check,
-    frequency_change,
     implied_shift,
 )
 from shm.plausibility.clock import FIRST_DAY
@@ -26,7 +25,6 @@ __all__ = [
     "Check",
     "doubts_about",
     "fingerprint_of",
-    "frequency_change",
     "implied_shift",
     "notice_of",
 ]

@@ -12,7 +12,6 @@ from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import (
     consequences,
-    contender,
     facts,
     name,
     promise,
@@ -33,7 +32,6 @@ from shm.report.diagnosis_wording import (
     size,
     tension_of,
     tension_unit,
-    title,
 )
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
@@ -175,7 +173,7 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
 
 
 def _cause_note(diagnosis: Diagnosis) -> str:
-    left_out = ", ".join(title(effect) for effect in diagnosis.left_out)
+    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return (
         f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
         "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
@@ -271,7 +269,7 @@ def next_measurements(sheet: DiagnosisSheet) -> Table:
         tuple(
             (
                 each.what,
-                *(contender(name) for name in each.separates),
+                *(formatting.quantity(name) for name in each.separates),
                 promise(each),
             )
             for each in ranked_measurements(sheet.diagnosis)
@@ -350,7 +348,7 @@ def places(sheet: DiagnosisSheet) -> Table:
 def _place_row(place: GapPlace) -> tuple[str, ...]:
     bounds = f"{place.low_m:.2f} to {place.high_m:.2f}"
     return (
-        title(place.kind),
+        formatting.quantity(place.kind),
         formatting.number(place.x_m, ".2f"),
         bounds if math.isfinite(place.low_m + place.high_m) else "not known",
         _share(place.share),
@@ -361,7 +359,7 @@ def invisible(sheet: DiagnosisSheet) -> Table:
     return Table(
         "What these data cannot show",
         ("effect", "why"),
-        tuple((title(effect), why) for effect, why in sheet.diagnosis.invisible),
+        tuple((formatting.quantity(effect), why) for effect, why in sheet.diagnosis.invisible),
     )
 
 

@@ -269,7 +269,7 @@ def next_step(diagnosis: Diagnosis) -> str:
     best = next(iter(ranked_measurements(diagnosis)), None)
     if best is None:
         return ""
-    one, other = (contender(each) for each in best.separates)
+    one, other = (formatting.quantity(each) for each in best.separates)
     if best.expected_log_bayes_factor < _WORTH_MEASURING:
         return f"No measurement that was considered would tell {one} from {other} for sure."
     return (
@@ -288,11 +288,6 @@ def _odds_to_expect(measurement: NextMeasurement) -> str:
     """The same in words for a sentence: `400`, `more than 1000`."""
     odds = math.exp(min(measurement.expected_log_bayes_factor, _CERTAIN))
     return f"{float(f'{odds:.1g}'):.0f}" if odds < _CERTAIN_ODDS else f"more than {_CERTAIN_ODDS}"
-
-
-def contender(effect: str) -> str:
-    """What a measurement separates in plain words."""
-    return formatting.quantity(effect)
 
 
 def facts(sheet: DiagnosisSheet) -> tuple[Fact, ...]:

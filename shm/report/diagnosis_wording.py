@@ -92,11 +92,6 @@ _MOST_PLACES = 2  # what a sentence bears
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
 
 
-def title(effect: str) -> str:
-    """`point_mass + sag` as `point mass + sag`."""
-    return formatting.quantity(effect)
-
-
 def label(cause: Cause) -> str:
     """`rotational end flexibility (both ends)`, for tables and figures."""
     parts = zip(cause.effects, cause.places, strict=True)
@@ -129,7 +124,7 @@ def _clause(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
     try:
         told = EFFECTS[effect].phrase.format_map(Sizes(estimates))
     except KeyError:
-        told = title(effect)
+        told = formatting.quantity(effect)
     return f"{told} {where}".rstrip()
 
 

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from shm.report.intervals import Interval
+from shm.values import stated_tension
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
 
@@ -42,9 +43,7 @@ _MEANINGS = {
 
 def decimals(width: float) -> int:
     """Decimals that show two significant digits of half an interval's `width`."""
-    if not (math.isfinite(width) and width > 0):
-        return 1
-    return min(6, max(0, 1 - math.floor(math.log10(width / 2))))
+    return stated_tension.decimals(width / 2)
 
 
 def with_interval(interval: Interval, unit: str) -> str:

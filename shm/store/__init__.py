@@ -1,6 +1,5 @@
 """Keeps every noun of the flow: tables, verbs, the archive of raw files, schema upgrade."""
 
-from shm.store.active import ActiveLock
 from shm.store.archive import Archive, Quarantine
 from shm.store.decisions import Withdrawal
 from shm.store.holding import Judged
@@ -20,7 +19,6 @@ from shm.store.recording_rows import (
     Death,
     Deaths,
     Decision,
-    Event,
     HeldTest,
     Hold,
     Outcome,
@@ -50,7 +48,6 @@ from shm.store.rows import (
     StoredAdoption,
     StoredAlert,
     StoredDiagnosis,
-    StoredPosterior,
     StoredSelection,
     StoredTest,
     StoredWatch,
@@ -63,7 +60,6 @@ __all__ = [
     "AGAIN_FROM",
     "ENDED",
     "Acknowledgement",
-    "ActiveLock",
     "Adoption",
     "AlertRow",
     "Archive",
@@ -75,7 +71,6 @@ __all__ = [
     "Delivery",
     "DeliveryRow",
     "DeliveryState",
-    "Event",
     "EventKind",
     "FormerPosterior",
     "FormerTest",
@@ -102,7 +97,6 @@ __all__ = [
     "StoredAdoption",
     "StoredAlert",
     "StoredDiagnosis",
-    "StoredPosterior",
     "StoredRecording",
     "StoredSelection",
     "StoredTest",

@@ -5,7 +5,7 @@ Nothing is deleted: the raw file, the test and what was made of it stay.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -42,7 +42,7 @@ from shm.store.holding import (
 from shm.store.queries import WEIGHED
 from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.reprocessing import BEFORE, of_baselines, reprocess, supersede_results
-from shm.store.results import advance_recordings
+from shm.store.results import advance_recordings, move_numbers
 from shm.store.rows import Stage
 from shm.store.tables import holds, recordings, tests, watch_states, watches
 
@@ -308,15 +308,5 @@ def _watch_again(
         again |= {row.id: row.recording_id for row in connection.execute(later)}
         connection.execute(sa.delete(watch_states).where(watch_states.c.hanger == hanger))
     supersede_results(connection, list(again), stage, at)
-    _send_back(connection, again, BEFORE[stage], at)
+    move_numbers(connection, again, BEFORE[stage], at)
     return len(again)
-
-
-def _send_back(
-    connection: Connection, again: Mapping[int, int], stage: Stage, at: datetime
-) -> None:
-    ids: Collection[int] = list(again)
-    connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=stage))
-    for test_id, recording_id in again.items():
-        write_step(connection, recording_id, stage, at, test_id)
-    advance_recordings(connection, sorted(set(again.values())), at)

@@ -41,12 +41,17 @@ def all_at(connection: Connection, chosen: Iterable[StoredTest], stage: Stage) -
 
 def move(connection: Connection, chosen: Iterable[StoredTest], stage: Stage, at: datetime) -> None:
     """Brings tests to a stage, and their recordings along."""
-    chosen = list(chosen)
-    ids = [test.id for test in chosen]
-    connection.execute(sa.update(tests).where(tests.c.id.in_(ids)).values(stage=stage))
-    for test in chosen:
-        write_step(connection, test.recording_id, stage, at, test.id)
-    advance_recordings(connection, {test.recording_id for test in chosen}, at)
+    move_numbers(connection, {test.id: test.recording_id for test in chosen}, stage, at)
+
+
+def move_numbers(
+    connection: Connection, chosen: Mapping[int, int], stage: Stage, at: datetime
+) -> None:
+    """The same of tests by their numbers, each with that of its recording."""
+    connection.execute(sa.update(tests).where(tests.c.id.in_(list(chosen))).values(stage=stage))
+    for test_id, recording_id in chosen.items():
+        write_step(connection, recording_id, stage, at, test_id)
+    advance_recordings(connection, sorted(set(chosen.values())), at)
 
 
 def advance_recordings(connection: Connection, ids: Collection[int], at: datetime) -> None:

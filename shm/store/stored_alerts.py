@@ -61,11 +61,24 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 class Alerts(Repository):
     """Alerts and the outbox."""
 
-    def list_all(self, hanger: int | None = None) -> tuple[StoredAlert, ...]:
-        """All alerts, or those of one hanger, as they were raised and acknowledged."""
+    def list_all(
+        self,
+        hanger: int | None = None,
+        baseline_id: int | None = None,
+        *,
+        standing: bool | None = None,
+    ) -> tuple[StoredAlert, ...]:
+        """Alerts as they were raised and acknowledged, the oldest first; of a hanger, against a
+        baseline where these are named, and only those whose condition stands, or has ended, where
+        `standing` tells.
+        """
         query = stored_alerts.order_by(alerts.c.id)
+        if standing is not None:
+            query = query.where(resolutions.c.id.is_(None) == standing)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
+        if baseline_id is not None:
+            query = query.where(alerts.c.baseline_id == baseline_id)
         with self.reading() as connection:
             return tuple(stored_alert(row) for row in connection.execute(query))
 
@@ -98,28 +111,6 @@ class Alerts(Repository):
         if not found:
             raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
         return found[0]
-
-    def list_standing(
-        self, hanger: int | None = None, baseline_id: int | None = None
-    ) -> tuple[StoredAlert, ...]:
-        """Alerts whose condition has not ended, the oldest first; of a hanger, against a baseline
-        where these are named."""
-        query = stored_alerts.where(resolutions.c.id.is_(None))
-        if hanger is not None:
-            query = query.where(alerts.c.hanger == hanger)
-        if baseline_id is not None:
-            query = query.where(alerts.c.baseline_id == baseline_id)
-        return self._in_order(query)
-
-    def list_resolved(self, hanger: int, baseline_id: int) -> tuple[StoredAlert, ...]:
-        """Alerts of a hanger against a baseline whose condition has ended, the oldest first."""
-        against = alerts.c.hanger == hanger, alerts.c.baseline_id == baseline_id
-        return self._in_order(stored_alerts.where(resolutions.c.id.is_not(None), *against))
-
-    def _in_order(self, query: sa.Select[Any]) -> tuple[StoredAlert, ...]:
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(alerts.c.id))
-            return tuple(stored_alert(row) for row in rows)
 
     def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that the condition of an alert ended, and acknowledges it where nobody has.

@@ -83,18 +83,18 @@ def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
     tension_n, sd_n = averaged.tension_n, averaged.repeatability_sd_n
     unit = unit or force_unit(tension_n.mean)
     low, mean, high = (unit.of(n) for n in (tension_n.q05, tension_n.mean, tension_n.q95))
-    places = _decimals((high - low) / 2)
+    places = decimals((high - low) / 2)
     repeats = unit.of(sd_n)
     return StatedTension(
         f"{mean:.{places}f} {unit.name}",
         f"{low:.{places}f} to {high:.{places}f} {unit.name}",
-        f"{repeats:.{_decimals(repeats)}f} {unit.name}" if math.isfinite(repeats) else "",
+        f"{repeats:.{decimals(repeats)}f} {unit.name}" if math.isfinite(repeats) else "",
         _probability(averaged.probability_above_limit),
         _probability(averaged.probability_slack),
     )
 
 
-def _decimals(size: float) -> int:
+def decimals(size: float) -> int:
     """Decimals that show two significant digits."""
     if not (math.isfinite(size) and size > 0):
         return 1

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from shm.models.effects import EFFECTS, Survey
+from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import summary
 from shm.report.diagnosis_wording import (
@@ -16,7 +17,6 @@ from shm.report.diagnosis_wording import (
     label,
     phrase,
     size,
-    title,
 )
 from shm.values import (
     NAN,
@@ -207,7 +207,7 @@ def test_every_effect_of_the_catalogue_is_put_in_words_with_its_size_at_every_pl
 ) -> None:
     for variant in EFFECTS[effect].variants(HANGER, RICH):
         told = phrase(estimates(effect, variant.at))
-        assert not told.startswith(title(effect) + " at")
+        assert not told.startswith(formatting.quantity(effect) + " at")
         assert told.count("(") >= 1
         assert "_" not in told
 

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import alerts, hanger_numbers, hangers, recordings, signing_in, tests, watching
+from shm_daemon.web import hanger_numbers, hangers, recordings, signing_in, tests, watching
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
@@ -22,8 +22,7 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
-from shm_daemon.web.pages import alerts as alerts_page
-from shm_daemon.web.pages import bridge, hanger, health, one_test, static, upload
+from shm_daemon.web.pages import alerts, bridge, hanger, health, one_test, static, upload
 from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
@@ -57,7 +56,6 @@ def load_pages(site: Site) -> Pages:
         signing_in,
         static,
         bridge,
-        alerts_page,
         upload,
         health,
         tests,

@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_wording import is_set_aside, title
+from shm.report.diagnosis_wording import is_set_aside
 from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -213,7 +213,7 @@ def _profile(place: GapPlace, colour: str, dash: Dash) -> list[Mark]:
     """One kind of cause as a curve, or as bars where it may only sit at a few places."""
     x_m, density = np.array(place.profile).T
     density = density / max(float(np.nanmax(density)), 1e-300)
-    name, hover = f"{title(place.kind)} ({_share(place)})", "%{x:.2f} m"
+    name, hover = f"{formatting.quantity(place.kind)} ({_share(place)})", "%{x:.2f} m"
     if len(x_m) <= _FEW_PLACES:
         return [Bars(x=x_m, y=density, width=0.12, colour=colour, name=name, hover=hover)]
     found: list[Mark] = [
@@ -283,15 +283,20 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     )
 
 
+def places_in_words(sheet: DiagnosisSheet) -> str:
+    places = "; ".join(
+        f"as {formatting.quantity(place.kind)} it would sit at "
+        f"{formatting.number(place.x_m, '.2f')} m"
+        for place in local(sheet)
+    )
+    return f"Along the hanger: {places}."
+
+
 def _alt(sheet: DiagnosisSheet) -> str:
     residuals = measured(sheet)
     worst = sorted(residuals, key=lambda r: -abs(r.residual_percent))[:3]
     told = ", ".join(f"{r.plane} {r.order} in {r.test} {r.residual_percent:+z.2f} %" for r in worst)
-    places = "; ".join(
-        f"as {title(place.kind)} it would sit at {formatting.number(place.x_m, '.2f')} m"
-        for place in local(sheet)
-    )
-    there = f" Along the hanger: {places}." if places else ""
+    there = f" {places_in_words(sheet)}" if local(sheet) else ""
     count = formatting.counted(len(residuals), "residual")
     gross = ", ".join(f"{r.plane} {r.order} in {r.test}" for r in aside(sheet))
     set_aside = f" Set aside as a gross error: {gross}." if gross else ""

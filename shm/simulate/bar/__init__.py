@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shm.simulate.bar.description import Bar, BarEnd, Mass, Spring, Stretch, bar_of
+from shm.simulate.bar.description import Bar, Mass, Spring, Stretch, bar_of
 from shm.simulate.bar.modes import BarModes, bar_modes
 
-__all__ = ["Bar", "BarEnd", "BarModes", "Mass", "Spring", "Stretch", "bar_modes", "bar_of"]
+__all__ = ["Bar", "BarModes", "Mass", "Spring", "Stretch", "bar_modes", "bar_of"]

@@ -5,7 +5,7 @@ A disturbance is one function and one line of `DISTURBANCES`.
 
 from __future__ import annotations
 
-from shm.simulate.disturbances.base import Channels, Disturbance, Lines, Motion, Planted, Scene
+from shm.simulate.disturbances.base import Channels, Disturbance, Lines, Motion, Planted
 from shm.simulate.disturbances.hitting import (
     cut_off,
     double_hit,
@@ -17,7 +17,7 @@ from shm.simulate.disturbances.hitting import (
 from shm.simulate.disturbances.spurious_vibration import deck, harmonic, machine, mains
 from shm.simulate.disturbances.wiring import cable, clipping, drop_out, overload
 
-__all__ = ["DISTURBANCES", "Channels", "Disturbance", "Lines", "Motion", "Planted", "Scene"]
+__all__ = ["DISTURBANCES", "Channels", "Disturbance", "Lines", "Motion", "Planted"]
 
 _ALL = (
     Disturbance("double_hit", "the hammer bounces once", schedule=double_hit),

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_wording import claimed, title
+from shm.report.diagnosis_wording import claimed
 from shm.report.figures import gap_before_and_after, gap_causes, gap_map
 from shm.report.figures.gap_map import kept, measured
 from shm.report.figures.specification import stacked
@@ -31,14 +30,6 @@ GAP_MAP = HangerFigure(
 )
 
 
-def _alt_of_places(view: HangerView) -> str:
-    places = "; ".join(
-        f"as {title(place.kind)} it would sit at {formatting.number(place.x_m, '.2f')} m"
-        for place in gap_map.local(_sheet(view))
-    )
-    return f"Along the hanger: {places}."
-
-
 GAP_PLACES = HangerFigure(
     "gap_places",
     "Where along the hanger",
@@ -49,7 +40,7 @@ GAP_PLACES = HangerFigure(
         "Where along the hanger a local cause of each kind would have to sit, were it of that "
         "kind, with the share of the misfit that it would explain there."
     ),
-    _alt_of_places,
+    lambda view: gap_map.places_in_words(_sheet(view)),
     height_px=300,  # judgement: one low panel
 )
 

@@ -1,27 +1,33 @@
-"""The page of alerts: those that nobody has acknowledged, then the others, some at a time."""
+"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that nobody has
+acknowledged, then the others.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Container, Sequence
+from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 
-from shm.store import AlertRow
-from shm_daemon.web.access import AtSite, Reader
+from shm.pipeline import utc_now
+from shm.store import AlertRow, Silence
+from shm.store.stored_silences import silenced_until
+from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
-from shm_daemon.web.alerts import alert_documents
+from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, Acknowledge, Alerts, AlertState
 from shm_daemon.web.site import Site
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(tags=["alerts"])
 
 _SHOWN = 50  # technical: alerts on a page, which links to older ones
 _MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert", "not needed": "steady"}
 Number = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
 
 
-@router.get("/alerts")
+@router.get("/alerts", include_in_schema=False)
 def alerts_page(
     request: Request,
     site: AtSite,
@@ -71,3 +77,87 @@ def _address(alert: AlertRow) -> str | None:
     if "held" in alert.kinds:  # what is held has no page of its own
         return "/operation#held"
     return None if "test" in alert.kinds else test_page(alert.hanger, alert.test)
+
+
+@router.get(
+    "/api/alerts",
+    response_model=Alerts,
+    responses=answers(400, 401, 403, 422, 503),
+    summary="Alerts that were raised",
+)
+def alerts(
+    site: AtSite,
+    _: Reader,
+    hanger: Number = None,
+    open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
+    limit: Annotated[
+        int | None,
+        Query(ge=1, le=MOST_ROWS, description="So many of the newest, the newest first."),
+    ] = None,
+    before: Annotated[
+        int | None,
+        Query(
+            ge=0, le=LARGEST_NUMBER, description="With `limit`: `next_before` of the answer before."
+        ),
+    ] = None,
+) -> Any:
+    """With their deliveries. Without `limit` all that were ever raised, the oldest first.
+
+    With `limit` page by page, the newest first: after years that is the quicker question.
+    """
+    is_open = True if open else None
+    if limit is None:
+        found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
+        return {"alerts": alert_documents(found, site), "next_before": None}
+    rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
+    return {
+        "alerts": alert_documents(rows[:limit], site),
+        "next_before": rows[limit - 1].id if len(rows) > limit else None,
+    }
+
+
+@router.post(
+    "/api/alerts/{alert_id}/acknowledgement",
+    response_model=AlertState,
+    responses=answers(400, 401, 403, 404, 409, 422, 503),
+    summary="Take note of an alert",
+)
+def acknowledge(
+    site: AtSite,
+    writer: Writer,
+    alert_id: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)],
+    told: Acknowledge,
+) -> Any:
+    """Notes on the record that somebody has seen an alert to its end: once an alert."""
+    who = writer.name if told.who is None else f"{told.who} (token {writer.name})"
+    site.store.alerts.acknowledge(alert_id, who, told.why, utc_now())
+    return alert_documents([site.store.alerts.row(alert_id)], site)[0]
+
+
+def alert_documents(found: Sequence[AlertRow], site: Site) -> list[dict[str, Any]]:
+    """Alerts with what became of their deliveries, and what holds them back."""
+    silences, now = site.store.silences.list_all(), utc_now()
+    escalates = site.workspace.bridge.escalation_s
+    return [_document(each, escalates, silences, now) for each in found]
+
+
+def _document(
+    alert: AlertRow, escalates: Container[str], silences: tuple[Silence, ...], now: datetime
+) -> dict[str, Any]:
+    noted, ended = alert.acknowledgement, alert.resolution
+    return {
+        "id": alert.id,
+        "hanger": alert.hanger,
+        "raised_at": alert.raised_at,
+        "test": alert.test,
+        "test_at": alert.test_time,
+        "kinds": list(alert.kinds),
+        "message": alert.message,
+        "acknowledged": noted and noted.said,
+        "resolved": ended and ended.said,
+        "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),
+        "deliveries": [
+            {**vars(each), "state": each.state.value, "escalation": each.hook in escalates}
+            for each in alert.deliveries
+        ],
+    }
