@@ -75,10 +75,11 @@ def first_tests_against(
     hanger: Hanger,
     options: WatchOptions,
 ) -> Alert | None:
-    """The alert of a test that with the two before it clearly reads off the baseline, alike.
+    """The alert of a test that with the two before it clearly reads another tension, alike.
 
-    None where they do not, there are no two that are watched, all are of one visit, their modes fit
-    no state (a notice says so), or they are off by next to nothing.
+    An end that seems to have moved is left to the watch: one mistaken mode of the only test before
+    passes for it. None where tensions do not, there are no two tests that are watched, all are of
+    one visit, their modes fit no state (a notice says so), or they are off by next to nothing.
     """
     unwatched = {*beside.held, *beside.of_works}
     before = [test for test in beside.came[0] if test.id not in unwatched]
@@ -87,15 +88,11 @@ def first_tests_against(
         return None
     if any(off_the_baseline(reader.reading(test, newest[1])).any() for test in tests):
         return None
-    read = [read_alone(reader, test, options) for test in tests]
-    found = [
-        drift
-        for quantity, shown in zip(reader.quantities, zip(*read, strict=True), strict=True)
-        if (drift := _common(quantity, shown, newest, hanger, options)) is not None
-    ]
-    if not found:
+    j = [quantity.name for quantity in reader.quantities].index(TENSION)
+    shown = [read_alone(reader, test, options)[j] for test in tests]
+    lead = _common(reader.quantities[j], shown, newest, hanger, options)
+    if lead is None:
         return None
-    lead = max(found, key=_deviations)
     test, time = newest
     return Alert(
         key=f"hanger-{hanger.id}:first-tests-against-baseline:{short_name(test.id)}",
@@ -115,7 +112,7 @@ def _common(
     hanger: Hanger,
     options: WatchOptions,
 ) -> Drift | None:
-    """What all tests show of a quantity; None where one does not, or it is not clear."""
+    """What all tests show of the tension; None where one does not, or it is not clear."""
     each: FloatArray = np.array([one.mean for one in shown])
     mean = float(each.mean())
     # What tests scatter by is their own, but for the baseline's; the rest may be common to them.
