@@ -67,8 +67,8 @@ def acknowledge(
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
-    """What `shm alerts --json` says of it: `acknowledged` is null while the alert is open, and
-    `resolved` while its condition stands.
+    """What `shm alerts --json` says of it: `acknowledged` is null while nobody took note of it, and
+    `resolved` while its condition stands; it is open while both are.
     """
     noted, ended = stored.acknowledgement, stored.resolution
     return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}
@@ -77,7 +77,9 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
 def acknowledgement_words(stored: StoredAlert) -> str:
     """`open`, or who took note of it, when and why; that it is resolved."""
     noted, ended = stored.acknowledgement, stored.resolution
-    said = "open" if noted is None else f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    if noted is None:
+        return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"
+    said = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
     return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 

@@ -55,6 +55,9 @@ _OWED = (
 _outbox = stored_alerts.add_columns(
     *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
 ).join(deliveries, deliveries.c.alert_id == alerts.c.id)
+_is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
+"""Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
+_closed_at = sa.func.coalesce(acknowledgements.c.at, resolutions.c.at)
 _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAITING))
 
 
@@ -79,17 +82,19 @@ class Alerts(Repository):
     ) -> tuple[AlertRow, ...]:
         """Alerts, the newest first; `before` is the number of the alert to go on after.
 
-        Only those that are open, or acknowledged, where `is_open` tells; acknowledged ones come
-        in the order in which they were, the latest first.
+        Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
+        latter come in the order in which they were, the latest first.
         """
-        place = acknowledgements.c.id if is_open is False else alerts.c.id
-        query = stored_alerts.order_by(place.desc())
+        query = stored_alerts
+        if is_open is False:
+            query = query.order_by(_closed_at.desc())
+        query = query.order_by(alerts.c.id.desc())
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
         if is_open is not None:
-            query = query.where(acknowledgements.c.id.is_(None) == is_open)
+            query = query.where(_is_open if is_open else sa.not_(_is_open))
         if before is not None:
-            query = query.where(place < _place(before, is_open))
+            query = query.where(_is_after(before, is_open=is_open))
         return self._alert_rows(query.limit(limit))
 
     def row(self, alert_id: int) -> AlertRow:
@@ -157,16 +162,22 @@ class Alerts(Repository):
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
         with self.reading() as connection:
-            raised = _count(connection, alerts)
-            noted = _count(connection, acknowledgements)
-        return raised - noted, noted
+            noted = connection.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
-        """How many alerts of each hanger nobody has acknowledged; hangers without are left out."""
-        query = sa.select(alerts.c.hanger, sa.func.count()).outerjoin(acknowledgements)
-        is_open = acknowledgements.c.id.is_(None)
+        """How many alerts of each hanger are open; hangers without any are left out.
+
+        The only place where they are counted: whoever states a number of them asks here.
+        """
+        query = (
+            sa.select(alerts.c.hanger, sa.func.count())
+            .select_from(alerts)
+            .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
+            .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
+        )
         with self.reading() as connection:
-            rows = connection.execute(query.where(is_open).group_by(alerts.c.hanger))
+            rows = connection.execute(query.where(_is_open).group_by(alerts.c.hanger))
             return {row[0]: int(row[1]) for row in rows}
 
     def list_hanger_events(
@@ -290,15 +301,16 @@ class Alerts(Repository):
         return tuple(_row(row, tuple(owed[row.id])) for row in rows)
 
 
-def _count(connection: sa.Connection, table: sa.Table) -> int:
-    return int(connection.scalar(sa.select(sa.func.count()).select_from(table)) or 0)
-
-
-def _place(alert_id: int, is_open: bool | None) -> Any:
+def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
+    """Which alerts stand after one in a list of `list_rows`."""
+    older = alerts.c.id < alert_id
     if is_open is not False:
-        return alert_id
-    noted = sa.select(acknowledgements.c.id).where(acknowledgements.c.alert_id == alert_id)
-    return noted.scalar_subquery()
+        return older
+    tables = alerts.outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
+    tables = tables.outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
+    at = sa.select(_closed_at).select_from(tables).where(alerts.c.id == alert_id)
+    of_one = at.correlate(None).scalar_subquery()
+    return (_closed_at < of_one) | ((_closed_at == of_one) & older)
 
 
 def _alert(connection: Connection, alert_id: int) -> StoredAlert:

@@ -29,7 +29,9 @@ def alerts(
     site: AtSite,
     _: Reader,
     hanger: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
-    open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
+    open: Annotated[
+        bool, Query(description="Only those that stand and that nobody has acknowledged.")
+    ] = False,
     limit: Annotated[
         int | None,
         Query(ge=1, le=MOST_ROWS, description="So many of the newest, the newest first."),

@@ -1,4 +1,4 @@
-"""The page of alerts: those that nobody has acknowledged, then the others, some at a time."""
+"""The page of alerts: those that are open, then the others, some at a time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def alerts_page(
 ) -> Response:
     """Alerts of all hangers or of one, the newest first.
 
-    `open_before` goes on among the open ones alone, `noted_before` among those acknowledged.
+    `open_before` goes on among the open ones alone, `noted_before` among the others.
     """
     opened, older_open = _some(site, hanger, open_before, is_open=True)
     noted, older_noted = _some(site, hanger, noted_before, is_open=False)
