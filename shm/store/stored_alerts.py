@@ -38,6 +38,7 @@ from shm.store.tables import (
     baselines,
     deliveries,
     resolutions,
+    steps,
     tests,
 )
 
@@ -275,6 +276,33 @@ class Alerts(Repository):
                 waits = {"last_error": error, "next_attempt_at": next_attempt_at}
                 _note(connection, delivery, waits)
 
+    def resend(self, alert_id: int, at: datetime) -> tuple[Delivery, ...]:
+        """Owes an alert anew to the hooks that it was given up by, with the whole message that it
+        went as; the deliveries of the alert that wait again.
+
+        Raises NothingThere where there is none of that number, UsageError where none was given up.
+        """
+        given_up = deliveries.c.state == DeliveryState.GIVEN_UP
+        own = sa.select(deliveries.c.message_id).where(deliveries.c.alert_id == alert_id, given_up)
+        with self.writing() as connection:
+            _alert(connection, alert_id)
+            of_alert = sa.select(deliveries.c.id).where(deliveries.c.alert_id == alert_id, given_up)
+            ids = connection.scalars(of_alert).all()
+            if not ids:
+                raise UsageError(
+                    f"alert {alert_id} was given up by no hook.", remedy="See `shm alerts`."
+                )
+            messages = [each for each in connection.scalars(own) if each is not None]
+            again = given_up & (deliveries.c.message_id.in_(messages) | deliveries.c.id.in_(ids))
+            waits = {
+                "state": DeliveryState.WAITING,
+                "attempts": 0,
+                "next_attempt_at": at,
+                "ended_at": None,
+            }
+            connection.execute(sa.update(deliveries).where(again).values(**waits))
+        return self._deliveries(_outbox.where(deliveries.c.id.in_(ids)).order_by(deliveries.c.id))
+
     def delivery_counts(self) -> dict[str, int]:
         """How many deliveries stand in each state; see `counts_by_name`."""
         query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
@@ -379,10 +407,26 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
         deliveries.c.state == DeliveryState.WAITING,
         deliveries.c.news == News.RAISED,
     )
-    if connection.execute(waiting).first() is None:
-        about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
-        row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+    if connection.execute(waiting).first() is not None:
+        return
+    about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
+    row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+    if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
         write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+
+
+def _notified_steps(connection: Connection, test_id: int) -> int:
+    of_test = (steps.c.test_id == test_id) & (steps.c.stage == NOTIFIED)
+    return int(connection.scalar(sa.select(sa.func.count()).where(of_test)) or 0)
+
+
+def _told_alerts(connection: Connection, test_id: int) -> int:
+    """Alerts of a test that no hook is owed any more: one that is sent again was told before."""
+    raised = (deliveries.c.alert_id == alerts.c.id) & (deliveries.c.news == News.RAISED)
+    waiting = raised & (deliveries.c.state == DeliveryState.WAITING)
+    told = sa.exists().where(raised) & ~sa.exists().where(waiting)
+    query = sa.select(sa.func.count()).select_from(alerts)
+    return int(connection.scalar(query.where(alerts.c.test_id == test_id, told)) or 0)
 
 
 def _delivery(row: Row[Any]) -> Delivery:
