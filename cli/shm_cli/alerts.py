@@ -17,7 +17,7 @@ from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
-from shm.store import StoredAlert
+from shm.store import DeliveryState, StoredAlert
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert
 from shm_cli import completion
@@ -67,8 +67,8 @@ def acknowledge(
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
-    """What `shm alerts --json` says of it: `acknowledged` is null while the alert is open, and
-    `resolved` while its condition stands.
+    """What `shm alerts --json` says of it: `acknowledged` is null while nobody took note of it, and
+    `resolved` while its condition stands; it is open while both are.
     """
     noted, ended = stored.acknowledgement, stored.resolution
     return {"acknowledged": noted and noted.said, "resolved": ended and ended.said}
@@ -77,7 +77,9 @@ def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
 def acknowledgement_words(stored: StoredAlert) -> str:
     """`open`, or who took note of it, when and why; that it is resolved."""
     noted, ended = stored.acknowledgement, stored.resolution
-    said = "open" if noted is None else f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
+    if noted is None:
+        return "open" if ended is None else f"resolved {ended.at:%Y-%m-%d}: {ended.why}"
+    said = f"{noted.who}, {noted.at:%Y-%m-%d}: {noted.why}"
     return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 
@@ -99,7 +101,29 @@ def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         _list(ctx, hanger_id, as_json)
 
 
-for _verb in (acknowledge, silence, silences, unsilence):
+@click.command()
+@click.argument("alert_id", type=int, metavar="ID")
+@json_option
+@click.pass_context
+def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
+    """Send an alert again to the hooks that it was given up by.
+
+    A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
+    with `shm alerts test`, then send the alert again: the daemon tries as often as before.
+
+    \b
+    Example: shm alerts resend 4
+    """
+    with opened_store(ctx) as (_, store):
+        owed = store.alerts.resend(alert_id, utc_now())
+    hooks = list(dict.fromkeys(each.hook for each in owed))
+    if as_json:
+        show({"id": alert_id, "hooks": hooks})
+        return
+    click.echo(f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.")
+
+
+for _verb in (acknowledge, resend, silence, silences, unsilence):
     command.add_command(_verb)
 
 
@@ -208,8 +232,20 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
             acknowledgement_words(stored),
         )
     show_table(shown)
-    for stored in alerts:
+    for stored, row in zip(alerts, rows, strict=True):
         click.echo("\n" + paragraph(f"{stored.id}. {stored.alert.message}"))
+        for each in row["deliveries"]:
+            if each["state"] == DeliveryState.GIVEN_UP:
+                click.echo(paragraph(_given_up_words(stored.id, each)))
+
+
+def _given_up_words(alert_id: int, delivery: dict[str, Any]) -> str:
+    tries = "one try" if delivery["attempts"] == 1 else f"{delivery['attempts']} tries"
+    why = delivery["last_error"] or "no reason is known"
+    return (
+        f"The hook {delivery['hook']} was not told: given up after {tries}, {why} Mend it, then "
+        f"`shm alerts resend {alert_id}`."
+    )
 
 
 def _delivery_words(delivery: dict[str, Any]) -> str:

@@ -135,7 +135,7 @@ def rebaseline(
         with progress_bar("updating") as progress:
             made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
         all_alerts = store.alerts.list_all(hanger_id)
-    alerts = [each.id for each in all_alerts if each.acknowledgement is None]
+    alerts = [each.id for each in all_alerts if each.is_open]
     explained = [each.id for each in all_alerts if _is_explained_by(each, made)] if kind else []
     if as_json:
         of_event = {"kind": kind, "alerts_explained": explained, "alerts_open": alerts}

@@ -203,7 +203,7 @@ def _by_reason(not_applicable: Mapping[str, str]) -> dict[str, list[str]]:
 
 def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     alerts, deliveries = store.alerts.list_all(), store.alerts.delivery_counts()
-    open_at = Counter(each.alert.hanger for each in alerts if each.acknowledgement is None)
+    open_at = Counter(store.alerts.open_counts())
     counts = store.recordings.stage_counts()
     ended = sum(counts[stage] for stage in ENDED)
     held, now = store.recordings.list_holds(), utc_now()

@@ -289,12 +289,6 @@ class Jobs:
         beside = tests_beside(self.store, baseline, test)
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
-<<<<<<< HEAD
-=======
-        standing = self.store.alerts.list_all(hanger.id, baseline.id, standing=True)
-        is_of_gap = any("gap" in each.alert.kinds for each in standing)
-        stands = is_of_gap and gap_stands(baseline.posterior, current)
->>>>>>> leftovers
 
         def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on

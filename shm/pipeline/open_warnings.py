@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shm.report.open_warnings import open_warnings, standing_out
+from shm.report.open_warnings import nearly_slack, open_warnings, standing_out
 from shm.store import Store, Workspace
 from shm.store.checksums import of_readable
-from shm.values import Hanger
+from shm.values import TENSION, Hanger
 
 
 def warnings_of(
@@ -21,12 +21,24 @@ def warnings_of(
     baselines = store.watch.baselines_in_force(every)
     tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
     latest = of_readable(store.watch.latest, {})
+    now = store.posteriors.latest_trends(hangers)
+
+    def slack(hanger: Hanger) -> str:
+        watched = latest[hanger.id].watched if hanger.id in latest else None
+        if hanger.id not in now or watched is None:
+            return ""
+        level = hanger.thresholds.alert_probability
+        is_told = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        of_test = now[hanger.id].averaged.tension_n
+        return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
+
     return {
         hanger.id: open_warnings(
             hanger,
             baselines[hanger.id].check,
             standing_out(hanger, every, tensions),
             latest[hanger.id].watched if hanger.id in latest else None,
+            slack(hanger),
         )
         for hanger in hangers
         if hanger.id in baselines

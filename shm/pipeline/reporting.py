@@ -84,7 +84,7 @@ def structure_report(
         said=frequency_words(watched, structure),
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
-        open_alerts=sum(each.acknowledgement is None for each in alerts),
+        open_alerts=store.alerts.open_counts().get(number, 0),
         generated_at=generated_at,
         version=shm.__version__,
     )

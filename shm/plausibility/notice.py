@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from shm.plausibility.candidate import Candidate, frequency_change, implied_shift
 from shm.values import Doubt
 
+_OTHER_BAR = ("right hanger", "right planes", "right time base")
+"""Checks that modes fail which are not those of the hanger as it was."""
+
 
 def notice_of(
     candidate: Candidate,
@@ -22,7 +25,9 @@ def notice_of(
     a loss. Nor must the likeness to another hanger: there it is said of the case that it is wrong.
     """
     loss = "" if any(map(_is_of_others, doubts)) else _loss(candidate, others, counted)
-    if_own = "" if loss or any(doubt.check == "copy" for doubt in doubts) else _if_own(candidate)
+    if_own = ""
+    if not loss and not any(doubt.check == "copy" for doubt in doubts):
+        if_own = _if_own(candidate, is_of_other=any(d.check in _OTHER_BAR for d in doubts))
     states = "; ".join(doubt.state for doubt in doubts)
     end = "" if states.endswith("?") else "."
     held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}{end}"
@@ -53,16 +58,24 @@ def _is_of_others(doubt: Doubt) -> bool:
     return doubt.check.startswith(("copy", "right"))
 
 
-def _if_own(candidate: Candidate) -> str:
-    """What the modes would mean if they are the hanger's own after all."""
+def _if_own(candidate: Candidate, *, is_of_other: bool) -> str:
+    """What the modes would mean if they are the hanger's own after all.
+
+    A damaged hanger looks like another one: who discards the test unseen may discard the damage.
+    """
     hanger = candidate.hanger
     shift = implied_shift(candidate.test, candidate.reference, hanger)
     if not abs(shift) >= hanger.thresholds.tension_shift_fraction:
-        return ""
+        return (
+            f"If it is of hanger {hanger.id} after all, it has changed and may be damaged: "
+            "look at it before you discard the test, and repeat the test within a week. "
+            if is_of_other
+            else ""
+        )
     moved = "lost" if shift < 0 else "gained"
     return (
         f"If it is right as it was sent, hanger {hanger.id} has {moved} {100 * abs(shift):.0f} % "
-        "of its tension: repeat the test today. "
+        "of its tension: look at it before you discard the test, and repeat the test today. "
     )
 
 

@@ -86,9 +86,9 @@ def advice(data: BridgeReport) -> tuple[str, ...]:
     found = []
     if alert:
         found.append(f"Repeat the test of {named(alert)} within days, and inspect what stays.")
-    if watch:
-        found.append(f"Test {named(watch)} again soon.")
     found += [each for line in data.hangers for each in line.warnings]
+    if watch:
+        found.append(f"Test {named(watch)} again within a week.")
     if opened:
         found.append(f"Take note of the open alerts of {named(opened)} (shm alerts ack).")
     if wide := [line for line in data.hangers if line.is_hardly_known]:

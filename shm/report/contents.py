@@ -239,7 +239,7 @@ class HangerLine:
 
     `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
     it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
-    says in a few words what was called since; `open_alerts` counts those that nobody took note of.
+    says in a few words what was called since; `open_alerts` is `store.alerts.open_counts`.
     `course` is None without a period; `warnings` are the open ones.
     """
 

@@ -182,6 +182,12 @@ def _change(data: HangerReport) -> str:
     if shifted:
         return " ".join(_shift(drift) for drift in shifted)
     top = max(data.drifts, key=lambda drift: drift.probability)
+    if data.is_called and top.is_clearly_beyond:
+        return (
+            f"A change was detected; whether it is the {formatting.quantity(top.quantity)} that "
+            "changed is not settled. If it is, the shift is beyond its threshold of "
+            f"{threshold_cell(top)}."
+        )
     return (
         f"No quantity has surely moved beyond its threshold: the likeliest is "
         f"{formatting.quantity(top.quantity)}, with probability "

@@ -11,11 +11,15 @@ from collections.abc import Mapping, Sequence
 
 from shm.report.formatting import listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
+from shm.values.rounding import rounded_percent
 from shm.watch.alert_text import against_baseline_words
 from shm.watch.mistakes_text import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
+_MOST_LOST = (
+    0.5  # judgement: no season, load or wrong mode halves a tension; both intervals allowed
+)
 _NEIGHBOURS = 4  # nearest of its kind: judgement, two each way; loads of a bridge vary along it
 _FEWEST_NEIGHBOURS = 2  # of one neighbour nobody can say which of the two stands out
 
@@ -25,13 +29,14 @@ def open_warnings(
     check: BaselineCheck | None,
     neighbours: str = "",
     latest: WatchedTest | None = None,
+    slack: str = "",
 ) -> tuple[str, ...]:
     """Each a state, what to do, and why; empty where nothing is wrong.
 
     `check` is that of the baseline, `neighbours` what `standing_out` says of it, `latest` what the
-    watch says after the newest test.
+    watch says after the newest test, `slack` what `nearly_slack` says of that.
     """
-    found = []
+    found = [slack] if slack else []
     if check is not None and check.misfit:
         found.append(
             f"The baseline of hanger {hanger.id} does not fit: {check.misfit}. Check the "
@@ -56,6 +61,24 @@ def open_warnings(
     if notable:
         found.append(warning_words(notable, hanger))
     return tuple(found)
+
+
+def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:
+    """That the latest test alone reads most of the tension lost; "" where it does not.
+
+    A bar that carries next to nothing is as stiff as before, and the watch may put its frequencies
+    down to something else, or be unsure for want of tests. Where it `is_told` of the tension that
+    it is beyond its threshold, nobody need be told twice.
+    """
+    nominal_n = hanger.nominal_tension_n
+    if is_told or not nominal_n > 0 or not now.q95 < _MOST_LOST * baseline.q05:
+        return ""
+    half = (now.q95 - now.q05) / 2 / nominal_n
+    return (
+        f"Hanger {hanger.id} carries {rounded_percent(now.mean / nominal_n, half)} of its nominal "
+        "tension by its latest test alone: it may be going slack. Look at it and repeat the test "
+        "today. The watch is not yet sure that it is the tension that changed."
+    )
 
 
 def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[int, Summary]) -> str:

@@ -120,7 +120,7 @@ class DeliveryRow:
 
 @dataclass(frozen=True)
 class AlertRow:
-    """An alert without its shifts; it is open while nobody has acknowledged it."""
+    """An alert without its shifts; `StoredAlert.is_open` says which are open."""
 
     id: int
     hanger: int

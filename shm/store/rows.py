@@ -284,16 +284,18 @@ class Resolution(Note):
 
 @dataclass(frozen=True)
 class StoredAlert:
-    """An alert and when it was raised; it is open while nobody has acknowledged it.
-
-    Its condition stands while it has no resolution.
-    """
+    """An alert and when it was raised; its condition stands while it has no resolution."""
 
     id: int
     alert: Alert
     raised_at: datetime
     acknowledgement: Acknowledgement | None = None
     resolution: Resolution | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it waits for somebody: it stands, and nobody has acknowledged it."""
+        return self.acknowledgement is None and self.resolution is None
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ from shm.store.tables import (
     baselines,
     deliveries,
     resolutions,
+    steps,
     tests,
 )
 
@@ -55,6 +56,9 @@ _OWED = (
 _outbox = stored_alerts.add_columns(
     *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
 ).join(deliveries, deliveries.c.alert_id == alerts.c.id)
+_is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
+"""Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
+_closed_at = sa.func.coalesce(acknowledgements.c.at, resolutions.c.at)
 _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAITING))
 
 
@@ -92,17 +96,19 @@ class Alerts(Repository):
     ) -> tuple[AlertRow, ...]:
         """Alerts, the newest first; `before` is the number of the alert to go on after.
 
-        Only those that are open, or acknowledged, where `is_open` tells; acknowledged ones come
-        in the order in which they were, the latest first.
+        Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
+        latter come in the order in which they were, the latest first.
         """
-        place = acknowledgements.c.id if is_open is False else alerts.c.id
-        query = stored_alerts.order_by(place.desc())
+        query = stored_alerts
+        if is_open is False:
+            query = query.order_by(_closed_at.desc())
+        query = query.order_by(alerts.c.id.desc())
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
         if is_open is not None:
-            query = query.where(acknowledgements.c.id.is_(None) == is_open)
+            query = query.where(_is_open if is_open else sa.not_(_is_open))
         if before is not None:
-            query = query.where(place < _place(before, is_open))
+            query = query.where(_is_after(before, is_open=is_open))
         return self._alert_rows(query.limit(limit))
 
     def row(self, alert_id: int) -> AlertRow:
@@ -148,16 +154,22 @@ class Alerts(Repository):
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
         with self.reading() as connection:
-            raised = _count(connection, alerts)
-            noted = _count(connection, acknowledgements)
-        return raised - noted, noted
+            noted = connection.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
-        """How many alerts of each hanger nobody has acknowledged; hangers without are left out."""
-        query = sa.select(alerts.c.hanger, sa.func.count()).outerjoin(acknowledgements)
-        is_open = acknowledgements.c.id.is_(None)
+        """How many alerts of each hanger are open; hangers without any are left out.
+
+        The only place where they are counted: whoever states a number of them asks here.
+        """
+        query = (
+            sa.select(alerts.c.hanger, sa.func.count())
+            .select_from(alerts)
+            .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
+            .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
+        )
         with self.reading() as connection:
-            rows = connection.execute(query.where(is_open).group_by(alerts.c.hanger))
+            rows = connection.execute(query.where(_is_open).group_by(alerts.c.hanger))
             return {row[0]: int(row[1]) for row in rows}
 
     def list_hanger_events(
@@ -255,6 +267,33 @@ class Alerts(Repository):
                 waits = {"last_error": error, "next_attempt_at": next_attempt_at}
                 _note(connection, delivery, waits)
 
+    def resend(self, alert_id: int, at: datetime) -> tuple[Delivery, ...]:
+        """Owes an alert anew to the hooks that it was given up by, with the whole message that it
+        went as; the deliveries of the alert that wait again.
+
+        Raises NothingThere where there is none of that number, UsageError where none was given up.
+        """
+        given_up = deliveries.c.state == DeliveryState.GIVEN_UP
+        own = sa.select(deliveries.c.message_id).where(deliveries.c.alert_id == alert_id, given_up)
+        with self.writing() as connection:
+            _alert(connection, alert_id)
+            of_alert = sa.select(deliveries.c.id).where(deliveries.c.alert_id == alert_id, given_up)
+            ids = connection.scalars(of_alert).all()
+            if not ids:
+                raise UsageError(
+                    f"alert {alert_id} was given up by no hook.", remedy="See `shm alerts`."
+                )
+            messages = [each for each in connection.scalars(own) if each is not None]
+            again = given_up & (deliveries.c.message_id.in_(messages) | deliveries.c.id.in_(ids))
+            waits = {
+                "state": DeliveryState.WAITING,
+                "attempts": 0,
+                "next_attempt_at": at,
+                "ended_at": None,
+            }
+            connection.execute(sa.update(deliveries).where(again).values(**waits))
+        return self._deliveries(_outbox.where(deliveries.c.id.in_(ids)).order_by(deliveries.c.id))
+
     def delivery_counts(self) -> dict[str, int]:
         """How many deliveries stand in each state; see `counts_by_name`."""
         query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
@@ -281,15 +320,16 @@ class Alerts(Repository):
         return tuple(_row(row, tuple(owed[row.id])) for row in rows)
 
 
-def _count(connection: sa.Connection, table: sa.Table) -> int:
-    return int(connection.scalar(sa.select(sa.func.count()).select_from(table)) or 0)
-
-
-def _place(alert_id: int, is_open: bool | None) -> Any:
+def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
+    """Which alerts stand after one in a list of `list_rows`."""
+    older = alerts.c.id < alert_id
     if is_open is not False:
-        return alert_id
-    noted = sa.select(acknowledgements.c.id).where(acknowledgements.c.alert_id == alert_id)
-    return noted.scalar_subquery()
+        return older
+    tables = alerts.outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
+    tables = tables.outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
+    at = sa.select(_closed_at).select_from(tables).where(alerts.c.id == alert_id)
+    of_one = at.correlate(None).scalar_subquery()
+    return (_closed_at < of_one) | ((_closed_at == of_one) & older)
 
 
 def _alert(connection: Connection, alert_id: int) -> StoredAlert:
@@ -358,10 +398,26 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
         deliveries.c.state == DeliveryState.WAITING,
         deliveries.c.news == News.RAISED,
     )
-    if connection.execute(waiting).first() is None:
-        about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
-        row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+    if connection.execute(waiting).first() is not None:
+        return
+    about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
+    row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+    if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
         write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+
+
+def _notified_steps(connection: Connection, test_id: int) -> int:
+    of_test = (steps.c.test_id == test_id) & (steps.c.stage == NOTIFIED)
+    return int(connection.scalar(sa.select(sa.func.count()).where(of_test)) or 0)
+
+
+def _told_alerts(connection: Connection, test_id: int) -> int:
+    """Alerts of a test that no hook is owed any more: one that is sent again was told before."""
+    raised = (deliveries.c.alert_id == alerts.c.id) & (deliveries.c.news == News.RAISED)
+    waiting = raised & (deliveries.c.state == DeliveryState.WAITING)
+    told = sa.exists().where(raised) & ~sa.exists().where(waiting)
+    query = sa.select(sa.func.count()).select_from(alerts)
+    return int(connection.scalar(query.where(alerts.c.test_id == test_id, told)) or 0)
 
 
 def _delivery(row: Row[Any]) -> Delivery:

@@ -12,7 +12,7 @@ import pytest
 
 from shm.models import THESIS, build
 from shm.plausibility import CHECKS, Candidate, Check, doubts_about, implied_shift, notice_of
-from shm.values import Fingerprint, Hanger, KnownSamples
+from shm.values import Doubt, Fingerprint, Hanger, KnownSamples
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test
 
@@ -79,6 +79,21 @@ def test_a_doubt_says_what_is_the_matter_what_to_do_and_why(check: str) -> None:
         assert part in message
     assert ("repeat the test today" in message.lower()) is (check in SHIFTED)
     assert len(re.split(r"[.?] ", message, maxsplit=1)[0].split()) <= 25
+
+
+@pytest.mark.parametrize("check", ["right hanger", "right planes"])
+def test_who_may_discard_a_test_of_another_bar_is_told_that_the_hanger_may_be_damaged(
+    check: str,
+) -> None:
+    # Its tension is as it was: the modes fit the hanger no more for another reason.
+    doubt = Doubt(
+        check, "the modes fit hanger 4: right hanger?", "Drop it again", "Probability 0.9."
+    )
+    message = notice_of(PLAIN, [doubt], 12, [])
+    assert "If it is of hanger 3 after all, it has changed and may be damaged" in message
+    assert "look at it before you discard the test" in message
+    copied = replace(doubt, check="copy")
+    assert "damaged" not in notice_of(PLAIN, [copied], 12, [])
 
 
 @pytest.mark.parametrize("share", [0.8, 0.9, 0.95, 1.0, 1.1])

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from shm.report.hanger_status import Status, findings, status_of
-from shm.report.open_warnings import open_warnings, standing_out
+from shm.report.open_warnings import nearly_slack, open_warnings, standing_out
 from shm.values import (
     Alert,
     AlertKind,
@@ -54,6 +54,27 @@ def row(*shares: float, families: str = "") -> str:
     families = families or "a" * len(shares)
     hangers = [replace(HANGER_3, id=n, family=f) for n, f in enumerate(families)]
     return standing_out(hangers[2], hangers, {n: tension(each) for n, each in enumerate(shares)})
+
+
+@pytest.mark.parametrize(
+    ("now", "is_told", "is_said"),
+    [
+        (0.03, False, True),
+        (0.03, True, False),  # the alert says it
+        (0.6, False, False),
+        (0.49, False, False),  # its interval reaches beyond half
+    ],
+)
+def test_a_hanger_that_is_nearly_slack_by_its_own_test_is_said_first(
+    now: float, is_told: bool, is_said: bool
+) -> None:
+    said = nearly_slack(HANGER_3, tension(1.0), tension(now), is_told=is_told)
+    assert bool(said) is is_said
+    if is_said:
+        assert said.startswith("Hanger 3 carries 3.0 ± 2.0 % of its nominal tension by its latest")
+        assert len(said.split(":")[0].split()) <= 25
+        assert "today" in said
+        assert open_warnings(HANGER_3, None, slack=said) == (said,)
 
 
 def test_a_mode_left_out_of_a_baseline_that_fits_is_no_warning() -> None:

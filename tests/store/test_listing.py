@@ -24,6 +24,7 @@ from shm.store import (
     StoredWatch,
     TestRow,
 )
+from shm.store.outbox import resolve
 from shm.values import Selection
 from tests.helpers.nouns import (
     NOW,
@@ -200,6 +201,23 @@ def test_open_alerts_are_counted_by_hanger(store: Store) -> None:
     for alert in store.alerts.list_all(3):
         store.alerts.acknowledge(alert.id, "engineer", "seen", NOW)
     assert store.alerts.open_counts() == {4: 3}
+    assert store.alerts.counts() == (3, 2)
+
+
+def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> None:
+    raise_alerts(store)
+    with store.engine.begin() as connection:
+        resolve(connection, 2, "shm", "two visits agree", NOW)
+        resolve(connection, 6, "shm", "two visits agree", NOW + timedelta(days=2))
+    store.alerts.acknowledge(3, "engineer", "seen", NOW + timedelta(days=1))
+    assert store.alerts.open_counts() == {3: 2, 4: 1}
+    assert store.alerts.counts() == (3, 1)
+    opened, others = (store.alerts.list_rows(is_open=each) for each in (True, False))
+    assert numbers(opened) == [5, 4, 1]
+    assert numbers(others) == [6, 3, 2]
+    assert numbers(store.alerts.list_rows(is_open=False, before=6)) == [3, 2]
+    assert numbers(store.alerts.list_rows(is_open=False, before=3)) == [2]
+    assert [each.id for each in store.alerts.list_all() if each.is_open] == [1, 4, 5]
 
 
 def raise_alerts(store: Store) -> None:

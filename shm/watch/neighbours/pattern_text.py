@@ -75,15 +75,15 @@ def _each(pattern: BridgePattern) -> str:
     moved = [row for row in pattern.rows if row.way != "unchanged"]
     if len(moved) == 1:
         return (
-            f"Hanger {moved[0].hanger} has {_way(moved[0], pattern)}, and its neighbours do not "
-            "answer for it: look at its sensor, its clamps and its description before the bridge."
+            f"Hanger {moved[0].hanger} has {_way(moved[0], pattern)}, and its neighbours did "
+            "not take it up: check its sensor, its clamps and its description first, then itself."
         )
     if not moved:
         return "Some hangers moved a little, each by itself: test again to see which."
     told = [f"{row.hanger}: {_force(row.shift_n, pattern, '+')}" for row in moved]
     return (
-        f"{len(moved)} hangers moved, each by itself and not as shed load would ({_listed(told)}): "
-        "compare their tests, sensors and descriptions before the bridge."
+        f"{len(moved)} hangers moved, and their neighbours did not take it up ({_listed(told)}): "
+        "check their tests, sensors and descriptions first, then the hangers themselves."
     )
 
 

@@ -1,5 +1,5 @@
-"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that nobody has
-acknowledged, then the others.
+"""Alerts: listed and taken note of over HTTP, and their page, some at a time: those that are open,
+then the others.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def alerts_page(
 ) -> Response:
     """Alerts of all hangers or of one, the newest first.
 
-    `open_before` goes on among the open ones alone, `noted_before` among those acknowledged.
+    `open_before` goes on among the open ones alone, `noted_before` among the others.
     """
     opened, older_open = _some(site, hanger, open_before, is_open=True)
     noted, older_noted = _some(site, hanger, noted_before, is_open=False)
@@ -89,7 +89,9 @@ def alerts(
     site: AtSite,
     _: Reader,
     hanger: Number = None,
-    open: Annotated[bool, Query(description="Only those nobody has acknowledged.")] = False,
+    open: Annotated[
+        bool, Query(description="Only those that stand and that nobody has acknowledged.")
+    ] = False,
     limit: Annotated[
         int | None,
         Query(ge=1, le=MOST_ROWS, description="So many of the newest, the newest first."),
