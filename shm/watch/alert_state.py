@@ -21,7 +21,8 @@ class AlertState:
     of a further change, no longer of that one. `mistaken` are the modes that the last tests have
     wrong, `noted` those of them that were told, `alone` whether it was told that the baseline
     stands alone. `agreed` are those of `beyond` that two tests told which agree: to the watch they
-    were improbable all along.
+    were improbable all along. `fading` says since when those of `beyond` look over that must do so
+    on another day, too.
     """
 
     beyond: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
@@ -32,6 +33,7 @@ class AlertState:
     noted: frozenset[tuple[Plane, int]] = frozenset()
     alone: bool = False
     agreed: frozenset[tuple[str, Way]] = frozenset()
+    fading: Mapping[tuple[str, Way], datetime] = field(default_factory=dict)
 
     def to_text(self) -> str:
         """JSON, from which `from_text` makes an equal one."""
@@ -45,6 +47,7 @@ class AlertState:
                 "noted": sorted(self.noted),
                 "alone": self.alone,
                 "agreed": sorted(self.agreed),
+                "fading": [[*condition, since] for condition, since in self.fading.items()],
             },
             default=datetime.isoformat,
         )
@@ -56,9 +59,17 @@ class AlertState:
             return cls()
         try:
             kept = json.loads(text)
-            beyond = value_of(tuple[tuple[str, Way, datetime], ...], kept["beyond"])
+            beyond, fading = (
+                {
+                    (quantity, way): at
+                    for quantity, way, at in value_of(
+                        tuple[tuple[str, Way, datetime], ...], kept[name]
+                    )
+                }
+                for name in ("beyond", "fading")
+            )
             return cls(
-                {(quantity, way): at for quantity, way, at in beyond},
+                beyond,
                 kept["call"] and value_of(datetime, kept["call"]),
                 value_of(tuple[Change, ...], kept["called"]),
                 int(kept["odd"]),
@@ -66,6 +77,7 @@ class AlertState:
                 frozenset(value_of(tuple[tuple[Plane, int], ...], kept["noted"])),
                 bool(kept["alone"]),
                 frozenset(value_of(tuple[tuple[str, Way], ...], kept["agreed"])),
+                fading,
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(

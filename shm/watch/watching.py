@@ -34,6 +34,7 @@ from shm.values import (
     RepeatedMistake,
     WatchedTest,
 )
+from shm.values.drift import OF_ONE_VISIT
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState
 from shm.watch.alert_text import message_of, message_of_odd, short_name
@@ -274,12 +275,13 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
 
 
 def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """What still stands at a test, its probability not below `end`; unknown ones end nothing.
+    """What still stands at a test: all but what tests of two visits have below `end`.
 
-    What two tests that agree have told was improbable to the watch all along: it ends once the
-    shift has come back, too.
+    A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two tests
+    that agree have told was improbable to the watch all along: it ends once the shift has come
+    back, too.
     """
-    ended = {
+    over = {
         (drift.quantity, way)
         for drift in test.drifts
         for way in ("up", "down")
@@ -289,10 +291,14 @@ def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
             and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
         )
     }
+    fading = {each: told.fading.get(each, test.time) for each in told.beyond if each in over}
+    ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
     beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
+    fading = {each: since for each, since in fading.items() if each in beyond}
+    agreed = told.agreed - ended
     if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=told.agreed - ended)
-    return replace(told, beyond=beyond, agreed=told.agreed - ended)
+        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=agreed, fading=fading)
+    return replace(told, beyond=beyond, agreed=agreed, fading=fading)
 
 
 def _probability(drift: Drift, way: Way) -> float:

@@ -119,14 +119,24 @@ def test_a_probability_that_hovers_about_the_level_rings_once() -> None:
 
 
 def test_a_condition_that_ended_below_half_the_level_can_ring_anew() -> None:
-    again = [day(n, probability=p) for n, p in enumerate((0.96, 0.47, 0.94, 0.96))]
-    assert [name for name, _ in told(*again)] == ["t0", "t3"]
+    again = [day(2 * n, probability=p) for n, p in enumerate((0.96, 0.47, 0.46, 0.94, 0.96))]
+    assert [name for name, _ in told(*again)] == ["t0", "t8"]
+
+
+@pytest.mark.parametrize(
+    "days", [{0: 0.96, 4: 0.1, 8: 0.97}, {0: 0.96, 4: 0.1, 5: 0.1, 8: 0.97}], ids=["one", "two"]
+)
+def test_one_visit_ends_nothing_that_was_told(days: dict[int, float]) -> None:
+    """A van that unloads a hanger for a day: the loss that stands beneath it rings no second time,
+    and its alert stays."""
+    assert [name for name, _ in told(*(day(n, probability=p) for n, p in days.items()))] == ["t0"]
 
 
 def test_the_level_and_its_half_are_those_of_the_hanger() -> None:
     careful = replace(HANGER_3, thresholds=Thresholds(alert_probability=0.6))
-    watched = [day(n, probability=p) for n, p in enumerate((0.6, 0.31, 0.7, 0.29, 0.7))]
-    assert [alert.test for alert in alerts_of(watched, careful)] == ["t0", "t4"]
+    chances = enumerate((0.6, 0.31, 0.31, 0.7, 0.29, 0.29, 0.7))
+    watched = [day(2 * n, probability=p) for n, p in chances]
+    assert [alert.test for alert in alerts_of(watched, careful)] == ["t0", "t12"]
 
 
 def test_an_unknown_probability_neither_raises_nor_ends() -> None:
