@@ -85,7 +85,9 @@ def sound_modes(
     misfit = np.array([each.scores(none)[0] for each in wide])
     odds = math.log(_MISFIT / (1 - _MISFIT) / len(wide))
     if mistaken.sum() > MOST_MISTAKEN * count or np.logaddexp.reduce(misfit) + odds > log_evidence:
-        x = wide[int(misfit.argmax())].most_probable(none[0])
+        # Who goes on from there may find that it fits: mistakes must not pull at it.
+        few = np.where(sets.sum(axis=1) <= MOST_MISTAKEN * count, scores, -np.inf)
+        x = problem.most_probable(sets[int(few.argmax())])
         return SoundModes(~none[0], x, log_evidence, is_misfit=True)
     return SoundModes(~mistaken, problem.most_probable(sets[best]), log_evidence)
 
