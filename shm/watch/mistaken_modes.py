@@ -25,7 +25,7 @@ MOST_MISTAKEN = 1 / 3  # judgement: where more modes fit no state, it is the tes
 _SMALL_SETS = 2
 # Of tests so many are of a bar that its class does not describe, all of whose modes lie off by a
 # little: judgement, a joint or a fitting that is new. By how much, from a percent on: technical.
-_MISFIT, _MISFIT_SDS = 0.03, (0.01, 0.02, 0.04)
+_MISFIT, _MISFIT_SDS = 0.001, (0.01, 0.02, 0.04)
 
 
 def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
