@@ -169,6 +169,7 @@ def watch_newest(
         are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
         if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not told.beyond:
             agreed = first_tests_against(reader, later[-1], beside, hanger, options)
+            told = replace(told, alone=told.alone or agreed is not None)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
