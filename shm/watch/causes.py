@@ -187,8 +187,11 @@ def structure_of(
     )
     strength, axes = np.linalg.eigh(columns.sensors)
     kept = strength > _SEEN_OF_SENSORS * strength[-1]
+    # A joint that gives for a day does so along what it does as it loosens.
+    loosening = np.vstack([np.zeros((0, n)), *columns.loosening])
     scattering = np.hstack(
         [
+            options.spring_scatter_of_step * loosening.T,
             axes[:, kept] * np.sqrt(strength[kept]),
             columns.by_cause[BENDING_STIFFNESS][0].T,
             np.ones((n, 1)),
@@ -198,7 +201,7 @@ def structure_of(
     sds = np.concatenate(
         [
             np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
-            np.ones(int(kept.sum())),
+            np.ones(len(loosening) + int(kept.sum())),
             [options.bending_scatter / _STIFFER, options.clock_scatter],
             np.full(n, options.mode_scatter),
         ]
