@@ -29,12 +29,13 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput, UsageError
-from shm.read import assemble, frequency_text
+from shm.read import assemble, frequency_text, logger_text
 from shm.read.atomic import replace_text
 from shm.read.base import Format, Peek, names_in
 from shm.read.comma_header import Heading, parse_heading
 from shm.read.content import is_text, text_of
 from shm.read.header import mass_entries
+from shm.read.logger_text import LoggerTable
 from shm.read.sidecar import with_sidecar
 from shm.read.table import REMEDY, evened, parse_table, rate_of, rows_in
 from shm.read.units import ACCELERANCE, SI
@@ -48,6 +49,9 @@ def _read(path: Path) -> Recording | FrequencyResponse:
     responses = frequency_text.parse(text, path)
     if responses is not None:
         return frequency_text.read(responses, path)
+    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path)
+    if logged is not None:
+        return _logged(logged, path)
     heading = parse_heading(text, path)
     table, rate = parse_table(heading, path), NAN
     if heading.has_time:
@@ -60,12 +64,28 @@ def _peek(path: Path) -> Peek:
     responses = frequency_text.parse(text, path)
     if responses is not None:
         return frequency_text.peek(responses, FORMAT.name, path)
+    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path)
+    if logged is not None:
+        return _logged_peek(logged, FORMAT.name, path)
     heading = parse_heading(text, path)
     rows = rows_in(heading.body)
     header = with_sidecar(heading.header, path)
     return assemble.peeked(
         header, FORMAT.name, rows, lambda: _rate(heading, path), path, heading.remarks
     )
+
+
+def _logged(table: LoggerTable, path: Path) -> Recording:
+    """A recording of what any logger's text holds."""
+    header, used, _ = logger_text.header_of(table, path)
+    rate = logger_text.told_rate(table, header, path)
+    return assemble.recording(header, logger_text.values(table, used), path, rate)
+
+
+def _logged_peek(table: LoggerTable, file_format: str, path: Path) -> Peek:
+    header, _, out = logger_text.header_of(table, path)
+    rate = logger_text.told_rate(table, header, path)
+    return assemble.peeked(header, file_format, table.samples, lambda: rate, path, left_out=out)
 
 
 def _rate(heading: Heading, path: Path) -> float:
