@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -21,55 +20,22 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
+from shm.read import assemble
 from shm.read import logger_words as words
+from shm.read.base import Peek
 from shm.read.comma_header import LINE_BREAK, cells_of, mark_between
 from shm.read.header import Entry, Header, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said
 from shm.read.logger_rows import Block, block_of, script_of, values_of
+from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.logger_times import Clock, clock_of
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.stamps import moment, parsed
-from shm.values import NAN, FloatArray
+from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
 _HEAD = 20_000  # characters in which a heading of our own says so
-
-
-@dataclass(frozen=True, eq=False)
-class LoggerColumn:
-    """A column as recorded: `values` (samples,) in `unit` ("" where the file says none), NaN where
-    bad, of which `overloads` were beyond what the logger can record.
-    """
-
-    name: str
-    unit: str
-    values: FloatArray
-    overloads: int = 0
-    sensitivity: words.Sensitivity | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class LoggerTable:
-    """What a logger's text says: columns but those of times and counters, and facts of the whole.
-
-    `said_rate_hz` is what the preamble says, `times_rate_hz` what the column of times tells, NaN
-    without. `layout` are the words by which files of one logger are known.
-    """
-
-    columns: tuple[LoggerColumn, ...]
-    said_rate_hz: float
-    times_rate_hz: float
-    hanger: int | None
-    time: datetime | None
-    temperature_c: float
-    names_line: int
-    layout: tuple[str, ...]
-    remarks: tuple[str, ...]
-
-    @property
-    def samples(self) -> int:
-        return len(self.columns[0].values) if self.columns else 0
 
 
 def is_ours(text: str) -> bool:
@@ -100,8 +66,10 @@ _OUR_KEYS = {
 }  # fmt: skip
 
 
-def parse(text: str, path: Path) -> LoggerTable | None:
+def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | None:
     """What a logger's text says; None where nothing in it looks like rows of numbers.
+
+    `preamble` are lines that are said elsewhere, as on another sheet of a workbook.
 
     Raises BadInput naming line and column for rows that are damaged, and for times that are uneven.
     """
@@ -111,7 +79,7 @@ def parse(text: str, path: Path) -> LoggerTable | None:
     if script is None or block is None:
         return None
     refuse_long_header(sum(map(len, block.above)), path)
-    heading = heading_of(block.above, script)
+    heading = heading_of((*preamble, *block.above), script)
     _refuse_split_decimals(heading, block, path)
     rate = rate_said(heading.facts, script.decimal)
     clock = clock_of(heading, block, rate, path)
@@ -127,7 +95,7 @@ def parse(text: str, path: Path) -> LoggerTable | None:
         hanger=_hanger(heading, path),
         time=clock.start or _time(heading),
         temperature_c=_temperature(heading, script.decimal),
-        names_line=heading.names_line,
+        names_line=max(0, heading.names_line - len(preamble)),
         layout=_layout(heading, block),
         remarks=(*clock.remarks, *block.remarks),
     )
@@ -254,7 +222,21 @@ def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
     return {key: Entry(value, path, line or None) for key, value in said.items() if value}
 
 
-def values(table: LoggerTable, used: Sequence[int]) -> FloatArray:
+def recording(table: LoggerTable, path: Path) -> Recording:
+    """The recording that a table holds, described by file and sidecar; raises BadInput."""
+    header, used, _ = header_of(table, path)
+    rate = told_rate(table, header, path)
+    return assemble.recording(header, _values(table, used), path, rate)
+
+
+def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
+    """What the headers say; faults become problems."""
+    header, _, out = header_of(table, path)
+    rate = told_rate(table, header, path)
+    return assemble.peeked(header, file_format, table.samples, lambda: rate, path, left_out=out)
+
+
+def _values(table: LoggerTable, used: Sequence[int]) -> FloatArray:
     """The values of channels (channels, samples), as recorded."""
     if not used:
         return np.zeros((0, table.samples))
