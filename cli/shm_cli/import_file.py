@@ -23,20 +23,25 @@ from shm.pipeline.importing import (
     look_into,
     understand,
 )
+from shm.pipeline.lineage import read_limits
 from shm.read.logger_words import measured_unit, seconds_of, sensitivity_of, volts_of
+from shm.read.modal_sets import ForeignModes
 from shm.read.profiles import Profile
+from shm.read.sandbox import foreign_modes
 from shm.read.units import KNOWN
 from shm.store import Workspace
-from shm.values import PLANES
+from shm.values import PLANES, Plane
 from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.held import Time
+from shm_cli.import_modes import import_modes
 from shm_daemon.landing import Landed, incoming
 
 _BARS = " ▁▂▃▄▅▆▇█"
-_PLANES = {
+_PLANES: dict[str, Plane] = {
     **{plane: plane for plane in PLANES}, "t": PLANES[0], "quer": PLANES[0], "l": PLANES[1],
     "längs": PLANES[1], "laengs": PLANES[1],
 }  # fmt: skip
+UFF_SUFFIXES = (".uff", ".unv", ".uf")
 _UNKNOWN = ("unknown", "-", "?")
 
 
@@ -60,9 +65,7 @@ _UNKNOWN = ("unknown", "-", "?")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @json_option
 @click.pass_context
-def command(
-    ctx: click.Context, file: Path, dry_run: bool, as_json: bool, **said: Any
-) -> int:
+def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **said: Any) -> int:
     """Take a logger's file in for the first time, asking only what it does not say.
 
     Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
@@ -76,10 +79,17 @@ def command(
     Example: shm import export.csv --hanger 3 --place 4.2,4.2 --plane transverse,longitudinal
     """
     workspace = open_workspace(ctx)
+    asks = not as_json and sys.stdin.isatty() and sys.stdout.isatty()
     first = look_into(file, workspace, _whole_file(said))
+    modes = None if first.columns else _modes_in(file, workspace)
+    if modes is not None:
+        return import_modes(
+            modes, workspace, _whole_file(said), said["plane"], plane_named,
+            dry_run=dry_run, as_json=as_json, asks=asks,
+        )  # fmt: skip
     answers = _answers(said, first)
     found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
-    if found.questions and not as_json and sys.stdin.isatty() and sys.stdout.isatty():
+    if found.questions and asks:
         _show(found)
         answers = _asked(found.questions, answers, found)
         found = understand(found.survey, workspace, answers)
@@ -95,6 +105,12 @@ def command(
     return 0 if found.is_ready else BadInput.exit_code
 
 
+def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
+    """Modes of another program, where a UFF file holds nothing else that is read."""
+    is_universal = any(part in file.name.lower() for part in UFF_SUFFIXES)
+    return foreign_modes(file, read_limits(workspace.settings)) if is_universal else None
+
+
 # ---------------------------------------------------------------- answers
 
 
@@ -102,7 +118,9 @@ def _whole_file(said: dict[str, Any]) -> Answers:
     """What the options say of the whole file."""
     rate, temperature = said["rate"], said["temperature"]
     if rate is not None and not 0 < rate < math.inf:
-        raise UsageError(f"--rate {rate:g} is no rate.", remedy="Give samples a second: --rate 512.")
+        raise UsageError(
+            f"--rate {rate:g} is no rate.", remedy="Give samples a second: --rate 512."
+        )
     time: datetime | None = said["time"]
     return Answers(
         said["hanger"],
@@ -141,7 +159,7 @@ def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[
 def _named(
     option: str, values: Sequence[str], names: Sequence[str], in_order: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Pairs of name and value: NAME=VALUE, or values in the order of the sensors, or one for all."""
+    """Names and values: NAME=VALUE, or values in the order of the sensors, or one for all."""
     found: list[tuple[str, str]] = []
     plain: list[str] = []
     for value in values:
@@ -175,15 +193,20 @@ def _of_sensor(about: str, text: str, recorded_in: str) -> dict[str, object]:
     if about == "place":
         return {"x_m": "" if text.lower() in _UNKNOWN else _metres(text)}
     if about == "plane":
-        plane = _PLANES.get(text.lower())
-        if plane is None:
-            raise UsageError(f"{text!r} is no plane.", remedy=f"Give {' or '.join(PLANES)}.")
-        return {"plane": plane}
+        return {"plane": plane_named(text)}
     if about == "unit":
         if measured_unit(text) is None and seconds_of(text) is None:
             raise UsageError(f"{text!r} is no unit that is read.", remedy=f"Give one of {KNOWN}.")
         return {"unit": text}
     return _calibrated(text, recorded_in)
+
+
+def plane_named(text: str) -> Plane:
+    """The plane that a person means; raises UsageError."""
+    plane = _PLANES.get(text.lower())
+    if plane is None:
+        raise UsageError(f"{text!r} is no plane.", remedy=f"Give {' or '.join(PLANES)}.")
+    return plane
 
 
 def _metres(text: str) -> float:

@@ -32,6 +32,7 @@ from shm_daemon.spool import LEFT_ALONE
 _LEFTOVER_S = 86400.0  # judgement: a day; no sender that is cut off after a minute is at it still
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
+
 @dataclass(frozen=True)
 class Landed:
     """A file that is safe in the spool."""

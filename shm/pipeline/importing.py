@@ -206,9 +206,7 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
 # ---------------------------------------------------------------- what is open
 
 
-def _questions(
-    found: Survey, described: Described, hanger: object, rate: float
-) -> list[Question]:
+def _questions(found: Survey, described: Described, hanger: object, rate: float) -> list[Question]:
     asked: list[Question] = []
     if hanger is None:
         asked.append(Question("hanger", "", "Which hanger was tested?", "--hanger N"))
@@ -282,7 +280,8 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
     name, quoted = column.name, shlex.quote(column.name)
     asked = []
     if math.isnan(column.x_m) and "x_m" not in {
-        *described.get("channel", {}).get(name, {}), *described
+        *described.get("channel", {}).get(name, {}),
+        *described,
     }:
         text = f"Where is {name}, in m from the deck end (or 'unknown')?"
         asked.append(Question("place", name, text, f"--place {quoted}=M"))
@@ -303,7 +302,7 @@ def _recording(
         columns = [_told(column, described) for column in found.columns]
         used = [c for c in columns if c.quantity is not None and c.values is not None]
         header = Header(path, {c.name: _entries(c, path) for c in used})
-        values = np.array([c.values for c in used]).reshape(len(used), -1)
+        values = np.array([c.values for c in used]).reshape(len(used), found.samples)
         return recording(header, values, path, rate), ""
     except BadInput as error:
         return None, str(error)

@@ -48,9 +48,7 @@ def _read(path: Path) -> Recording | FrequencyResponse:
     return read_text(text_of(path), path)
 
 
-def read_text(
-    text: str, path: Path, preamble: Sequence[str] = ()
-) -> Recording | FrequencyResponse:
+def read_text(text: str, path: Path, preamble: Sequence[str] = ()) -> Recording | FrequencyResponse:
     """What a text holds, with lines that a workbook says elsewhere; raises BadInput."""
     responses = frequency_text.parse(text, path)
     if responses is not None:

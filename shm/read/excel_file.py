@@ -71,8 +71,8 @@ def _sheets(path: Path) -> dict[str, list[str]]:
 def _lines(sheet: object, path: Path) -> list[str]:
     """The rows of a sheet as lines, empty ones kept so that line numbers are those of the rows."""
     lines: list[str] = []
-    for row in sheet.iter_rows(max_col=_MOST_COLUMNS, values_only=True):  # type: ignore[attr-defined]
-        lines.append("\t".join(map(_cell, row)).rstrip())
+    for row in sheet.iter_rows(values_only=True):  # type: ignore[attr-defined]
+        lines.append("\t".join(map(_cell, row[:_MOST_COLUMNS])).rstrip())
         if len(lines) % 10_000 == 0:
             refuse_many_samples(len(lines), path)
     while lines and not lines[-1]:

@@ -15,8 +15,10 @@ from shm.read.logger_rows import Script, is_number, number_of
 from shm.read.stamps import parsed
 from shm.values import NAN
 
-_NAME_LABELS = {"name", "names", "channel", "channels", "channelname", "kanal", "kanalname", "kanäle",
-    "signal", "signalname", "sensor", "messstelle", "bezeichnung", "label", "channellabel"}  # fmt: skip
+_NAME_LABELS = {
+    "name", "names", "channel", "channels", "channelname", "kanal", "kanalname", "kanäle", "signal",
+    "signalname", "sensor", "messstelle", "bezeichnung", "label", "channellabel",
+}  # fmt: skip
 _UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "yunitlabel", "physicalunit", "dim",
     "dimension", "engineeringunits", "eu", "phyeinheit"}  # fmt: skip
 _KEY = re.compile(r"\s*[:=]\s+|\s*=\s*|:\s*(?=\D|\d+(?:[.,]\d+)?\s*$)")
@@ -66,9 +68,7 @@ def heading_of(above: Sequence[str], script: Script) -> Heading:
         if place not in taken and (fact := _fact(line, script)) is not None
     ]
     names = _unlike(tuple(name for name, _ in split))
-    return Heading(
-        names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1
-    )
+    return Heading(names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1)
 
 
 def _cells(line: str, script: Script) -> list[str]:
@@ -181,7 +181,9 @@ def _fact(line: str, script: Script) -> tuple[str, str] | None:
 def _joined(cells: Sequence[str], script: Script) -> str:
     """A value with its unit, or the first of several."""
     more = cells[1] if len(cells) > 1 and not is_number(cells[1], script.decimal) else ""
-    return f"{cells[0]} {more}".strip() if words.is_unit(more) or _HERTZ.fullmatch(more) else cells[0]
+    return (
+        f"{cells[0]} {more}".strip() if words.is_unit(more) or _HERTZ.fullmatch(more) else cells[0]
+    )
 
 
 def _with_unit(key: str, value: str) -> tuple[str, str]:

@@ -26,17 +26,20 @@ Kind = Literal["number", "stamp", "text", "empty"]
 _SAMPLE_LINES = 60  # judgement: enough that a bad line or two do not decide
 _MOST_PREAMBLE = 2000  # judgement: lines; the longest heading of a logger has some hundred
 _SHARE = 0.9
-_MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nv", "#nv", "invalid",
-    "ungültig", "-nan", "1.#qnan", "-1.#ind", "nan.0", "bad"}  # fmt: skip
+_MISSING = {
+    "", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nv", "#nv", "invalid", "bad",
+    "ungültig", "-nan", "1.#qnan", "-1.#ind", "nan.0", "#div/0!", "#value!", "#num!", "#ref!",
+}  # fmt: skip
 _OVER = re.compile(
-    r"[+-]?(ov(e?r)?(l|ld|f|flow|range|load)?|over[ -_]?(range|load|flow|fl)?|ol|o\.l\.?|inf(inity)?|∞"
+    r"[+-]?(ov(e?r)?(l|ld|f|flow|range|load)?|over[ _-]?(range|load|flow|fl)?|ol|o\.l\.?|∞"
+    r"|inf(inity)?"
     r"|1\.#inf|überlauf|ueberlauf|übersteuert|uebersteuert|clip(ped)?|sat|max|\*{2,}|#{2,}|9\.9e\+?37)"
     r"(\.0*)?",
     re.IGNORECASE,
 )
 _REMARK = "#"
 _BLANKS = re.compile(r"[ \u00a0\u202f]+")
-_GROUPS = r"[ \u00a0\u202f'’]"
+_GROUPS = r"[ \u00a0\u202f'\u2019]"
 _NUMBERS = {
     ".": re.compile(
         rf"(?=[+-]?[.,]?\d)[+-]?(?:\d{{1,3}}(?:,\d{{3}})+|\d{{1,3}}(?:{_GROUPS}\d{{3}})+|\d+)?(?:\.\d*)?(?:[eEdD][+-]?\d+)?"
@@ -249,7 +252,7 @@ def _no_row(
             "a second record begins here, with a heading of its own.",
             file=path,
             line=line,
-            remedy="Export each recording to a file of its own; `shm ingest --together` joins hits.",
+            remedy="Export each recording to a file of its own; `ingest --together` joins them.",
         )
     return BadInput(
         f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
@@ -276,9 +279,7 @@ def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
         elif is_over(text):
             over += 1
         elif not is_gap(text):
-            raise _no_row(
-                block.rows[place], block.lines[place], block.above, block.script, path
-            )
+            raise _no_row(block.rows[place], block.lines[place], block.above, block.script, path)
     return values, over
 
 

@@ -61,8 +61,8 @@ def _names_bare(line: str, below: str) -> bool:
 
 
 _OUR_KEYS = {
-    "hanger", "temperature_c", "added_mass_kg", "added_mass_at_m", "sampling_rate_hz", "unit", "x_m",
-    "plane", "calibration", "full_scale", "leave_out",
+    "hanger", "temperature_c", "added_mass_kg", "added_mass_at_m", "sampling_rate_hz", "unit",
+    "x_m", "plane", "calibration", "full_scale", "leave_out",
 }  # fmt: skip
 
 
@@ -101,9 +101,7 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     )
 
 
-def _column(
-    heading: Heading, block: Block, clock: Clock, place: int, path: Path
-) -> LoggerColumn:
+def _column(heading: Heading, block: Block, clock: Clock, place: int, path: Path) -> LoggerColumn:
     values, overloads = values_of(block, place, path)
     return LoggerColumn(
         heading.names[place],
@@ -120,7 +118,7 @@ def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
     if script.mark != "," or script.quoted or not block.above:
         return
     named = max((len([c for c in script.cells(line) if c]) for line in block.above[-3:]), default=0)
-    if 1 < named and len(script.kinds) in (2 * named, 2 * named - 1) and heading.names_line == 0:
+    if named > 1 and len(script.kinds) in (2 * named, 2 * named - 1) and heading.names_line == 0:
         raise BadInput(
             f"{len(script.kinds)} values in a row under {named} names: commas part the columns and"
             " the decimals too.",

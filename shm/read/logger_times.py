@@ -80,9 +80,7 @@ def _is_counter(heading: Heading, block: Block, place: int, path: Path) -> bool:
     return bool(len(steps) and np.all(steps == steps[0]) and steps[0] > 0)
 
 
-def _nameless_times(
-    heading: Heading, block: Block, counters: list[int], path: Path
-) -> list[int]:
+def _nameless_times(heading: Heading, block: Block, counters: list[int], path: Path) -> list[int]:
     """A nameless first column in even steps of less than one: times, as nothing counts so."""
     first = counters[0]
     values, _ = values_of(block, first, path)

@@ -1,4 +1,4 @@
-"""What the words of loggers mean, in German and English: units, names of columns, keys of preambles.
+"""What the words of loggers mean, in German and English: units, names, keys of preambles.
 
 No word decides against a unit: a column is a force because it is in newtons. A name decides only
 where the unit is one of volts, and then says no more than which sensor to ask for.
@@ -29,7 +29,9 @@ _OTHERS = {
     "digits", "lsb", "fs", "fullscale", "a.u.", "%rh", "kg", "none", "yyyy-mm-dd", "hh:mm:ss",
     "dd.mm.yyyy", "hh:mm:ss.000", "hh:mm:ss,000",
 }  # fmt: skip
-_BRACKETED = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|<([^<>]*)>|\{([^{}]*)\})\s*$")
+_BRACKETED = re.compile(
+    r"\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|<([^<>]*)>|\{([^{}]*)\})\s*$"
+)
 _APART = re.compile(r"\s*(/| in |,|:|_| )\s*")
 _TIMES = re.compile(
     r"(t|x|x[ _]?(value|werte?|achse|axis)|(rel(ative|ativ)?|elapsed|abs(olute?)?)?[ _.]*"
@@ -43,7 +45,9 @@ _COUNTERS = re.compile(
     r"sample ?(no|nr|number|index)|mess(wert|punkt)( ?nr)?|lfd ?nr|count|counter|z(ä|ae)hler)\.?",
     re.IGNORECASE,
 )
-_FORCE = re.compile(r"force|kraft|hammer|impact|impuls|schlag|\bf(_?\d|[xyz])?\b|load", re.IGNORECASE)
+_FORCE = re.compile(
+    r"force|kraft|hammer|impact|impuls|schlag|\bf(_?\d|[xyz])?\b|load", re.IGNORECASE
+)
 _ACCELERATION = re.compile(
     r"acc|beschl|\ba(_?\d+)?_?[xyz]?\b|\bb\d+\b|vibration|schwing|acz|\bicp|iepe", re.IGNORECASE
 )
@@ -155,7 +159,9 @@ _INTERVAL = re.compile(
     r"delta[xt]|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
     r"(intervall?|period|periode|step|schritt|schrittweite|zeit|inkrement|increment)|schrittweite"
 )
-_DATE = re.compile(r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|creation)?(datum|date)")
+_DATE = re.compile(
+    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|creation)?(datum|date)"
+)
 _MOMENT = re.compile(
     r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|begin(n)?|created?)*"
     r"(zeit|time|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"

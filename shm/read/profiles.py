@@ -38,8 +38,8 @@ Described = Mapping[str, Any]
 """Keys and values of a sidecar; `channel` holds a mapping for each channel by name."""
 _OF_PROFILE = ("hanger", "sampling_rate_hz", "channel")
 _COMMENT = (
-    "# What the files of one logger do not say themselves, as `shm import` asked. It holds for every\n"
-    "# file with these columns; correct it here, or import a file again.\n"
+    "# What the files of one logger do not say themselves, as `shm import` asked. It holds for\n"
+    "# every file with these columns; correct it here, or import a file again.\n"
 )
 _WRITE_ANEW = "Correct it, or delete it and import a file of the logger again."
 

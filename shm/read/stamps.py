@@ -17,7 +17,9 @@ from shm.values import FloatArray
 _DAY = r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})[-./](?P<c>\d{1,4})"
 _CLOCK = r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2}(?:[.,:]\d+)?))?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?"
-_STAMP = re.compile(rf"(?:{_DAY})?(?:\s*[T ,;]\s*|^)(?:{_CLOCK}{_ZONE})|{_DAY.replace('?P<', '?P<d')}")
+_STAMP = re.compile(
+    rf"(?:{_DAY})?(?:\s*[T ,;]\s*|^)(?:{_CLOCK}{_ZONE})|{_DAY.replace('?P<', '?P<d')}"
+)
 _NAMED_DAYS = (
     "%d-%b-%Y %H:%M:%S", "%d %b %Y %H:%M:%S", "%d. %B %Y %H:%M:%S", "%B %d, %Y %H:%M:%S",
     "%b %d, %Y %H:%M:%S", "%d-%b-%Y", "%d %B %Y", "%B %d, %Y", "%a %b %d %H:%M:%S %Y",

@@ -119,11 +119,22 @@ def quantity(found: FunctionSet) -> Quantity | None:
 def recording(content: Content, path: Path) -> Recording:
     sets = time_sets(content)
     if not sets:
+        _refuse_modes(content, path)
         assemble.refuse_quantities([], path)
     _refuse_different(sets, path)
     values = np.array([universal_frf.sign(found.response[2]) * _real(found) for found in sets])
     header = _header(sets, content, path)
     return assemble.recording(header, values, path, _rate(sets))
+
+
+def _refuse_modes(content: Content, path: Path) -> None:
+    """Raises BadInput for a file of modes alone, which a person must say more of."""
+    if content.has_modes:
+        raise BadInput(
+            "it holds modes that another program identified, no recording.",
+            file=path,
+            remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
+        )
 
 
 def peek(content: Content, file_format: str, path: Path) -> Peek:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -77,15 +79,22 @@ def _tdms(layout: Layout, path: Path) -> None:
 def _excel(described: Recording | FrequencyResponse, path: Path) -> None:
     """Our own text in cells: remarks in the first column, numbers as numbers."""
     text = (
-        recording_text(described)
-        if isinstance(described, Recording)
-        else response_text(described)
+        recording_text(described) if isinstance(described, Recording) else response_text(described)
     )
     book = openpyxl.Workbook(write_only=True)
     sheet = book.create_sheet("test")
     for line in text.splitlines():
         sheet.append([line] if line.startswith("#") else [_number(c) for c in line.split(",")])
-    book.save(path)
+    packed = io.BytesIO()
+    book.save(packed)
+    _repack(packed, path)
+
+
+def _repack(packed: io.BytesIO, path: Path) -> None:
+    """Without compression and dates, so that equal cells make files of equal length."""
+    with zipfile.ZipFile(packed) as made, zipfile.ZipFile(path, "w") as archive:
+        for member in made.namelist():
+            archive.writestr(zipfile.ZipInfo(member), made.read(member))
 
 
 def _wave(described: Recording | FrequencyResponse, path: Path) -> None:

@@ -9,6 +9,7 @@ costs.
 
 from shm.read.limits import Limits
 from shm.read.sandbox.client import (
+    foreign_modes,
     layout_of,
     load_modes,
     missing_bounds,
@@ -19,6 +20,7 @@ from shm.read.sandbox.client import (
 
 __all__ = [
     "Limits",
+    "foreign_modes",
     "layout_of",
     "load_modes",
     "missing_bounds",

@@ -22,6 +22,7 @@ from shm.read.base import Peek
 from shm.read.bundles import holds_test
 from shm.read.content import is_gzipped
 from shm.read.limits import Limits
+from shm.read.modal_sets import ForeignModes
 from shm.read.sandbox.protocol import Answer, Refused, refusal_of, value_of
 from shm.read.sandbox.reading_process import Request, ask
 from shm.read.survey import Layout, Survey
@@ -66,6 +67,14 @@ def layout_of(path: Path, limits: Limits | None = None) -> Layout:
     answer = _answer("layout_of", path, limits or Limits())
     with _believed(path):
         return value_of(Layout, answer.listed()[0], answer.arrays)
+
+
+def foreign_modes(path: Path, limits: Limits | None = None) -> ForeignModes | None:
+    """Modes of another program in a UFF file, None where it holds none; raises BadInput."""
+    answer = _answer("foreign_modes", path, limits or Limits())
+    with _believed(path):
+        node = answer.listed()[0]
+        return None if node is None else value_of(ForeignModes, node, answer.arrays)
 
 
 def load_modes(path: Path, limits: Limits | None = None) -> tuple[ModalTest, ...]:

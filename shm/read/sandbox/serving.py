@@ -23,6 +23,7 @@ from shm.errors import BadInput, ShmError
 from shm.modes_document import modes_document
 from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large
+from shm.read.modal_sets import foreign_modes
 from shm.read.sandbox.confinement import Confinement, confine, pythons_own
 from shm.read.sandbox.protocol import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.sandbox.reading_process import ARRAYS_AT_ONCE, WALL_SECONDS
@@ -121,4 +122,5 @@ def _modes(path: Path) -> Any:
 _VERBS: dict[str, Callable[[Path], object]] = {
     "read_test": read_test, "peek_test": peek_test, "load_modes": _modes,
     "survey": lambda path: [survey(path)], "layout_of": lambda path: [layout_of(path)],
+    "foreign_modes": lambda path: [foreign_modes(path)],
 }  # fmt: skip
