@@ -208,6 +208,8 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
 
 def _questions(found: Survey, described: Described, hanger: object, rate: float) -> list[Question]:
     asked: list[Question] = []
+    if not found.columns:
+        return asked  # nothing is there to be said of
     if hanger is None:
         asked.append(Question("hanger", "", "Which hanger was tested?", "--hanger N"))
     if math.isnan(rate) and not found.lines:

@@ -6,8 +6,10 @@ the workbook was saved; macros are never run.
 
 from __future__ import annotations
 
+import io
 import re
 import warnings
+import zipfile
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
@@ -23,6 +25,7 @@ _NAME = "Excel"
 _PARTS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 _MOST_COLUMNS = 200  # judgement: far more than the 16 accelerations that are read
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+_EMPTY_FILL = re.compile(rb"<fill\s*/>")
 _SHARE_OF_LARGEST = 0.5  # judgement: a sheet of half as many rows holds a recording too
 
 
@@ -61,11 +64,28 @@ def _sheets(path: Path) -> dict[str, list[str]]:
 
     with guarded(path, "the workbook"):
         warnings.simplefilter("ignore")  # of styles and extensions that openpyxl does not know
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        options = {"read_only": True, "data_only": True, "keep_links": False}
+        try:
+            book = openpyxl.load_workbook(path, **options)
+        except TypeError:  # of a fill that is empty, as some programs write it
+            book = openpyxl.load_workbook(_with_fills(path), **options)
         try:
             return {sheet.title: _lines(sheet, path) for sheet in book.worksheets}
         finally:
             book.close()
+
+
+def _with_fills(path: Path) -> io.BytesIO:
+    """A copy of a workbook in which no fill is empty: openpyxl raises TypeError for one."""
+    copy = io.BytesIO()
+    with zipfile.ZipFile(path) as packed, zipfile.ZipFile(copy, "w") as archive:
+        for member in packed.namelist():
+            content = packed.read(member)
+            if member.endswith("styles.xml"):
+                content = _EMPTY_FILL.sub(b"<fill><patternFill/></fill>", content)
+            archive.writestr(member, content)
+    copy.seek(0)
+    return copy
 
 
 def _lines(sheet: object, path: Path) -> list[str]:

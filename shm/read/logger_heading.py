@@ -60,14 +60,14 @@ def heading_of(above: Sequence[str], script: Script) -> Heading:
     others = {place: cells for place, cells in wide.items() if place != at}
     units_at = _units_at(others, at, script)
     below = [_no_label(cell, place == 0) for place, cell in enumerate(others.get(units_at, []))]
-    units = [own or (below[i] if below else "") for i, (_, own) in enumerate(split)]
+    units = [(below[i] if below else "") or own for i, (_, own) in enumerate(split)]
     taken = {at, units_at}
     facts = [
         fact
         for place, line in enumerate(above)
-        if place not in taken and (fact := _fact(line, script)) is not None
+        if place not in taken and (fact := _fact_at(place, above, script)) is not None
     ]
-    names = _unlike(tuple(name for name, _ in split))
+    names = unlike(tuple(name for name, _ in split))
     return Heading(names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1)
 
 
@@ -111,7 +111,9 @@ def _score(cells: Sequence[str], script: Script) -> float:
     """How well a row names the columns of numbers; 0 where it leaves one without a name."""
     needed = [c for c, kind in zip(cells, script.kinds, strict=True) if kind == "number"]
     named = [cell for cell in needed if cell and not is_number(cell, script.decimal)]
-    if len(named) < len(needed) - 1 or not named or all(map(words.is_unit, named)):
+    if not named or all(map(words.is_unit, named)) or cells[0].endswith(":"):
+        return 0.0
+    if any(not cell or is_number(cell, script.decimal) for cell in needed[1:]):
         return 0.0
     labelled = _label(cells[0]) in _NAME_LABELS
     if not labelled and (_label(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
@@ -151,7 +153,7 @@ def _sensitivities(
     return (None,) * len(script.kinds)
 
 
-def _unlike(names: Sequence[str]) -> tuple[str, ...]:
+def unlike(names: Sequence[str]) -> tuple[str, ...]:
     """Names of printable characters, each once; a column without one by its number."""
     taken: list[str] = []
     for place, name in enumerate(names, start=1):
@@ -162,6 +164,15 @@ def _unlike(names: Sequence[str]) -> tuple[str, ...]:
             twin, count = f"{plain}_{count}", count + 1
         taken.append(twin)
     return tuple(taken)
+
+
+def _fact_at(place: int, above: Sequence[str], script: Script) -> tuple[str, str] | None:
+    """The fact of a line; where that is a key alone, `dt:`, its value is the line below."""
+    plain = above[place].strip()
+    if plain.endswith(":") and plain.count(":") == 1 and place + 1 < len(above):
+        below = _cells(above[place + 1], script)
+        return (plain[:-1], below[0]) if below else None
+    return _fact(above[place], script)
 
 
 def _fact(line: str, script: Script) -> tuple[str, str] | None:

@@ -33,7 +33,7 @@ _MISSING = {
 _OVER = re.compile(
     r"[+-]?(ov(e?r)?(l|ld|f|flow|range|load)?|over[ _-]?(range|load|flow|fl)?|ol|o\.l\.?|∞"
     r"|inf(inity)?"
-    r"|1\.#inf|überlauf|ueberlauf|übersteuert|uebersteuert|clip(ped)?|sat|max|\*{2,}|#{2,}|9\.9e\+?37)"
+    r"|1\.#inf|überlauf|ueberlauf|übersteuert|uebersteuert|clip(ped)?|\*{2,}|#{2,}|9\.9e\+?37)"
     r"(\.0*)?",
     re.IGNORECASE,
 )
@@ -89,7 +89,9 @@ class Script:
                     some = True
                 elif not is_gap(cell) and not is_over(cell):
                     return False
-            elif kind == "stamp" and not is_stamp(cell):
+            elif (kind == "stamp" and not is_stamp(cell)) or (
+                kind == "empty" and not some and not is_gap(cell)
+            ):
                 return False
         return some
 
@@ -98,7 +100,8 @@ class Script:
 class Block:
     """The rows of numbers: `above` are the lines before them, `first_line` counts from 1.
 
-    `rows` are cells by row, `lines` the number of the line of each.
+    `rows` are cells by row, `lines` the number of the line of each; `seam` is the line at which a
+    heading stands in their midst, 0 without: then times must run on over it.
     """
 
     script: Script
@@ -106,6 +109,7 @@ class Block:
     rows: list[list[str]]
     lines: list[int]
     remarks: tuple[str, ...] = ()
+    seam: int = 0
 
 
 def is_number(text: str, decimal: str) -> bool:
@@ -140,7 +144,7 @@ def script_of(lines: Sequence[str]) -> Script | None:
         return None
     middle = max(0, (len(filled) + min(len(filled), 200)) // 2 - _SAMPLE_LINES // 2)
     sample = filled[middle : middle + _SAMPLE_LINES] or filled[-_SAMPLE_LINES:]
-    quoted = any('"' in line for line in sample)
+    quoted = any('"' in line for line in (*filled[:_SAMPLE_LINES], *sample))
     for mark in _MARKS:
         found = _script(sample, mark, quoted)
         if found is not None:
@@ -150,7 +154,7 @@ def script_of(lines: Sequence[str]) -> Script | None:
 
 def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
     """How a sample is written if that is the mark; None where it is not."""
-    if not quoted and sum(mark in line.strip() for line in sample) < _SHARE * len(sample):
+    if sum(mark in line for line in sample) < _SHARE * len(sample):
         return None
     plain = Script(mark, ".", (), quoted)
     rows = [plain.cells(line) for line in sample]
@@ -159,7 +163,7 @@ def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
         return None
     even = [row for row in rows if len(row) == count]
     columns = list(zip(*even, strict=True))
-    decimal = "." if mark == "," and not quoted else _decimal(columns)
+    decimal = "." if mark == "," and '"' not in "".join(sample) else _decimal(columns)
     if mark == ", " and decimal != ",":
         return None
     kinds = tuple(_kind(column, decimal) for column in columns)
@@ -203,6 +207,8 @@ def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
     stop, remarks = _last(lines, script, start)
     rows: list[list[str]] = []
     numbers: list[int] = []
+    keys = {cells[0] for line in lines[:start] if (cells := script.cells(line))[0]}
+    seam = 0
     for place in range(start, stop):
         line = lines[place]
         if not line.strip() or line.lstrip().startswith(_REMARK):
@@ -210,11 +216,16 @@ def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
         row = script.cells(line)
         if len(row) != len(script.kinds):
             row = script.row(line) or []
+        if row and row[0] in keys:
+            row = []
+        if not row and script.cells(line)[0] in keys:
+            seam = seam or place + 1
+            continue
         if not row:
-            raise _no_row(script.cells(line), place + 1, lines[:start], script, path)
+            raise _no_row(script.cells(line), place + 1, script, path)
         rows.append(row)
         numbers.append(place + 1)
-    return Block(script, tuple(lines[:start]), rows, numbers, remarks)
+    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam)
 
 
 def _first(lines: Sequence[str], script: Script) -> int | None:
@@ -243,17 +254,18 @@ def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[
     return stop, (f"{len(left)} lines after the last row are no numbers; left out.",)
 
 
-def _no_row(
-    cells: Sequence[str], line: int, above: Sequence[str], script: Script, path: Path
-) -> BadInput:
-    """The refusal of a line in the midst of the rows: a second record, or a damaged line."""
-    if any(cells) and list(cells) in [script.cells(one) for one in above]:
-        return BadInput(
-            "a second record begins here, with a heading of its own.",
-            file=path,
-            line=line,
-            remedy="Export each recording to a file of its own; `ingest --together` joins them.",
-        )
+def second_record(line: int, path: Path) -> BadInput:
+    """The refusal of a file in which a second record begins at a line."""
+    return BadInput(
+        "a second record begins here, with a heading of its own.",
+        file=path,
+        line=line,
+        remedy="Export each recording to a file of its own; `ingest --together` joins them.",
+    )
+
+
+def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadInput:
+    """The refusal of a damaged line in the midst of the rows."""
     return BadInput(
         f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
         file=path,
@@ -279,7 +291,7 @@ def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
         elif is_over(text):
             over += 1
         elif not is_gap(text):
-            raise _no_row(block.rows[place], block.lines[place], block.above, block.script, path)
+            raise _no_row(block.rows[place], block.lines[place], block.script, path)
     return values, over
 
 

@@ -28,7 +28,7 @@ class LoggerTable:
 
     `said_rate_hz` is what its heading says, `times_rate_hz` what a column of times tells, NaN
     without. `layout` are the words by which files of one logger are known. `is_text` is False of a
-    format that has a reader of its own.
+    format that has a reader of its own; `title` is that of a text with one signal.
     """
 
     columns: tuple[LoggerColumn, ...]
@@ -41,6 +41,7 @@ class LoggerTable:
     layout: tuple[str, ...]
     remarks: tuple[str, ...]
     is_text: bool = True
+    title: str = ""
 
     @property
     def samples(self) -> int:

@@ -12,8 +12,10 @@ sidecar to describe (see `shm import`), times without a unit need a rate that ag
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +28,7 @@ from shm.read.base import Peek
 from shm.read.comma_header import LINE_BREAK, cells_of, mark_between
 from shm.read.header import Entry, Header, quantity_named
 from shm.read.limits import refuse_long_header
-from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said
+from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike
 from shm.read.logger_rows import Block, block_of, script_of, values_of
 from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.logger_times import Clock, clock_of
@@ -35,6 +37,7 @@ from shm.read.stamps import moment, parsed
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
+_MOST_STACKED = 64  # judgement: four times the accelerations that are read
 _HEAD = 20_000  # characters in which a heading of our own says so
 
 
@@ -74,6 +77,9 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     Raises BadInput naming line and column for rows that are damaged, and for times that are uneven.
     """
     lines = LINE_BREAK.split(text.rstrip("\x00\x1a"))
+    stacked = _stacked(lines, path)
+    if stacked is not None:
+        return stacked
     script = script_of(lines)
     block = None if script is None else block_of(lines, script, path)
     if script is None or block is None:
@@ -97,15 +103,40 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
         temperature_c=_temperature(heading, script.decimal),
         names_line=max(0, heading.names_line - len(preamble)),
         layout=_layout(heading, block),
-        remarks=(*clock.remarks, *block.remarks),
+        title=_of_one_signal(heading, words.means_title),
+        remarks=(*clock.remarks, *block.remarks, *_two_days(heading)),
     )
+
+
+def _stacked(lines: Sequence[str], path: Path) -> LoggerTable | None:
+    """Signals of equal length one below the other, each under its own heading; None for others.
+
+    Their first line is the same, and each heading says a title and a unit of its one signal.
+    """
+    first = next((line for line in lines if line.strip()), "")
+    starts = [place for place, line in enumerate(lines) if line == first]
+    if len(starts) < 2 or ":" not in first or len(starts) > _MOST_STACKED:
+        return None
+    parts = [lines[a:b] for a, b in pairwise([*starts, len(lines)])]
+    tables = [parse("\n".join(["", *part[1:]]), path) for part in parts]
+    found = [table for table in tables if table is not None and len(table.columns) == 1]
+    if len(found) < len(tables) or len({t.samples for t in found}) > 1:
+        return None
+    if len({(str(t.said_rate_hz), str(t.times_rate_hz)) for t in found}) > 1:
+        return None
+    columns = tuple(
+        replace(table.columns[0], name=name)
+        for table, name in zip(found, unlike([t.title for t in found]), strict=True)
+    )
+    units = [f"{c.name} [{c.unit}]" for c in columns]
+    return replace(found[0], columns=columns, layout=("stacked", *units))
 
 
 def _column(heading: Heading, block: Block, clock: Clock, place: int, path: Path) -> LoggerColumn:
     values, overloads = values_of(block, place, path)
     return LoggerColumn(
         heading.names[place],
-        heading.units[place],
+        heading.units[place] or ("" if heading.names_line else _unit_of_one(heading)),
         clock.evened(values),
         overloads,
         heading.sensitivities[place],
@@ -131,6 +162,16 @@ def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
 # ---------------------------------------------------------------- facts of the whole
 
 
+def _of_one_signal(heading: Heading, means: Callable[[str], bool]) -> str:
+    return next((value for key, value in heading.facts if means(key)), "")
+
+
+def _unit_of_one(heading: Heading) -> str:
+    """The unit of the signal of a text that has one signal and names no columns."""
+    unit = _of_one_signal(heading, words.means_unit)
+    return unit if words.is_unit(unit) else ""
+
+
 def _hanger(heading: Heading, path: Path) -> int | None:
     """The hanger that the preamble numbers, or else the file's name."""
     for key, value in heading.facts:
@@ -147,6 +188,15 @@ def _time(heading: Heading) -> datetime | None:
     if whole:
         return moment("", whole[0])
     return moment(days[0] if days else "", clocks[0] if clocks else "") if days else None
+
+
+def _two_days(heading: Heading) -> tuple[str, ...]:
+    """A remark on a day such as 05/06/2026, from which no time is taken."""
+    for key, value in heading.facts:
+        found = parsed(value) if words.means_date(key) or words.means_moment(key) else None
+        if found is not None and not found[1] and found[0].year > 1:
+            return (f"{value} may be one day or another: the time of the test is left open.",)
+    return ()
 
 
 def _temperature(heading: Heading, decimal: str) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.logger_heading import Heading
-from shm.read.logger_rows import Block, values_of
+from shm.read.logger_rows import Block, second_record, values_of
 from shm.read.stamps import parsed, seconds_of_stamps
 from shm.read.table import REMEDY, evened
 from shm.values import NAN, FloatArray
@@ -23,6 +23,7 @@ _SLOWEST_HZ, _FASTEST_HZ = 20.0, 200_000.0
 _LEAST_EPOCH_S, _EPOCHS = 1e8, ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
 _SHEET_DAYS = (30_000.0, 60_000.0)  # 1982 to 2064, as spreadsheets count days
 _SHEET_START = datetime(1899, 12, 30, tzinfo=UTC)  # day 0 of spreadsheets
+_EVEN = 0.1  # judgement: of a step, which may be rounded
 _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give the rate alone
 _SAME = 1e-3
 
@@ -45,11 +46,15 @@ def clock_of(heading: Heading, block: Block, said_hz: float, path: Path) -> Cloc
     """
     stamps = [i for i, kind in enumerate(block.script.kinds) if kind == "stamp"]
     numbers = [i for i, kind in enumerate(block.script.kinds) if kind == "number"]
-    times = [i for i in numbers if _is_time(heading, i)]
+    times = [
+        i for i in numbers if _is_time(heading, i) or _keeps_step(heading, block, i, said_hz, path)
+    ]
     counters = [i for i in numbers if i not in times and _is_counter(heading, block, i, path)]
     if not times and not stamps and counters and math.isnan(said_hz):
         times = _nameless_times(heading, block, counters, path)
     used = frozenset([*stamps, *times, *counters])
+    if block.seam and not times and not stamps:
+        raise second_record(block.seam, path)
     for place in times:
         found = _of_numbers(heading, block, place, said_hz, path)
         if found is not None:
@@ -68,6 +73,15 @@ def _is_time(heading: Heading, place: int) -> bool:
     named = words.means_time(heading.names[place])
     in_seconds = words.seconds_of(unit) is not None
     return (named and (in_seconds or not unit)) or (in_seconds and place == 0)
+
+
+def _keeps_step(heading: Heading, block: Block, place: int, said_hz: float, path: Path) -> bool:
+    """Whether a column without a name runs on by the step that the preamble says."""
+    if math.isnan(said_hz) or heading.names[place] != f"column_{place + 1}":
+        return False
+    values, _ = values_of(block, place, path)
+    steps = np.diff(values)
+    return bool(len(steps) and np.all(np.abs(steps * said_hz - 1) < _EVEN))
 
 
 def _is_counter(heading: Heading, block: Block, place: int, path: Path) -> bool:
@@ -151,6 +165,9 @@ def _even(
 ) -> Clock:  # fmt: skip
     """The clock of seconds that may be rounded so that several rows have the same."""
     fault = _fault(block, name, path)
+    back = np.flatnonzero(np.diff(seconds) < 0)
+    if block.seam and len(back):
+        raise second_record(block.seam, path)
     if len(seconds) < 2 or np.all(np.diff(seconds) > 0):
         _, rate = evened(seconds, seconds[np.newaxis], fault)
         return Clock(used, rate, start, lambda v: evened(seconds, v[np.newaxis], fault)[0][0])

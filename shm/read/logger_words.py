@@ -27,7 +27,7 @@ _OTHERS = {
     "um/m", "ue", "mm/m", "mv/v", "hz", "khz", "rpm", "1/min", "m/s", "mm/s", "cm/s", "bar", "mbar",
     "pa", "kpa", "mpa", "n/mm2", "nm", "knm", "a", "ma", "ohm", "db", "counts", "count", "digit",
     "digits", "lsb", "fs", "fullscale", "a.u.", "%rh", "kg", "none", "yyyy-mm-dd", "hh:mm:ss",
-    "dd.mm.yyyy", "hh:mm:ss.000", "hh:mm:ss,000",
+    "ts", "rn", "smp", "dd.mm.yyyy", "hh:mm:ss.000", "hh:mm:ss,000",
 }  # fmt: skip
 _BRACKETED = re.compile(
     r"\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|<([^<>]*)>|\{([^{}]*)\})\s*$"
@@ -114,10 +114,10 @@ def name_and_unit(text: str) -> tuple[str, str]:
 
 def _stands_apart(mark: str, unit: str) -> bool:
     """Whether the end of a name is a unit: after a mere blank or line, only a clear one."""
-    if mark in ("_", " ") and plain_unit(unit) in ("h", "d", "min", "m"):
-        return False
-    known = unit_of(unit) is not None or seconds_of(unit) is not None
-    return known or volts_of(unit) is not None
+    known = unit_of(unit) is not None or volts_of(unit) is not None
+    if mark in ("_", " ", ":"):  # a letter there may be a direction or a number
+        return known or plain_unit(unit) in ("ms", "sec")
+    return known or seconds_of(unit) is not None
 
 
 def quantity_meant(name: str) -> Quantity | None:
@@ -156,7 +156,7 @@ _RATE = re.compile(
     r"(ing)?(rate|frequenz|frequency|freq)(hz)?|fs|sps|samplespersec(ond)?|abtastratehz|fabtast"
 )
 _INTERVAL = re.compile(
-    r"delta[xt]|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
+    r"delta[xt]|(x(axis)?)?delta|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
     r"(intervall?|period|periode|step|schritt|schrittweite|zeit|inkrement|increment)|schrittweite"
 )
 _DATE = re.compile(
@@ -175,6 +175,8 @@ _NUMBERED = re.compile(
     r"(?:h(?:a|ä|ae)nger|seil|cable)\s*(?:nr\.?|no\.?|#)?[\s_:=-]*0*(\d{1,3})(?!\d|[.-]\d)",
     re.IGNORECASE,
 )
+_TITLE = re.compile(r"(title|titel|signal|channel|kanal)(name)?")
+_UNIT_KEY = re.compile(r"y?(axis|achse)?(unit|einheit)(label)?")
 _SERIAL = re.compile(r".*(serial|serien|^sn)(number|nummer|nr|no)?.*")
 
 
@@ -205,6 +207,14 @@ def means_temperature(key: str) -> bool:
 
 def means_hanger(key: str) -> bool:
     return _HANGER.fullmatch(key_of(key)) is not None
+
+
+def means_title(key: str) -> bool:
+    return _TITLE.fullmatch(key_of(key)) is not None
+
+
+def means_unit(key: str) -> bool:
+    return _UNIT_KEY.fullmatch(key_of(key)) is not None
 
 
 def means_serial(key: str) -> bool:
