@@ -14,6 +14,12 @@ from typing import Any
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
+from shm.pipeline.import_answers import (
+    answer_to,
+    channel_answer,
+    import_document,
+    unit_recorded,
+)
 from shm.pipeline.importing import (
     Answers,
     Import,
@@ -24,25 +30,18 @@ from shm.pipeline.importing import (
     understand,
 )
 from shm.pipeline.lineage import read_limits
-from shm.read.logger_words import measured_unit, seconds_of, sensitivity_of, volts_of
+from shm.read.logger_words import measured_unit
 from shm.read.modal_sets import ForeignModes
 from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
-from shm.read.units import KNOWN
 from shm.store import Workspace
-from shm.values import PLANES, Plane
 from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.held import Time
 from shm_cli.import_modes import import_modes
 from shm_daemon.landing import Landed, incoming
 
 _BARS = " ▁▂▃▄▅▆▇█"
-_PLANES: dict[str, Plane] = {
-    **{plane: plane for plane in PLANES}, "t": PLANES[0], "quer": PLANES[0], "l": PLANES[1],
-    "längs": PLANES[1], "laengs": PLANES[1],
-}  # fmt: skip
 UFF_SUFFIXES = (".uff", ".unv", ".uf")
-_UNKNOWN = ("unknown", "-", "?")
 
 
 @click.command()
@@ -84,7 +83,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
     modes = None if first.columns else _modes_in(file, workspace)
     if modes is not None:
         return import_modes(
-            modes, workspace, _whole_file(said), said["plane"], plane_named,
+            modes, workspace, _whole_file(said), said["plane"],
             dry_run=dry_run, as_json=as_json, asks=asks,
         )  # fmt: skip
     answers = _answers(said, first)
@@ -138,11 +137,13 @@ def _answers(said: dict[str, Any], found: Import) -> Answers:
         tables.setdefault(_column(name, names), {})["leave_out"] = True
     for key, values in (("unit", said["unit"]), ("sensitivity", said["sensitivity"])):
         for name, value in _named(key, values, names, names):
-            tables.setdefault(name, {}).update(_of_sensor(key, value, _unit_of(name, found)))
+            tables.setdefault(name, {}).update(
+                channel_answer(key, value, unit_recorded(name, found))
+            )
     sensors = _accelerations(found, tables)
     for key, values in (("place", said["place"]), ("plane", said["plane"])):
         for name, value in _named(key, values, names, sensors):
-            tables.setdefault(name, {}).update(_of_sensor(key, value, ""))
+            tables.setdefault(name, {}).update(channel_answer(key, value))
     return replace(_whole_file(said), channels=tables)
 
 
@@ -184,56 +185,6 @@ def _column(name: str, names: Sequence[str]) -> str:
     raise UsageError(f"the file has no column {name!r}.", remedy=f"It has {', '.join(names)}.")
 
 
-def _unit_of(name: str, found: Import) -> str:
-    return next(column.unit for column in found.survey.columns if column.name == name)
-
-
-def _of_sensor(about: str, text: str, recorded_in: str) -> dict[str, object]:
-    """An answer as keys of a sidecar; raises UsageError with what may be said."""
-    if about == "place":
-        return {"x_m": "" if text.lower() in _UNKNOWN else _metres(text)}
-    if about == "plane":
-        return {"plane": plane_named(text)}
-    if about == "unit":
-        if measured_unit(text) is None and seconds_of(text) is None:
-            raise UsageError(f"{text!r} is no unit that is read.", remedy=f"Give one of {KNOWN}.")
-        return {"unit": text}
-    return _calibrated(text, recorded_in)
-
-
-def plane_named(text: str) -> Plane:
-    """The plane that a person means; raises UsageError."""
-    plane = _PLANES.get(text.lower())
-    if plane is None:
-        raise UsageError(f"{text!r} is no plane.", remedy=f"Give {' or '.join(PLANES)}.")
-    return plane
-
-
-def _metres(text: str) -> float:
-    try:
-        return float(text.replace(",", "."))
-    except ValueError:
-        raise UsageError(
-            f"{text!r} is no place.", remedy="Give metres from the deck end, or 'unknown'."
-        ) from None
-
-
-def _calibrated(text: str, recorded_in: str) -> dict[str, object]:
-    """Unit and calibration: by a sensitivity, or by what the full scale is worth."""
-    found, volts = sensitivity_of(text), volts_of(recorded_in)
-    if found is not None and volts is not None:
-        return {"unit": found.unit, "calibration": found.unit_per_volt * volts}
-    number, _, unit = text.strip().partition(" ")
-    known = measured_unit(unit)
-    if known is not None and volts is None:
-        return {"unit": unit, "calibration": _metres(number)}
-    raise UsageError(
-        f"{text!r} is no sensitivity of a column in {recorded_in or 'no unit'}.",
-        remedy="Give '100 mV/g' or '2.25 mV/N' of a column in volts, else what one recorded unit"
-        " is worth: '50 g'.",
-    )
-
-
 def _asked(questions: Sequence[Question], answers: Answers, found: Import) -> Answers:
     """The answers of the person at the terminal; what follows from them is asked again."""
     tables = {name: dict(given) for name, given in answers.channels.items()}
@@ -243,24 +194,17 @@ def _asked(questions: Sequence[Question], answers: Answers, found: Import) -> An
         elif question.about == "rate":
             answers = replace(answers, sampling_rate_hz=click.prompt(question.text, type=float))
         else:
-            unit = _unit_of(question.channel, found)
-            prompt = _taking(question, unit)
+            prompt = _taking(question, found)
             tables.setdefault(question.channel, {}).update(
                 click.prompt(question.text, value_proc=prompt)
             )
     return replace(answers, channels=tables)
 
 
-def _taking(question: Question, unit: str) -> Callable[[str], dict[str, object]]:
-    about = question.about
-    if about == "unit" and (volts_of(unit) is not None or unit == "full scale"):
-        about = "sensitivity"
-
+def _taking(question: Question, found: Import) -> Callable[[str], dict[str, object]]:
     def take(text: str) -> dict[str, object]:
-        if about in ("unit", "sensitivity") and text.strip().lower() in ("", "none", "leave out"):
-            return {"leave_out": True}
         try:
-            return _of_sensor(about, text.strip(), unit)
+            return answer_to(question, text, found)
         except UsageError as error:
             raise click.UsageError(str(error)) from error
 
@@ -346,30 +290,9 @@ def _say_next(
 
 
 def _document(found: Import, profile: Profile | None, landed: Landed | None) -> dict[str, Any]:
-    survey = found.survey
     return {
-        "file": survey.source,
-        "format": survey.format,
-        "fingerprint": survey.layout.fingerprint,
-        "hanger": found.hanger,
-        "time": found.described.get("time", survey.time),
-        "temperature_c": found.described.get("temperature_c", survey.temperature_c),
-        "sampling_rate_hz": found.sampling_rate_hz,
-        "samples": survey.samples,
-        "columns": [
-            {
-                "name": c.name, "unit": c.unit, "quantity": c.quantity, "plane": c.plane,
-                "x_m": c.x_m, "least": c.least, "largest": c.largest, "overloads": c.overloads,
-                "is_clipped": c.is_clipped, "hits": c.hits,
-            }
-            for c in found.columns
-        ],
-        "questions": [
-            {"about": q.about, "channel": q.channel, "text": q.text, "option": q.option}
-            for q in found.questions
-        ],
-        "problems": list(found.problems),
-        "remarks": list(survey.remarks),
+        "file": found.survey.source,
+        **import_document(found),
         "profile": None if profile is None else str(profile.path),
         "landed": None if landed is None else str(landed.path),
-    }  # fmt: skip
+    }

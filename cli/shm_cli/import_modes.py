@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,26 +12,24 @@ from typing import Any
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
+from shm.pipeline.import_answers import plane_named, question_document
 from shm.pipeline.importing import Answers
 from shm.pipeline.importing_modes import ImportedModes, keep_modes_profile, understand_modes
 from shm.read.modal_sets import ForeignModes, axes_of
 from shm.store import Workspace
-from shm.values import Plane
 from shm_cli.common import show, show_table, table
 from shm_daemon.landing import Landed, incoming
 
-PlaneOf = Callable[[str], Plane]
-
 
 def import_modes(
-    modes: ForeignModes, workspace: Workspace, answers: Answers, planes: Sequence[str],
-    plane_of: PlaneOf, *, dry_run: bool, as_json: bool, asks: bool,
+    modes: ForeignModes, workspace: Workspace, answers: Answers, planes: Sequence[str], *,
+    dry_run: bool, as_json: bool, asks: bool,
 ) -> int:  # fmt: skip
     """Takes the modes of a file in, or says what is open; the exit code."""
-    answers = replace(answers, channels=_planes(planes, axes_of(modes.modes), plane_of))
+    answers = replace(answers, channels=_planes(planes, axes_of(modes.modes)))
     found = understand_modes(modes, workspace, answers)
     if found.questions and asks:
-        answers = _asked(found, answers, plane_of)
+        answers = _asked(found, answers)
         found = understand_modes(modes, workspace, answers)
     landed = None
     if found.test is not None and not dry_run:
@@ -44,9 +42,7 @@ def import_modes(
     return 0 if found.test is not None else BadInput.exit_code
 
 
-def _planes(
-    given: Sequence[str], axes: Sequence[str], plane_of: PlaneOf
-) -> dict[str, dict[str, object]]:
+def _planes(given: Sequence[str], axes: Sequence[str]) -> dict[str, dict[str, object]]:
     found: dict[str, dict[str, object]] = {}
     for pair in (pair for value in given for pair in value.split(",")):
         axis, mark, plane = pair.partition("=")
@@ -55,17 +51,17 @@ def _planes(
                 f"--plane {pair} names no axis of the shapes.",
                 remedy=f"Give AXIS=PLANE, of the axes {', '.join(axes)}.",
             )
-        found[axis.strip()] = {"plane": plane_of(plane.strip())}
+        found[axis.strip()] = {"plane": plane_named(plane.strip())}
     return found
 
 
-def _asked(found: ImportedModes, answers: Answers, plane_of: PlaneOf) -> Answers:
+def _asked(found: ImportedModes, answers: Answers) -> Answers:
     tables = dict(answers.channels)
     for question in found.questions:
         if question.about == "hanger":
             answers = replace(answers, hanger=click.prompt(question.text, type=int))
         else:
-            tables[question.channel] = {"plane": plane_of(click.prompt(question.text))}
+            tables[question.channel] = {"plane": plane_named(click.prompt(question.text))}
     return replace(answers, channels=tables)
 
 
@@ -114,10 +110,7 @@ def _document(found: ImportedModes, landed: Landed | None) -> dict[str, Any]:
             }
             for mode, order in zip(found.found.modes, found.orders, strict=True)
         ],
-        "questions": [
-            {"about": q.about, "channel": q.channel, "text": q.text, "option": q.option}
-            for q in found.questions
-        ],
+        "questions": [question_document(question) for question in found.questions],
         "remarks": list(found.notes),
         "landed": None if landed is None else str(landed.path),
     }  # fmt: skip

@@ -225,7 +225,7 @@ def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
             raise _no_row(script.cells(line), place + 1, script, path)
         rows.append(row)
         numbers.append(place + 1)
-    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam)
+    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
 
 
 def _first(lines: Sequence[str], script: Script) -> int | None:

@@ -59,7 +59,8 @@ def table_of(path: Path) -> LoggerTable:
 
 def _shares(values: np.ndarray) -> np.ndarray:
     """Whole numbers as shares of the largest that the file can hold; others as they are."""
-    found = values.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # signalling NaNs of damaged files
+        found = values.astype(np.float64)
     if values.dtype.kind == "u":
         return (found - 128.0) / 128.0
     return found / -float(np.iinfo(values.dtype).min) if values.dtype.kind == "i" else found
