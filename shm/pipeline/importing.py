@@ -135,8 +135,10 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     questions = _questions(found, described, hanger, rate)
     problems = _hanger_problem(hanger, workspace)
     record, fault = _recording(found, described, rate, path)
-    if found.lines or questions:
-        fault = ""
+    if found.lines or any(question.about in ("unit", "rate") for question in questions):
+        fault = ""  # the answers may mend it
+    if _holds_nothing(found, described, questions):
+        questions, fault = [], "; ".join(found.problems) or fault
     kept = _to_keep(known, answers.said, found)
     columns = _columns(found, described, record, rate)
     problems = (*problems, *((fault,) if fault else ()))
@@ -208,8 +210,6 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
 
 def _questions(found: Survey, described: Described, hanger: object, rate: float) -> list[Question]:
     asked: list[Question] = []
-    if not found.columns:
-        return asked  # nothing is there to be said of
     if hanger is None:
         asked.append(Question("hanger", "", "Which hanger was tested?", "--hanger N"))
     if math.isnan(rate) and not found.lines:
@@ -220,6 +220,13 @@ def _questions(found: Survey, described: Described, hanger: object, rate: float)
         if column.quantity == "acceleration":
             asked += _of_sensor(column, described)
     return asked
+
+
+def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
+    """Whether no answer can make it a recording: no column is, or may be, an acceleration."""
+    may_be = any(question.about == "unit" for question in questions)
+    measured = {_told(column, described).quantity for column in found.columns}
+    return "acceleration" not in measured and not may_be
 
 
 def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:

@@ -288,6 +288,8 @@ def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
     for place, text in enumerate(texts):
         if is_number(text, block.script.decimal):
             values[place] = number_of(text, block.script.decimal)
+            if np.isinf(values[place]):
+                raise _no_row(block.rows[place], block.lines[place], block.script, path)
         elif is_over(text):
             over += 1
         elif not is_gap(text):

@@ -30,7 +30,8 @@ def survey(path: Path) -> Survey:
     )
     known = {channel.name: channel for channel in look.channels}
     if table is None:
-        columns: Sequence[SurveyedColumn] = [_bare(channel) for channel in look.channels]
+        listed = look.channels if look.lines else ()
+        columns: Sequence[SurveyedColumn] = [_bare(channel) for channel in listed]
     else:
         columns = [_column(column, known.get(column.name)) for column in table.columns]
     return Survey(
@@ -45,13 +46,20 @@ def survey(path: Path) -> Survey:
         layout=_layout(found, table, look),
         lines=look.lines,
         remarks=table.remarks if table is not None else (),
-        problems=look.problems,
+        problems=(*look.problems, *_left_out(look, columns)),
     )
 
 
 def layout_of(path: Path) -> Layout:
     """The layout of a file alone; raises BadInput where nothing can be made out."""
     return survey(path).layout
+
+
+def _left_out(look: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
+    """What a file holds that is not read, where that is all that it holds."""
+    if columns or not look.left_out:
+        return ()
+    return (f"it holds {', '.join(look.left_out)[:200]}, which is not read.",)
 
 
 def _refuse_archive(path: Path) -> None:
