@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from shm.documents import dump
+from shm.errors import BadInput
 from shm.modes_document import modes_document
 from shm.pipeline.importing import Answers, Question
 from shm.read.modal_sets import ForeignModalMode, ForeignModes, axes_of
@@ -51,6 +52,12 @@ class ImportedModes:
 def understand_modes(found: ForeignModes, workspace: Workspace, answers: Answers) -> ImportedModes:
     """The modes of a file with all that is known of them; raises BadInput for an unknown hanger."""
     axes = axes_of(found.modes)
+    if not axes:
+        raise BadInput(
+            "no mode has a shape, so that nothing says its plane.",
+            file=found.source,
+            remedy="Export the shapes too, or write the modes into a NAME.modes.json.",
+        )
     layout = _layout(found, axes)
     profile = profile_for(layout, workspace.folder)
     said = completed(profile.described if profile else {}, layout, answers.said)
@@ -124,7 +131,9 @@ def _orders(modes: Sequence[ForeignModalMode]) -> tuple[tuple[int, ...], tuple[s
             )
     without = sum(not mode.axis for mode in modes)
     if without:
-        notes.append(f"{without} modes have no shape at places that are known; left out.")
+        notes.append(f"{without} modes have no shape, so that their plane is unknown; left out.")
+    if not any(mode.points for mode in modes):
+        notes.append("the file does not say where its nodes are: no shape is kept.")
     notes.append("the file says no uncertainty of the frequencies: it stays unknown.")
     return tuple(orders.values()), tuple(notes)
 

@@ -25,7 +25,7 @@ Kind = Literal["number", "stamp", "text", "empty"]
 
 _SAMPLE_LINES = 60  # judgement: enough that a bad line or two do not decide
 _MOST_PREAMBLE = 2000  # judgement: lines; the longest heading of a logger has some hundred
-_SHARE = 0.9
+_SHARE = 0.9  # judgement: of the sample; a heading in the midst is less than a tenth of it
 _MISSING = {
     "", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nv", "#nv", "invalid", "bad",
     "ungültig", "-nan", "1.#qnan", "-1.#ind", "nan.0", "#div/0!", "#value!", "#num!", "#ref!",

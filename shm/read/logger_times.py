@@ -25,7 +25,6 @@ _SHEET_DAYS = (30_000.0, 60_000.0)  # 1982 to 2064, as spreadsheets count days
 _SHEET_START = datetime(1899, 12, 30, tzinfo=UTC)  # day 0 of spreadsheets
 _EVEN = 0.1  # judgement: of a step, which may be rounded
 _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give the rate alone
-_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from shm.read.units import Unit, plain_unit, unit_of
 from shm.values import Plane, Quantity
 
+# In s and in V; a day has 86,400 s.
 _SECONDS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), 1e-3),

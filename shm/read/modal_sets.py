@@ -22,6 +22,7 @@ from shm.read.content import bytes_of, plain_file
 from shm.read.universal_sets import NODES, opened, read_set, refuse_cut_off
 from shm.values import NAN, FloatArray, ShapePoint
 
+# Data sets 55 and 164; the kinds of analysis are field 2 of record 6 of set 55.
 _MODES, _UNITS = 55, 164
 _NORMAL, _COMPLEX = 2, (3, 7)
 _AXES = "xyz"
@@ -34,7 +35,7 @@ class ForeignModalMode:
     """A mode as another program gives it; `axis` is "x", "y" or "z", along which it moves most.
 
     `points` are along the hanger: `value` along `axis`, `cross` along the other; both normalised by
-    the largest. `damping_ratio` is NaN where the file says none.
+    the largest; none where the file places no node. `damping_ratio` is NaN where it is not said.
     """
 
     number: int
@@ -144,9 +145,11 @@ def _shape(
     """The axis of the largest motion across the hanger, and the motion at each place."""
     rows = [np.asarray(found.get(f"r{k}"), dtype=complex).ravel() for k in (1, 2, 3)]
     nodes = [int(node) for node in np.asarray(found.get("node_nums"), dtype=float).ravel()]
-    known = [place for place, node in enumerate(nodes) if node in places]
-    if not known or any(len(row) != len(nodes) for row in rows):
+    if not nodes or any(len(row) != len(nodes) for row in rows):
         return "", ()
+    known = [place for place, node in enumerate(nodes) if node in places]
+    if not known:
+        return _axis_alone(np.array(rows)), ()
     at = np.array([places[nodes[place]] for place in known])
     motion = np.array([row[known] for row in rows])
     if not (np.isfinite(at).all() and np.isfinite(motion).all()):
@@ -166,6 +169,13 @@ def _shape(
         )
     )
     return _AXES[strongest], tuple(sorted(points, key=lambda point: point.x_m))
+
+
+def _axis_alone(motion: np.ndarray) -> str:
+    """The axis of the largest motion of a shape whose places nobody says."""
+    if not np.isfinite(motion).all() or not np.any(motion):
+        return ""
+    return _AXES[int(np.argmax(np.sum(_as_real(motion) ** 2, axis=1)))]
 
 
 def _as_real(motion: np.ndarray) -> FloatArray:

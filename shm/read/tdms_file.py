@@ -21,7 +21,7 @@ from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"TDSm"
-_MOST_CHANNELS = 2000
+_MOST_CHANNELS = 2000  # judgement: a hundred times what a recording has
 
 
 @contextmanager

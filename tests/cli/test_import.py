@@ -11,6 +11,7 @@ import pytest
 import pyuff
 from scipy.io import wavfile
 
+from shm.modes_document import load_modes
 from shm.read import read, sidecar_path
 from shm.store import Stage, Workspace
 from shm.values import Recording
@@ -209,7 +210,20 @@ def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncer
     assert again.code == 0
 
 
-def modes_file(path: Path) -> Path:
+def test_modes_without_places_keep_no_shape_and_are_numbered_by_frequency(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    path = modes_file(tmp_path / "m.uff", with_nodes=False)
+    planes = "x=transverse,y=longitudinal"
+    ended = shm("--workspace", workspace.folder, "import", path, "--hanger", 3, "--plane", planes)
+    assert ended.code == 0
+    assert "numbered from 1 by frequency" in ended.out
+    (test,) = load_modes(workspace.spool / "m.modes.json")
+    assert [mode.order for mode in test.modes] == [1, 1, 2, 2]
+    assert all(mode.shape == () for mode in test.modes)
+
+
+def modes_file(path: Path, with_nodes: bool = True) -> Path:
     """Two modes in each of two planes, with the nodes along z."""
     places = np.array([2.0, 4.0, 6.0, 8.0, 10.0])
     nodes = np.arange(1, 6)
@@ -232,5 +246,5 @@ def modes_file(path: Path) -> Path:
                 "modal_damp_vis": 0.004, "modal_damp_his": 0.0,
             }
         )  # fmt: skip
-    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+    pyuff.UFF(str(path)).write_sets(sets[not with_nodes :], mode="add")
     return path
