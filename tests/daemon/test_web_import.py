@@ -29,10 +29,10 @@ def client(site: Served) -> Iterator[httpx.Client]:
         yield client
 
 
-def export(seed: int) -> bytes:
+def export(seed: int, rows_: int = 600) -> bytes:
     rng = np.random.default_rng(seed)
     rows = "".join(f"{i / 500:.3f};{a:.4f};{b:.4f};{c:.4f}\n" for i, (a, b, c) in enumerate(
-        rng.normal(size=(600, 3))
+        rng.normal(size=(rows_, 3))
     ))  # fmt: skip
     return (HEAD + rows.replace(".", ",")).encode("latin-1")
 
@@ -87,3 +87,7 @@ def test_what_cannot_be_read_is_refused_with_its_reason(client: httpx.Client) ->
     assert asked(client, b"some words\nin lines\n").json()["problems"]
     assert asked(client, b"\x89PNG\r\n\x1a\n").status_code == 422
     assert client.post("/api/imports?name=a.csv", content=b"").status_code == 422
+
+
+def test_a_file_as_long_as_loggers_write_is_looked_into(client: httpx.Client) -> None:
+    assert asked(client, export(1, 40_000)).json()["samples"] == 40_000
