@@ -35,6 +35,10 @@ class Verb:
 VERBS: dict[str, Verb] = {
     "init": Verb("shm_cli.init", "Make a workspace for a bridge."),
     "demo": Verb("shm_cli.demo", "See the whole job on a simulated bridge of 20 hangers."),
+    "import": Verb(
+        "shm_cli.import_file",
+        "Take a logger's file in for the first time, asking only what it does not say.",
+    ),
     "ingest": Verb(
         "shm_cli.ingest",
         "Take recordings in, look into them with --peek, or do one again with --again.",

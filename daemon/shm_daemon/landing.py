@@ -11,15 +11,14 @@ import os
 import re
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path, PurePosixPath
 
-from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import sidecar_path
+from shm.read.profiles import Described, sidecar_text
 from shm.store.archive import (
     MODES_SUFFIX,
     checksum,
@@ -32,9 +31,6 @@ from shm_daemon.spool import LEFT_ALONE
 
 _LEFTOVER_S = 86400.0  # judgement: a day; no sender that is cut off after a minute is at it still
 _UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
-
-Described = Mapping[str, object]
-"""Keys and values of a sidecar: what the file itself cannot say."""
 
 
 @dataclass(frozen=True)
@@ -159,22 +155,6 @@ def incoming(spool: Path, max_bytes: int) -> Iterator[Incoming]:
         yield file
     finally:
         file.close()
-
-
-def sidecar_text(described: Described) -> str:
-    """The TOML of a sidecar."""
-    return "".join(f"{key} = {_toml(value)}\n" for key, value in described.items())
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, datetime):
-        return str(format_time(value))
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        plain = _UNPRINTABLE.sub(" ", value).replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{plain}"'
-    return repr(value)
 
 
 def _places(spool: Path, name: str, sha256: str) -> Iterator[Path]:

@@ -6,15 +6,22 @@ The file is safe in the archive before it is entered, and entered before it leav
 from __future__ import annotations
 
 import os
+import tempfile
 import uuid
 from collections import Counter
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
-from shm.read import sidecar_path
+from shm.pipeline.lineage import read_limits
+from shm.read import holds_test, sidecar_path
+from shm.read.profiles import any_profile, completed, profile_for, sidecar_text
+from shm.read.sandbox import layout_of
+from shm.read.sidecar import document_beside
 from shm.store import Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
+    MODES_SUFFIX,
     Kept,
     Meanwhile,
     entry_of,
@@ -109,7 +116,36 @@ def _keep(
     kept_sidecar = None
     if _is_plain(sidecar):
         kept_sidecar = archive.keep(sidecar, most_bytes=most, meanwhile=meanwhile)
+    text = _by_profile(path, workspace, follow)
+    if text is not None:
+        with tempfile.TemporaryDirectory(prefix="shm-") as folder:
+            made_up = Path(folder) / sidecar.name
+            made_up.write_text(text, encoding="utf-8")
+            made = archive.keep(made_up, most_bytes=most, meanwhile=meanwhile)
+        kept_sidecar = replace(made, entry=kept_sidecar.entry) if kept_sidecar else made
     return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, meanwhile=meanwhile)
+
+
+def _by_profile(path: Path, workspace: Workspace, follow: bool) -> str | None:
+    """The sidecar that the profile of a file's logger makes; None where there is no such profile.
+
+    It is kept with the file, so that a profile which changes later changes no test of before.
+    """
+    is_one_recording = not holds_test(path) and not path.name.lower().endswith(MODES_SUFFIX)
+    if not is_one_recording or not any_profile(workspace.folder):
+        return None
+    if path.is_symlink() and not follow:
+        return None
+    try:
+        layout = layout_of(path, read_limits(workspace.settings))
+        own = document_beside(path)
+    except BadInput:
+        return None  # it is refused with its reason where it is read
+    profile = profile_for(layout, workspace.folder)
+    if profile is None:
+        return None
+    whole = completed(profile.described, layout, own)
+    return sidecar_text(whole) if whole != own else None
 
 
 def _set_aside(

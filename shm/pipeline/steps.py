@@ -108,7 +108,9 @@ def identify_options(settings: Settings, bridge: Bridge) -> IdentifyOptions:
 def _hanger(hanger_id: int | None, bridge: Bridge) -> Hanger:
     if hanger_id is None:
         raise BadInput(
-            "the file names no hanger.", remedy="Give `hanger` in its header or its sidecar."
+            "the file names no hanger.",
+            remedy="Give `hanger` in its header or its sidecar, or say it once for all files of"
+            " this logger: `shm import FILE`.",
         )
     return bridge.tested(hanger_id)
 

@@ -21,6 +21,7 @@ from shm.read.arrays import Arrays, Variable, arranged
 from shm.read.base import Peek
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, quantity_named
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples
+from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.table import REMEDY, evened, rate_of
 from shm.read.units import accelerance_si, unit_of
@@ -49,6 +50,17 @@ def peeker(opened: Opener, name: str) -> Callable[[Path], Peek]:
             return _response_peek(chosen, name) if chosen.is_response else _peek(chosen, name)
 
     return peek
+
+
+def tabler(opened: Opener, name: str) -> Callable[[Path], LoggerTable | None]:
+    """The verb `table` of a format whose files are opened so; None for frequency responses."""
+
+    def table(path: Path) -> LoggerTable | None:
+        with opened(path) as arrays:
+            chosen = _chosen(arrays, path)
+            return None if chosen.is_response else _table(chosen, name)
+
+    return table
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +136,26 @@ def _peek(chosen: _Chosen, name: str) -> Peek:
         header, name, samples, lambda: _rate(chosen, header, samples), path, problems,
         chosen.left_out,
     )  # fmt: skip
+
+
+def _table(chosen: _Chosen, name: str) -> LoggerTable:
+    """All rows of numbers that are as long as the channels, or else as most are."""
+    out = [v for v in chosen.by_role["left out"] if v.is_series and v.kind != "c"]
+    series = [*chosen.by_role["channel"], *out]
+    lengths = [v.size for v in chosen.by_role["channel"] or out]
+    length = max(set(lengths), key=lengths.count, default=0)
+    series = [v for v in series if v.size == length]
+    columns = tuple(
+        LoggerColumn(v.name, unit_in(v), row)
+        for v, row in zip(series, _real(series, chosen.path) if series else (), strict=True)
+    )
+    header = chosen.header([])
+    problems: list[str] = []
+    rate = assemble.attempt(lambda: _rate(chosen, header, length), NAN, problems)
+    said = assemble.attempt(lambda: header.sampling_rate_hz, NAN, problems)
+    hanger = assemble.attempt(lambda: header.hanger, None, problems)
+    layout = (name, *(f"{c.name} [{c.unit}]" for c in columns))
+    return LoggerTable(columns, said, rate, hanger, None, NAN, 0, layout, (), False)
 
 
 def _rate(chosen: _Chosen, header: Header, samples: int) -> float:

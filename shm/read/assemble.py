@@ -21,7 +21,7 @@ LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
 _SAME_RATE = 1e-4
 _NAME_THEM = (
     "Name accelerometers acc_1, acc_2, ..., or give in NAME.toml a table [channel.NAME] with"
-    ' unit = "m/s2" for each.'
+    ' unit = "m/s2" for each; `shm import FILE` asks and keeps it for all files of this logger.'
 )
 _LEAVE_OUT = "Leave the others out: [channel.NAME] with leave_out = true in NAME.toml."
 
@@ -61,7 +61,7 @@ def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
             "the sampling rate is missing.",
             file=path,
             remedy="Add a header line `# sampling_rate_hz: 512`, or to the sidecar"
-            " sampling_rate_hz = 512.",
+            " sampling_rate_hz = 512, or say it once for this logger: `shm import FILE`.",
         )
     if math.isnan(said):
         return file_rate_hz

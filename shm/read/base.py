@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from shm.read.logger_table import LoggerTable
 from shm.values import NAN, AddedMass, FrequencyResponse, Plane, Quantity, Recording
 
 
@@ -55,7 +56,8 @@ class Format:
 
     `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
     `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
-    holds time records alone.
+    holds time records alone, `names_channels` of one whose channels are only numbered. `table`
+    gives all columns of a file, None where it holds no time records.
     """
 
     name: str
@@ -66,6 +68,8 @@ class Format:
     write: Callable[[Recording | FrequencyResponse, Path], None] | None = None
     may_be_gzipped: bool = False
     holds_responses: bool = True
+    names_channels: bool = True
+    table: Callable[[Path], LoggerTable | None] | None = None
 
 
 def names_in(described: Recording | FrequencyResponse) -> list[str]:

@@ -13,7 +13,7 @@
 What belongs to a column may also stand alone: `# acc_1.unit: g`. Columns may be separated by
 commas, semicolons (then with decimal commas, if need be) or tabs. A first column `time`, in
 seconds, is checked against the sampling rate, or gives it. A first column `frequency` makes it
-frequency responses: see `frequency_text`.
+frequency responses: see `frequency_text`. Any other heading is understood as `logger_text` says.
 
 Recordings and frequency responses as the text of a CSV file.
 """
@@ -29,12 +29,13 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput, UsageError
-from shm.read import assemble, frequency_text
+from shm.read import assemble, frequency_text, logger_text
 from shm.read.atomic import replace_text
 from shm.read.base import Format, Peek, names_in
 from shm.read.comma_header import Heading, parse_heading
 from shm.read.content import is_text, text_of
 from shm.read.header import mass_entries
+from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.sidecar import with_sidecar
 from shm.read.table import REMEDY, evened, parse_table, rate_of, rows_in
 from shm.read.units import ACCELERANCE, SI
@@ -44,10 +45,17 @@ _PLAIN = re.compile(r"[^,;\t\r\n#\"]+")
 
 
 def _read(path: Path) -> Recording | FrequencyResponse:
-    text = text_of(path)
+    return read_text(text_of(path), path)
+
+
+def read_text(text: str, path: Path, preamble: Sequence[str] = ()) -> Recording | FrequencyResponse:
+    """What a text holds, with lines that a workbook says elsewhere; raises BadInput."""
     responses = frequency_text.parse(text, path)
     if responses is not None:
         return frequency_text.read(responses, path)
+    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path, preamble)
+    if logged is not None:
+        return logger_text.recording(logged, path)
     heading = parse_heading(text, path)
     table, rate = parse_table(heading, path), NAN
     if heading.has_time:
@@ -56,15 +64,47 @@ def _read(path: Path) -> Recording | FrequencyResponse:
 
 
 def _peek(path: Path) -> Peek:
-    text = text_of(path)
+    return peek_text(text_of(path), FORMAT.name, path)
+
+
+def peek_text(text: str, file_format: str, path: Path, preamble: Sequence[str] = ()) -> Peek:
+    """What the heading of a text says; faults become problems."""
     responses = frequency_text.parse(text, path)
     if responses is not None:
-        return frequency_text.peek(responses, FORMAT.name, path)
+        return frequency_text.peek(responses, file_format, path)
+    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path, preamble)
+    if logged is not None:
+        return logger_text.peeked(logged, file_format, path)
     heading = parse_heading(text, path)
     rows = rows_in(heading.body)
     header = with_sidecar(heading.header, path)
     return assemble.peeked(
-        header, FORMAT.name, rows, lambda: _rate(heading, path), path, heading.remarks
+        header, file_format, rows, lambda: _rate(heading, path), path, heading.remarks
+    )
+
+
+def _table(path: Path) -> LoggerTable | None:
+    return table_of_text(text_of(path), path)
+
+
+def table_of_text(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | None:
+    """All columns of a text; None for frequency responses, and where there are no numbers."""
+    if frequency_text.parse(text, path) is not None:
+        return None
+    if not logger_text.is_ours(text):
+        return logger_text.parse(text, path, preamble)
+    heading = parse_heading(text, path)
+    rows = parse_table(heading, path)
+    names = heading.columns[1:] if heading.has_time else heading.columns
+    units = (heading.header.channels[name].get("unit") for name in names)
+    columns = tuple(
+        LoggerColumn(name, unit.text if unit else "", row)
+        for name, unit, row in zip(names, units, rows[heading.has_time :], strict=True)
+    )
+    rate, said = _rate(heading, path), heading.header.sampling_rate_hz
+    layout = ("shm", *names)
+    return LoggerTable(
+        columns, said, rate, heading.header.hanger, None, NAN, 0, layout, heading.remarks, False
     )
 
 
@@ -96,12 +136,13 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
 
 FORMAT = Format(
     name="CSV",
-    suffixes=(".csv", ".txt", ".tsv"),
+    suffixes=(".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".prn", ".xls"),
     recognises=is_text,
     peek=_peek,
     read=_read,
     write=_write,
     may_be_gzipped=True,
+    table=_table,
 )
 
 

@@ -31,9 +31,11 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"%PDF", "a PDF document"),
     (b"PK\x03\x04", "a ZIP archive or office document"),
     (b"\x1f\x8b", "a gzip archive"),
+    (b"\xd0\xcf\x11\xe0", "a document of an old Excel or Word"),
     (b"SQLite format 3", "a SQLite database"),
     (b"\x7fELF", "a program"),
 )
+_MOSTLY = 0.9  # judgement: letters beyond Latin are rare in a heading
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _TEXT_CONTROLS = {*b"\t\n\r\f\x1a"}  # 0x1a ends a text file of DOS
 MOST_MEMBERS = 200
@@ -92,7 +94,7 @@ def refuse_unless_readable(
 
 def is_text(head: bytes) -> bool:
     """Whether the first bytes of a file are text, that is, hold no control characters."""
-    if head.startswith(_UTF16):
+    if head.startswith(_UTF16) or _unmarked_utf16(head):
         return True
     return not any(byte < 32 and byte not in _TEXT_CONTROLS for byte in head)
 
@@ -101,9 +103,23 @@ def text_of(path: Path) -> str:
     """A whole file as text: UTF-8, UTF-16 with a mark, or else Western European (for m/s²)."""
     content = bytes_of(path)
     try:
-        return content.decode("utf-16" if content.startswith(_UTF16) else "utf-8-sig")
+        if content.startswith(_UTF16):
+            return content.decode("utf-16", errors="replace")
+        return content.decode(_unmarked_utf16(content[:_HEAD_BYTES]) or "utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+def _unmarked_utf16(head: bytes) -> str | None:
+    """The encoding of a text in UTF-16 without its mark: every other byte is zero."""
+    even, odd = head[: len(head) // 2 * 2 : 2], head[1::2]
+    if len(odd) < 8 or len(odd) != len(even):
+        return None
+    for zeros, others, name in ((odd, even, "utf-16-le"), (even, odd, "utf-16-be")):
+        plain = all(byte >= 32 or byte in _TEXT_CONTROLS for byte in others)
+        if zeros.count(0) > _MOSTLY * len(zeros) and plain:
+            return name
+    return None
 
 
 def bytes_of(path: Path) -> bytes:

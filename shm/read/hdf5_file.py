@@ -26,7 +26,7 @@ from h5py import h5d, h5g, h5l, h5o
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader
+from shm.read.array_reading import peeker, reader, tabler
 from shm.read.arrays import Arrays, Variable, attributes_of, named_apart, natural
 from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
@@ -66,6 +66,7 @@ FORMAT = Format(
     recognises=lambda head: head.startswith(_MAGIC),
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
+    table=tabler(_opened, _NAME),
 )
 
 

@@ -31,7 +31,7 @@ import scipy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader
+from shm.read.array_reading import peeker, reader, tabler
 from shm.read.arrays import Arrays, Variable
 from shm.read.base import Format
 from shm.read.content import bytes_of
@@ -81,6 +81,7 @@ FORMAT = Format(
     recognises=_recognises,
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
+    table=tabler(_opened, _NAME),
 )
 
 

@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput, UsageError
-from shm.read.array_reading import peeker, reader
+from shm.read.array_reading import peeker, reader, tabler
 from shm.read.arrays import Arrays, Variable, layout_of
 from shm.read.atomic import replace_file
 from shm.read.base import Format
@@ -115,5 +115,6 @@ FORMAT = Format(
     recognises=_recognises,
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
+    table=tabler(_opened, _NAME),
     write=_write,
 )

@@ -18,11 +18,13 @@ from shm.read.content import (
     refuse_unless_readable,
     refuse_unreadable_suffix,
 )
+from shm.read.excel_file import FORMAT as EXCEL
 from shm.read.hdf5_file import FORMAT as HDF5
 from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.numpy_file import FORMAT as NUMPY
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
+from shm.read.wave_file import FORMAT as WAVE
 from shm.values import Channel, FloatArray, FrequencyResponse, Recording
 
 # The most particular first: any text may be comma-separated.
@@ -31,6 +33,8 @@ FORMATS: tuple[Format, ...] = (
     MATLAB,
     TDMS,
     NUMPY,
+    EXCEL,
+    WAVE,
     UFF,
     CSV,
 )
@@ -38,7 +42,7 @@ FORMATS: tuple[Format, ...] = (
 
 def read(path: Path) -> Recording | FrequencyResponse:
     """The content of a file; raises BadInput naming file, line, channel and remedy."""
-    return _format_of_content(path).read(path)
+    return format_of(path).read(path)
 
 
 def peek(path: Path) -> Peek:
@@ -47,7 +51,7 @@ def peek(path: Path) -> Peek:
     Faults of the description are listed in `problems`; a file of which nothing can be made out
     raises BadInput.
     """
-    return _format_of_content(path).peek(path)
+    return format_of(path).peek(path)
 
 
 def write(recording: Recording | FrequencyResponse, path: Path) -> None:
@@ -66,8 +70,8 @@ def write(recording: Recording | FrequencyResponse, path: Path) -> None:
     found.write(recording, path)
 
 
-def _format_of_content(path: Path) -> Format:
-    """The format of the suffix, after a look at the content."""
+def format_of(path: Path) -> Format:
+    """The format of the suffix, after a look at the content; raises BadInput."""
     head = head_of(path)
     if holds_test(path):
         raise BadInput(

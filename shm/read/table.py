@@ -15,6 +15,8 @@ from shm.values import NAN, FloatArray, IntArray
 
 _MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
 _MOST_JITTER = 0.4  # samples: times rounded to milliseconds are off by 0.26 of one at 512 Hz
+_MANY_GAPS = 0.05  # judgement: no link loses every twentieth sample, one by one and evenly
+_WHOLE = 0.01  # of a sample: rounding of the sums
 _MOST_GAP = 2  # a file whose gaps outweigh its data is refused, not filled up
 REMEDY = "Export with an even time step, or drop the times and give sampling_rate_hz."
 
@@ -131,6 +133,22 @@ def rate_of(times_s: FloatArray, refusal: Callable[[int, str], BadInput]) -> flo
     return _places(times_s, refusal)[1] if len(times_s) > 1 else NAN
 
 
+def _are_rounded(times: FloatArray, multiples: FloatArray, deviations: FloatArray) -> bool:
+    """Whether times without gaps, rounded to the clock's last digit, look as if they had gaps.
+
+    At 800 Hz in ms the steps are 1, 1, 1, 2 ms: gaps at a clock of 1000 Hz would not come in so
+    many and such even places.
+    """
+    if np.mean(multiples != 1) <= _MANY_GAPS:
+        return False
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    since = times - times[0]
+    digits = (10.0**-power for power in range(7))
+    last = next((d for d in digits if np.abs(since / d - np.rint(since / d)).max() < 1e-3), 0.0)
+    # Half a digit of a time itself, and half of the first and the last that the others are held to.
+    return bool(np.abs(deviations).max() <= last / step + _WHOLE)
+
+
 def _places(times: FloatArray, refusal: Callable[[int, str], BadInput]) -> tuple[IntArray, float]:
     """The sample that each time belongs to, and the rate in Hz.
 
@@ -146,7 +164,9 @@ def _places(times: FloatArray, refusal: Callable[[int, str], BadInput]) -> tuple
         (times - times[0]) * places[-1] / (times[-1] - times[0]) - places for places in readings
     ]
     best = min((0, 1), key=lambda reading: float(np.abs(deviations[reading]).max()))
-    if not np.abs(deviations[best]).max() <= _MOST_JITTER:
+    rounded = best == 1 and _are_rounded(times, multiples, deviations[0])
+    best = 0 if rounded else best
+    if not (rounded or np.abs(deviations[best]).max() <= _MOST_JITTER):
         oddest = int(np.argmax(np.abs(steps - np.median(steps))))
         raise refusal(oddest + 1, "the times are uneven")
     places = readings[best].astype(np.int64)

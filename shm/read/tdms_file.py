@@ -13,29 +13,42 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nptdms import TdmsFile
-from nptdms.log import log_manager
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader
+from shm.read.array_reading import peeker, reader, tabler
 from shm.read.arrays import Arrays, Variable, attributes_of, named_apart
 from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
 
-log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words
 _MAGIC = b"TDSm"
-_MOST_CHANNELS = 2000
+_MOST_CHANNELS = 2000  # judgement: a hundred times what a recording has
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Arrays]:
+    tdms_file = _library(path)
     # As a stream, so that no index file beside it is opened.
     with path.open("rb") as stream:
         with guarded(path):
-            file = TdmsFile.open(stream)
+            file = tdms_file.open(stream)
             _refuse_cut_off(file, path)
             arrays = _arrays(file, path)
         yield arrays
+
+
+def _library(path: Path) -> Any:
+    """The class that opens files, of npTDMS, which is LGPL and therefore an extra."""
+    try:
+        from nptdms import TdmsFile
+        from nptdms.log import log_manager
+    except ImportError:
+        raise BadInput(
+            "TDMS needs the extra `tdms`, which is not installed.",
+            file=path,
+            remedy="Install it (pip install 'shm[tdms]'), or export as CSV or UFF.",
+        ) from None
+    log_manager.set_level(logging.CRITICAL)  # it writes to stderr what we refuse in words
+    return TdmsFile
 
 
 def _refuse_cut_off(file: Any, path: Path) -> None:
@@ -85,4 +98,5 @@ FORMAT = Format(
     recognises=lambda head: head.startswith(_MAGIC),
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
+    table=tabler(_opened, _NAME),
 )

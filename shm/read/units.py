@@ -26,15 +26,26 @@ _UNITS: dict[str, Unit] = {
     "dan": Unit("force", 10.0),
     "kn": Unit("force", 1e3),
     "kgf": Unit("force", _STANDARD_GRAVITY),
+    "kp": Unit("force", _STANDARD_GRAVITY),
+    "mn": Unit("force", 1e-3),
+    "kilonewton": Unit("force", 1e3),
+    "lb": Unit("force", 0.45359237 * _STANDARD_GRAVITY),
     "lbf": Unit("force", 0.45359237 * _STANDARD_GRAVITY),
     "m/s2": _METRE_PER_S2,
     "m/s/s": _METRE_PER_S2,
     "m/sec2": _METRE_PER_S2,
     "ms-2": _METRE_PER_S2,
+    "meter/s2": _METRE_PER_S2,
+    "m/second2": _METRE_PER_S2,
+    "ft/s2": Unit("acceleration", 0.3048),
+    "in/s2": Unit("acceleration", 0.0254),
     "cm/s2": Unit("acceleration", 1e-2),
     "mm/s2": Unit("acceleration", 1e-3),
     "um/s2": Unit("acceleration", 1e-6),
     "g": Unit("acceleration", _STANDARD_GRAVITY),
+    "gn": Unit("acceleration", _STANDARD_GRAVITY),
+    "gs": Unit("acceleration", _STANDARD_GRAVITY),
+    "g's": Unit("acceleration", _STANDARD_GRAVITY),
     "mg": Unit("acceleration", 1e-3 * _STANDARD_GRAVITY),
     "ug": Unit("acceleration", 1e-6 * _STANDARD_GRAVITY),
 }
@@ -45,8 +56,19 @@ SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
 
 def unit_of(text: str) -> Unit | None:
     """The unit that a text means, None where it is not known."""
-    plain = text.lower().replace("²", "2").replace("µ", "u").replace("μ", "u")
-    return _UNITS.get(re.sub(r"[\s\[\]()^*]", "", plain))
+    if text.strip() == "MN":  # the one unit of which the capital letter decides
+        return Unit("force", 1e6)
+    return _UNITS.get(plain_unit(text))
+
+
+def plain_unit(text: str) -> str:
+    """A unit in small letters, without brackets, blanks and signs of powers and products.
+
+    "Â²" is a ² that was decoded twice, U+FFFD one that was lost.
+    """
+    plain = text.lower().replace("â²", "2").replace("²", "2").replace("m/s\ufffd", "m/s2")
+    plain = plain.replace("µ", "u").replace("μ", "u")
+    return re.sub(r"[\s\[\]()^*·⋅]", "", plain)
 
 
 def accelerance_si(numerator: str, denominator: str) -> float | None:

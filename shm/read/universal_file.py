@@ -20,6 +20,7 @@ from shm.read import assemble, universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, Peek, PeekChannel
 from shm.read.header import Header
+from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.sidecar import with_sidecar, write_sidecar
 from shm.read.units import SI, unit_of
 from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
@@ -68,6 +69,23 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
     replace_file(path, lambda temporary: save(temporary, sets))
 
 
+def _table(path: Path) -> LoggerTable | None:
+    """The time histories, with those that are neither a force nor an acceleration."""
+    content = load(path, headers_only=False)
+    sets = time_sets(content)
+    if _holds_responses(content) or not sets:
+        return None
+    _refuse_different(sets, path)
+    header = _header(sets, content, path)
+    columns = tuple(
+        LoggerColumn(name, found.unit, _real(found))
+        for name, found in zip(header.channels, sets, strict=True)
+    )
+    layout = ("UFF", *(f"{c.name} [{c.unit}]" for c in columns))
+    rate = _rate(sets)
+    return LoggerTable(columns, rate, NAN, header.hanger, None, NAN, 0, layout, (), False)
+
+
 FORMAT = Format(
     name="UFF",
     suffixes=(".uff", ".unv", ".uf"),
@@ -76,6 +94,7 @@ FORMAT = Format(
     read=_read,
     write=_write,
     may_be_gzipped=True,
+    table=_table,
 )
 
 
@@ -100,11 +119,22 @@ def quantity(found: FunctionSet) -> Quantity | None:
 def recording(content: Content, path: Path) -> Recording:
     sets = time_sets(content)
     if not sets:
+        _refuse_modes(content, path)
         assemble.refuse_quantities([], path)
     _refuse_different(sets, path)
     values = np.array([universal_frf.sign(found.response[2]) * _real(found) for found in sets])
     header = _header(sets, content, path)
     return assemble.recording(header, values, path, _rate(sets))
+
+
+def _refuse_modes(content: Content, path: Path) -> None:
+    """Raises BadInput for a file of modes alone, which a person must say more of."""
+    if content.has_modes:
+        raise BadInput(
+            "it holds modes that another program identified, no recording.",
+            file=path,
+            remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
+        )
 
 
 def peek(content: Content, file_format: str, path: Path) -> Peek:

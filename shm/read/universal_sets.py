@@ -23,8 +23,8 @@ from shm.values import ComplexArray, FloatArray
 
 # UC-SDRL, Universal File Formats: data sets 15, 58, 58b and 2411
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
-_FUNCTION = 58
-_NODES = (15, 2411)
+_FUNCTION, _MODES = 58, 55
+NODES = (15, 2411)
 _START = re.compile(rb"\A\s*-1[ \t]*\r?\n\s*\d+")
 _MARK = re.compile(rb"^ {4}-1[ \t]*\r?$", re.MULTILINE)
 _EXPORT_AGAIN = "Export or send it again."
@@ -64,10 +64,14 @@ class FunctionSet:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """The functions of a file and the places (x, y, z) of its nodes, in m."""
+    """The functions of a file and the places (x, y, z) of its nodes, in m.
+
+    `has_modes` says whether it holds modes that another program identified (`modal_sets`).
+    """
 
     functions: tuple[FunctionSet, ...]
     nodes: dict[int, tuple[float, float, float]]
+    has_modes: bool = False
 
 
 def recognises(head: bytes) -> bool:
@@ -77,6 +81,15 @@ def recognises(head: bytes) -> bool:
 def load(path: Path, *, headers_only: bool) -> Content:
     """All functions and nodes of a file; raises BadInput naming the data set and its line."""
     raw = bytes_of(path)
+    refuse_cut_off(raw, path)
+    quiet = warnings.catch_warnings()
+    with quiet, np.errstate(all="ignore"), plain_file(path, raw) as plain:
+        warnings.simplefilter("ignore")
+        return _content(opened(plain, path), path, raw, headers_only)
+
+
+def refuse_cut_off(raw: bytes, path: Path) -> None:
+    """Raises BadInput where a file ends within a data set."""
     if not raw.rstrip().endswith(b"-1"):
         raise BadInput(
             "the file ends within a data set.",
@@ -84,10 +97,6 @@ def load(path: Path, *, headers_only: bool) -> Content:
             line=raw.count(b"\n") + 1,
             remedy=_EXPORT_AGAIN,
         )
-    quiet = warnings.catch_warnings()
-    with quiet, np.errstate(all="ignore"), plain_file(path, raw) as plain:
-        warnings.simplefilter("ignore")
-        return _content(_opened(plain, path), path, raw, headers_only)
 
 
 def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
@@ -99,16 +108,18 @@ def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
 def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
     functions: list[FunctionSet] = []
     nodes: dict[int, tuple[float, float, float]] = {}
-    for index, kind in enumerate(int(kind) for kind in file.get_set_types()):
+    kinds = [int(kind) for kind in file.get_set_types()]
+    for index, kind in enumerate(kinds):
         if kind == _FUNCTION:
-            found = _read_set(file, index, path, raw, headers_only)
+            found = read_set(file, index, path, raw, headers_only)
             functions.append(_function(found, index + 1, path, raw))
-        elif kind in _NODES:
-            nodes.update(_nodes(_read_set(file, index, path, raw, headers_only)))
-    return Content(tuple(functions), nodes)
+        elif kind in NODES:
+            nodes.update(_nodes(read_set(file, index, path, raw, headers_only)))
+    return Content(tuple(functions), nodes, _MODES in kinds)
 
 
-def _opened(plain: Path, path: Path) -> Any:
+def opened(plain: Path, path: Path) -> Any:
+    """The file as pyuff has it; raises BadInput where its sets cannot be told apart."""
     try:
         return pyuff.UFF(str(plain))
     except Exception as error:
@@ -117,14 +128,15 @@ def _opened(plain: Path, path: Path) -> Any:
         ) from error
 
 
-def _read_set(file: Any, index: int, path: Path, raw: bytes, headers_only: bool) -> dict[str, Any]:
+def read_set(file: Any, index: int, path: Path, raw: bytes, headers_only: bool) -> dict[str, Any]:
+    """One data set as pyuff has it; raises BadInput naming it."""
     try:
         found: dict[str, Any] = file.read_sets([index], header_only=headers_only)
     except Exception as error:
         what = "cannot be read: a header or a number in it is damaged"
         raise _refusal(what, index + 1, path, raw) from error
     if found.get("abscissa_spacing") == 0 and found["x"] is None:
-        return _read_set(file, index, path, raw, headers_only=False)
+        return read_set(file, index, path, raw, headers_only=False)
     if found.get("binary") and found["fp_format"] != _IEEE_754:
         raise _refusal("holds numbers that are not IEEE 754", index + 1, path, raw)
     return found

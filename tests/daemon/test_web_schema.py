@@ -34,6 +34,7 @@ CHECKS = [
 ]
 ROUTES = (
     "POST /api/recordings",
+    "POST /api/imports",
     "GET /api/recordings",
     "GET /api/recordings/{key}",
     "GET /api/status",

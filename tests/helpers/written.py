@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import io
+import math
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import h5py
+import numpy as np
+import openpyxl
 import pytest
 import scipy.io
+import scipy.io.wavfile
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from shm.read import FORMATS, Format
 from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
+from shm.read.base import PeekChannel
+from shm.read.comma_separated import recording_text, response_text
+from shm.read.sidecar import write_sidecar
+from shm.read.units import SI
 from shm.values import FrequencyResponse, Recording
 
 
@@ -21,6 +31,12 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
 
     A format that `shm` only reads needs a line of `_WRITERS`.
     """
+    if path.suffix == ".xlsx":
+        _excel(described, path)
+        return
+    if path.suffix == ".wav":
+        _wave(described, path)
+        return
     if path.suffix in _WRITERS:
         _WRITERS[path.suffix](layout_of(described), path)
         return
@@ -58,6 +74,47 @@ def _tdms(layout: Layout, path: Path) -> None:
     ]  # fmt: skip
     with path.open("wb") as stream, TdmsWriter(stream) as writer:
         writer.write_segment([RootObject(layout.attributes), GroupObject("test"), *channels])
+
+
+def _excel(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Our own text in cells: remarks in the first column, numbers as numbers."""
+    text = (
+        recording_text(described) if isinstance(described, Recording) else response_text(described)
+    )
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet("test")
+    for line in text.splitlines():
+        sheet.append([line] if line.startswith("#") else [_number(c) for c in line.split(",")])
+    packed = io.BytesIO()
+    book.save(packed)
+    _repack(packed, path)
+
+
+def _repack(packed: io.BytesIO, path: Path) -> None:
+    """Without compression and dates, so that equal cells make files of equal length."""
+    with zipfile.ZipFile(packed) as made, zipfile.ZipFile(path, "w") as archive:
+        for member in made.namelist():
+            archive.writestr(zipfile.ZipInfo(member), made.read(member))
+
+
+def _wave(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Channels by number, in floating point; the sidecar says all else."""
+    assert isinstance(described, Recording)
+    values = np.column_stack([channel.values for channel in described.channels])
+    scipy.io.wavfile.write(path, round(described.sampling_rate_hz), values)
+    channels = [
+        PeekChannel(f"channel_{place}", c.quantity, SI[c.quantity], c.plane, c.x_m)
+        for place, c in enumerate(described.channels, start=1)
+    ]
+    write_sidecar(described, channels, described.sampling_rate_hz, path)
+
+
+def _number(cell: str) -> float | str | None:
+    try:
+        value = float(cell)
+    except ValueError:
+        return cell
+    return value if math.isfinite(value) else str(value)
 
 
 _WRITERS: dict[str, Callable[[Layout, Path], None]] = {

@@ -355,7 +355,7 @@ def test_the_numbers_are_those_of_the_kernels_headers(machine: str) -> None:
 def test_hundreds_of_files_are_read_one_after_the_other(
     tmp_path: Path, recording: Recording
 ) -> None:
-    paths = [tmp_path / f"test{kind.suffixes[0]}" for kind in FORMATS]
+    paths = [tmp_path / f"test{kind.suffixes[0]}" for kind in FORMATS if kind.names_channels]
     for path in paths:
         write(recording, path)
     for _ in range(200 // len(paths)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -334,3 +335,12 @@ def test_our_matlab_and_numpy_files_are_plain_to_other_software(
 def test_names_sort_as_people_count() -> None:
     names = ["acc_10", "acc_2", "Acc_1", "b", "acc_²"]
     assert sorted(names, key=natural) == ["Acc_1", "acc_2", "acc_10", "acc_²", "b"]
+
+
+def test_tdms_without_its_extra_says_what_to_install(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(recording, tmp_path / "test.tdms")
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(BadInput, match=r"extra `tdms`.*shm\[tdms\]"):
+        read(tmp_path / "test.tdms")

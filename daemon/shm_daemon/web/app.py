@@ -14,7 +14,15 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import hanger_numbers, hangers, recordings, signing_in, tests, watching
+from shm_daemon.web import (
+    hanger_numbers,
+    hangers,
+    imports,
+    recordings,
+    signing_in,
+    tests,
+    watching,
+)
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
@@ -50,6 +58,7 @@ def load_pages(site: Site) -> Pages:
     handle_faults(app)
     for part in (
         recordings,
+        imports,
         hangers,
         alerts,
         watching,

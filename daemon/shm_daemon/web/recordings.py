@@ -29,7 +29,7 @@ from shm_daemon.web.models import (
 
 _PIECE_BYTES = 1 << 20  # technical: memory of an upload, against a change of threads for each piece
 _SILENCE_S = 60.0  # judgement: a mobile connection comes back within that or begins anew
-_BODY = {
+PLAIN_BODY = {
     "requestBody": {
         "required": True,
         "description": "The bytes of the file, as they are: no form.",
@@ -84,7 +84,7 @@ def described_by(
     status_code=202,
     response_model=Uploaded,
     responses=answers(400, 401, 403, 408, 413, 415, 422, 503),
-    openapi_extra=_BODY,
+    openapi_extra=PLAIN_BODY,
     summary="Upload a recording",
 )
 async def upload(
@@ -109,11 +109,9 @@ async def upload(
     """
     landing_name(name)
     workspace = site.workspace
-    _refuse_form(request)
-    _refuse_large(request, workspace.settings.max_file_bytes)
     file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
     try:
-        await _stream(request, file)
+        await receive_body(request, file, workspace.settings.max_file_bytes)
         landed = await run_in_threadpool(_land, file, name, described, x_content_sha256)
     finally:
         await run_in_threadpool(file.close)
@@ -157,6 +155,13 @@ def recordings(
     """One, or none while the file waits in the spool."""
     found = site.store.recordings.with_checksum(sha256.lower())
     return {"recordings": [_row(site.store, found)] if found else []}
+
+
+async def receive_body(request: Request, file: Incoming, max_bytes: int) -> None:
+    """Writes the body of a request to a file; refuses a form, and one that says it is too large."""
+    _refuse_form(request)
+    _refuse_large(request, max_bytes)
+    await _stream(request, file)
 
 
 async def _stream(request: Request, file: Incoming) -> None:

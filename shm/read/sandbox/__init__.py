@@ -8,6 +8,23 @@ costs.
 """
 
 from shm.read.limits import Limits
-from shm.read.sandbox.client import load_modes, missing_bounds, peek_test, read_test
+from shm.read.sandbox.client import (
+    foreign_modes,
+    layout_of,
+    load_modes,
+    missing_bounds,
+    peek_test,
+    read_test,
+    survey,
+)
 
-__all__ = ["Limits", "load_modes", "missing_bounds", "peek_test", "read_test"]
+__all__ = [
+    "Limits",
+    "foreign_modes",
+    "layout_of",
+    "load_modes",
+    "missing_bounds",
+    "peek_test",
+    "read_test",
+    "survey",
+]

@@ -22,8 +22,10 @@ from shm.read.base import Peek
 from shm.read.bundles import holds_test
 from shm.read.content import is_gzipped
 from shm.read.limits import Limits
+from shm.read.modal_sets import ForeignModes
 from shm.read.sandbox.protocol import Answer, Refused, refusal_of, value_of
 from shm.read.sandbox.reading_process import Request, ask
+from shm.read.survey import Layout, Survey
 from shm.values import Channel, FloatArray, FrequencyResponse, ModalTest, Recording
 
 T = TypeVar("T")
@@ -48,6 +50,31 @@ def peek_test(path: Path, limits: Limits | None = None) -> tuple[Peek, ...]:
         looks = tuple(value_of(Peek, node, answer.arrays) for node in answer.listed())
         refuse_unsound_look(looks, path)
     return looks
+
+
+def survey(path: Path, limits: Limits | None = None) -> Survey:
+    """What a file holds, as `shm.read.survey.survey` finds it; raises BadInput."""
+    known = limits or Limits()
+    answer = _answer("survey", path, known)
+    with _believed(path):
+        found = value_of(Survey, answer.listed()[0], answer.arrays)
+        refuse_unsound_survey(found, path, known)
+    return found
+
+
+def layout_of(path: Path, limits: Limits | None = None) -> Layout:
+    """The layout of a file, by which its logger is known; raises BadInput."""
+    answer = _answer("layout_of", path, limits or Limits())
+    with _believed(path):
+        return value_of(Layout, answer.listed()[0], answer.arrays)
+
+
+def foreign_modes(path: Path, limits: Limits | None = None) -> ForeignModes | None:
+    """Modes of another program in a UFF file, None where it holds none; raises BadInput."""
+    answer = _answer("foreign_modes", path, limits or Limits())
+    with _believed(path):
+        node = answer.listed()[0]
+        return None if node is None else value_of(ForeignModes, node, answer.arrays)
 
 
 def load_modes(path: Path, limits: Limits | None = None) -> tuple[ModalTest, ...]:
@@ -131,6 +158,16 @@ def refuse_unsound_look(looks: Sequence[Peek], path: Path) -> None:
         _refuse_description(look.source, look.hanger, look.temperature_c, path)
         if look.samples < 0 or look.lines < 0:
             raise ValueError("there are fewer than no samples")
+
+
+def refuse_unsound_survey(found: Survey, path: Path, limits: Limits) -> None:
+    """Raises ValueError for a survey of another file, or with impossible columns."""
+    _refuse_description(found.source, found.hanger, found.temperature_c, path)
+    if not 0 <= found.samples <= limits.max_samples or found.lines < 0:
+        raise ValueError("it has too many samples, or fewer than none")
+    for column in found.columns:
+        if column.values is not None and column.values.ndim != 1:
+            raise ValueError("a column is none")
 
 
 def _refuse_description(source: str, hanger: int | None, temperature_c: float, path: Path) -> None:

@@ -23,10 +23,12 @@ from shm.errors import BadInput, ShmError
 from shm.modes_document import modes_document
 from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large
+from shm.read.modal_sets import foreign_modes
 from shm.read.sandbox.confinement import Confinement, confine, pythons_own
 from shm.read.sandbox.protocol import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.sandbox.reading_process import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.sidecar import sidecar_path
+from shm.read.surveying import layout_of, survey
 from shm.read.whole_test import load_modes, peek_test, read_test
 
 _LARGEST_REQUEST = 1 << 16  # three paths of PATH_MAX, 4096 bytes, thrice as long in JSON
@@ -36,7 +38,10 @@ def serve() -> None:
     """Answers requests until the asking process is gone."""
     requests = socket.socket(fileno=0)
     pythons_own()  # found once, for all children
-    import_module("scipy.io")  # likewise: else each would load it within its limits
+    for library in ("scipy.io", "openpyxl"):  # likewise: else each would load it within its limits
+        import_module(library)
+    with suppress(ImportError):
+        import_module("nptdms")  # an extra
     gc.freeze()
     with suppress(ConnectionError):  # it was killed meanwhile
         requests.sendall(b"+")
@@ -116,4 +121,6 @@ def _modes(path: Path) -> Any:
 
 _VERBS: dict[str, Callable[[Path], object]] = {
     "read_test": read_test, "peek_test": peek_test, "load_modes": _modes,
+    "survey": lambda path: [survey(path)], "layout_of": lambda path: [layout_of(path)],
+    "foreign_modes": lambda path: [foreign_modes(path)],
 }  # fmt: skip

@@ -29,7 +29,7 @@
     item.append(made("h3", { textContent: file.name }),
       made("p", { className: "note", textContent: size(file.size) }), bar, stage);
     list.append(item);
-    return { item, bar, stage, name: file.name };
+    return { item, bar, stage, name: file.name, number: list.children.length };
   }
 
   function state(row, text, kind = "") {
@@ -72,12 +72,128 @@
     });
   }
 
+  // ---- the first file of a logger
+
+  const BARS = " ▁▂▃▄▅▆▇█";
+  const SENT_AS_THEY_ARE = [".zip", ".modes.json"];
+
+  async function looked(file, answers) {
+    const query = new URLSearchParams({ name: file.name });
+    if (answers) query.set("said", JSON.stringify(answers));
+    const answer = await fetch(`/api/imports?${query}`, {
+      method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" },
+    });
+    const found = await answer.json();
+    if (!answer.ok) throw new Error(said(found));
+    return found;
+  }
+
+  function cells(column) {
+    const unit = column.quantity === "force" ? "N" : "m/s²";
+    const range = column.largest === null ? ""
+      : `${column.least.toPrecision(3)} to ${column.largest.toPrecision(3)} ${unit}`;
+    const seen = [column.hits === null ? "" : `${column.hits} hits`,
+      column.is_clipped ? "clipped" : ""].filter(Boolean).join(", ");
+    const picture = column.outline.map((share) => BARS[Math.round(8 * share)]).join("");
+    return [column.name, column.unit, column.quantity ?? "left out", range, seen, picture];
+  }
+
+  function tableOf(found) {
+    const table = made("table");
+    const head = made("tr");
+    for (const textContent of ["Column", "Unit", "Taken for", "Range", "Seen", "Over time"]) {
+      head.append(made("th", { textContent, scope: "col" }));
+    }
+    table.append(head);
+    for (const column of found.columns) {
+      const line = made("tr");
+      for (const textContent of cells(column)) line.append(made("td", { textContent }));
+      table.append(line);
+    }
+    return table;
+  }
+
+  // Resolves to the answers, or to null where the file is to be sent as it is.
+  function asked(found, row) {
+    return new Promise((resolve) => {
+      const part = made("div");
+      const box = made("form", { className: "questions" });
+      const fields = found.questions.map((question, index) => {
+        const id = `question-${row.number}-${index}`;
+        const input = made("input", { id, required: true });
+        const line = made("div");
+        line.append(made("label", { htmlFor: id, textContent: question.text }), input);
+        box.append(line);
+        return [question, input];
+      });
+      const plain = made("button", { type: "button", textContent: "Send as it is" });
+      box.append(made("button", { textContent: "Keep for this logger, and send" }), plain);
+      part.append(tableOf(found), box);
+      row.item.append(part);
+      const ended = (answers) => { part.remove(); resolve(answers); };
+      plain.addEventListener("click", () => ended(null));
+      box.addEventListener("submit", (event) => {
+        event.preventDefault();
+        const answers = { columns: {} };
+        for (const [{ about, channel }, { value }] of fields) {
+          if (about === "hanger") answers.hanger = Number(value);
+          else if (about === "rate") answers.sampling_rate_hz = Number(value);
+          else (answers.columns[channel] ??= {})[about] = value;
+        }
+        ended(answers);
+      });
+    });
+  }
+
+  const written = (name) => {
+    const value = form.elements[name].value.trim();
+    return value ? Number(value) : undefined;
+  };
+
+  // Whether the file went on its way with what a person said of it.
+  async function imported(file, row) {
+    if (SENT_AS_THEY_ARE.some((ending) => file.name.toLowerCase().endsWith(ending))) return false;
+    const given = { hanger: written("hanger"), temperature_c: written("temperature_c"), columns: {} };
+    let found;
+    try {
+      found = await looked(file, null);
+    } catch {
+      return false; // sent as it is, it is refused with its reason
+    }
+    found.questions = found.questions.filter(({ about }) => about !== "hanger" || !given.hanger);
+    while (found.questions.length) {
+      state(row, "Say what the file does not: it is kept for all files of this logger.", "open");
+      const answers = await asked(found, row);
+      if (answers === null) return false;
+      for (const [name, more] of Object.entries(answers.columns)) {
+        given.columns[name] = { ...given.columns[name], ...more };
+      }
+      Object.assign(given, { ...answers, columns: given.columns });
+      let next;
+      try {
+        next = await looked(file, given);
+      } catch (error) {
+        told.textContent = `${row.name}: ${error.message}`;
+        continue;
+      }
+      found = next;
+      if (found.problems.length) throw new Error(found.problems.join(" "));
+    }
+    if (!found.sha256) return false;
+    row.bar.value = 1;
+    state(row, "Safe on the disk; the daemon takes it next.");
+    told.textContent = `${row.name} is safe on the disk.`;
+    follow(`/api/recordings?sha256=${found.sha256}`, row);
+    return true;
+  }
+
   async function one(file, row) {
     if (file.size > Number(form.dataset.maxBytes)) {
       failed(row, `Not sent: it is larger than ${size(Number(form.dataset.maxBytes))}.`);
       return;
     }
     try {
+      if (await imported(file, row)) return;
       const landed = await sent(file, row);
       row.bar.value = 1;
       const again = landed.outcome === "duplicate" ? " These bytes were known already." : "";

@@ -1,0 +1,298 @@
+"""`shm import`: a file of any logger, the first time; the second needs nothing."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import rich_click as click
+
+from shm.errors import BadInput, UsageError
+from shm.pipeline.import_answers import (
+    answer_to,
+    channel_answer,
+    import_document,
+    unit_recorded,
+)
+from shm.pipeline.importing import (
+    Answers,
+    Import,
+    Question,
+    Understood,
+    keep_profile,
+    look_into,
+    understand,
+)
+from shm.pipeline.lineage import read_limits
+from shm.read.logger_words import measured_unit
+from shm.read.modal_sets import ForeignModes
+from shm.read.profiles import Profile
+from shm.read.sandbox import foreign_modes
+from shm.store import Workspace
+from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli.held import Time
+from shm_cli.import_modes import import_modes
+from shm_daemon.landing import Landed, incoming
+
+_BARS = " ▁▂▃▄▅▆▇█"
+UFF_SUFFIXES = (".uff", ".unv", ".uf")
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--hanger", type=click.IntRange(min=0), metavar="N", help="The hanger tested.")
+@click.option(
+    "--place", multiple=True, metavar="[NAME=]M", help="Metres of a sensor from the deck end."
+)
+@click.option(
+    "--plane", multiple=True, metavar="[NAME=]PLANE", help="Plane in which a sensor measures."
+)
+@click.option("--unit", multiple=True, metavar="NAME=UNIT", help="Unit of a column that has none.")
+@click.option(
+    "--sensitivity", multiple=True, metavar="NAME=S", help="Of a sensor in volts: '100 mV/g'."
+)
+@click.option("--leave-out", multiple=True, metavar="NAME", help="A column that is no channel.")
+@click.option("--rate", type=float, metavar="HZ", help="Samples a second, if the file says none.")
+@click.option("--time", type=Time(), help="When the test was, if the file does not say.")
+@click.option("--temperature", type=float, metavar="C", help="Degrees Celsius of the steel.")
+@click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
+@json_option
+@click.pass_context
+def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **said: Any) -> int:
+    """Take a logger's file in for the first time, asking only what it does not say.
+
+    Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
+    place and plane of the sensors) is kept in the workspace, in loggers/; later files of the same
+    logger need nothing and may go into the spool as they are.
+
+    Without a terminal nothing is asked: exit code 3, and the options to add.
+
+    \b
+    Example: shm import export.csv
+    Example: shm import export.csv --hanger 3 --place 4.2,4.2 --plane transverse,longitudinal
+    """
+    workspace = open_workspace(ctx)
+    asks = not as_json and sys.stdin.isatty() and sys.stdout.isatty()
+    first = look_into(file, workspace, _whole_file(said))
+    modes = None if first.columns else _modes_in(file, workspace)
+    if modes is not None:
+        return import_modes(
+            modes, workspace, _whole_file(said), said["plane"],
+            dry_run=dry_run, as_json=as_json, asks=asks,
+        )  # fmt: skip
+    answers = _answers(said, first)
+    found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
+    if found.questions and asks:
+        _show(found)
+        answers = _asked(found.questions, answers, found)
+        found = understand(found.survey, workspace, answers)
+    landed, profile = None, found.profile
+    if found.is_ready and not dry_run:
+        profile = keep_profile(found, workspace)
+        landed = _land(file, workspace, found)
+    if as_json:
+        show(_document(found, profile, landed))
+    else:
+        _show(found)
+        _say_next(found, profile, landed, file, workspace)
+    return 0 if found.is_ready else BadInput.exit_code
+
+
+def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
+    """Modes of another program, where a UFF file holds nothing else that is read."""
+    is_universal = any(part in file.name.lower() for part in UFF_SUFFIXES)
+    return foreign_modes(file, read_limits(workspace.settings)) if is_universal else None
+
+
+# ---------------------------------------------------------------- answers
+
+
+def _whole_file(said: dict[str, Any]) -> Answers:
+    """What the options say of the whole file."""
+    rate, temperature = said["rate"], said["temperature"]
+    if rate is not None and not 0 < rate < math.inf:
+        raise UsageError(
+            f"--rate {rate:g} is no rate.", remedy="Give samples a second: --rate 512."
+        )
+    time: datetime | None = said["time"]
+    return Answers(
+        said["hanger"],
+        math.nan if rate is None else rate,
+        time,
+        math.nan if temperature is None else temperature,
+    )
+
+
+def _answers(said: dict[str, Any], found: Import) -> Answers:
+    """What the options say, of the channels too."""
+    names = [column.name for column in found.survey.columns]
+    tables: dict[str, dict[str, object]] = {}
+    for name in said["leave_out"]:
+        tables.setdefault(_column(name, names), {})["leave_out"] = True
+    for key, values in (("unit", said["unit"]), ("sensitivity", said["sensitivity"])):
+        for name, value in _named(key, values, names, names):
+            tables.setdefault(name, {}).update(
+                channel_answer(key, value, unit_recorded(name, found))
+            )
+    sensors = _accelerations(found, tables)
+    for key, values in (("place", said["place"]), ("plane", said["plane"])):
+        for name, value in _named(key, values, names, sensors):
+            tables.setdefault(name, {}).update(channel_answer(key, value))
+    return replace(_whole_file(said), channels=tables)
+
+
+def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[str]:
+    """The accelerations in the order of the file, with those that the options make such."""
+    known = {column.name: column.quantity for column in found.columns}
+    for name, given in tables.items():
+        unit = measured_unit(str(given.get("unit", "")))
+        if "leave_out" in given or unit is not None:
+            known[name] = None if unit is None else unit.quantity
+    return [name for name, quantity in known.items() if quantity == "acceleration"]
+
+
+def _named(
+    option: str, values: Sequence[str], names: Sequence[str], in_order: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Names and values: NAME=VALUE, or values in the order of the sensors, or one for all."""
+    found: list[tuple[str, str]] = []
+    plain: list[str] = []
+    for value in values:
+        name, mark, rest = value.rpartition("=")
+        if mark:
+            found.append((_column(name, names), rest.strip()))
+        else:
+            plain += [part.strip() for part in value.split(",")]
+    if len(plain) == 1:
+        plain = plain * max(1, len(in_order))
+    if plain and len(plain) != len(in_order):
+        raise UsageError(
+            f"--{option} gives {len(plain)} values for {len(in_order)} channels.",
+            remedy=f"Give one a channel, in this order: {', '.join(in_order) or 'none is known'}.",
+        )
+    return found + list(zip(in_order, plain, strict=False))
+
+
+def _column(name: str, names: Sequence[str]) -> str:
+    if name.strip() in names:
+        return name.strip()
+    raise UsageError(f"the file has no column {name!r}.", remedy=f"It has {', '.join(names)}.")
+
+
+def _asked(questions: Sequence[Question], answers: Answers, found: Import) -> Answers:
+    """The answers of the person at the terminal; what follows from them is asked again."""
+    tables = {name: dict(given) for name, given in answers.channels.items()}
+    for question in questions:
+        if question.about == "hanger":
+            answers = replace(answers, hanger=click.prompt(question.text, type=int))
+        elif question.about == "rate":
+            answers = replace(answers, sampling_rate_hz=click.prompt(question.text, type=float))
+        else:
+            prompt = _taking(question, found)
+            tables.setdefault(question.channel, {}).update(
+                click.prompt(question.text, value_proc=prompt)
+            )
+    return replace(answers, channels=tables)
+
+
+def _taking(question: Question, found: Import) -> Callable[[str], dict[str, object]]:
+    def take(text: str) -> dict[str, object]:
+        try:
+            return answer_to(question, text, found)
+        except UsageError as error:
+            raise click.UsageError(str(error)) from error
+
+    return take
+
+
+# ---------------------------------------------------------------- what is shown and kept
+
+
+def _land(file: Path, workspace: Workspace, found: Import) -> Landed:
+    """Lays the file into the spool with its sidecar, for the daemon to take as any other."""
+    with incoming(workspace.spool, workspace.settings.max_file_bytes) as coming:
+        with file.open("rb") as stream:
+            while piece := stream.read(1 << 20):
+                coming.write(piece)
+        return coming.land(file.name, found.described)
+
+
+def _show(found: Import) -> None:
+    rate, survey = found.sampling_rate_hz, found.survey
+    parts = (
+        f"{Path(survey.source).name}: {survey.format}",
+        f"hanger {found.hanger}" if found.hanger is not None else "hanger not named",
+        f"{survey.time:%Y-%m-%d %H:%M} UTC" if survey.time else "time not recorded",
+        f"{survey.samples} samples" if survey.samples else "",
+        f"{survey.samples / rate:.1f} s at {rate:g} Hz" if rate > 0 else "rate not recorded",
+    )
+    made = table(", ".join(part for part in parts if part), *_COLUMNS)
+    for column in found.columns:
+        made.add_row(*(told(column) for told in _COLUMNS.values()))
+    show_table(made)
+    for remark in survey.remarks:
+        click.echo(f"note: {remark}")
+
+
+def _range(column: Understood) -> str:
+    if not math.isfinite(column.largest):
+        return ""
+    unit = "N" if column.quantity == "force" else "m/s²"
+    return f"{column.least:.3g} to {column.largest:.3g} {unit}"
+
+
+def _seen(column: Understood) -> str:
+    told = [] if column.hits is None else [f"{column.hits} hit{'s' * (column.hits != 1)}"]
+    told += [f"{column.overloads} overloads"] if column.overloads else []
+    told += ["clipped"] if column.is_clipped else []
+    return ", ".join(told)
+
+
+_COLUMNS: dict[str, Callable[[Understood], str]] = {
+    "column": lambda column: column.name,
+    "unit": lambda column: column.unit,
+    "taken for": lambda column: column.quantity or "left out",
+    "plane": lambda column: column.plane or "",
+    "x (m)": lambda column: f"{column.x_m:g}" if math.isfinite(column.x_m) else "",
+    "range": _range,
+    "seen": _seen,
+    "over time": lambda column: "".join(
+        _BARS[round(share * (len(_BARS) - 1))] for share in column.outline
+    ).replace(" ", "·"),
+}
+
+
+def _say_next(
+    found: Import, profile: Profile | None, landed: Landed | None, file: Path, workspace: Workspace
+) -> None:
+    for problem in found.problems:
+        click.echo(f"problem: {problem}", err=True)
+    if found.questions:
+        for question in found.questions:
+            click.echo(f"open: {question.text}", err=True)
+        options = " ".join(question.option for question in found.questions)
+        click.echo(f"Add: shm import {shlex.quote(str(file))} {options}", err=True)
+    if landed is None:
+        return
+    if profile is not None:
+        where = profile.path.relative_to(workspace.folder)
+        roams = " It was at several hangers: each file must say its own." * profile.roams
+        click.echo(f"Kept for all files of this logger: {where}.{roams}")
+    running = workspace.holder() is not None
+    then = "the daemon takes it" if running else "no daemon runs; `shm daemon --once` takes it"
+    click.echo(f"In the spool as {landed.path.name}: {then}.")
+
+
+def _document(found: Import, profile: Profile | None, landed: Landed | None) -> dict[str, Any]:
+    return {
+        "file": found.survey.source,
+        **import_document(found),
+        "profile": None if profile is None else str(profile.path),
+        "landed": None if landed is None else str(landed.path),
+    }

@@ -1,0 +1,120 @@
+"""Answers of a person about a file, as text, and what is shown of the file, as a document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shm.errors import UsageError
+from shm.pipeline.importing import Import, Question, Understood
+from shm.read.logger_words import measured_unit, seconds_of, sensitivity_of, volts_of
+from shm.read.units import KNOWN
+from shm.values import PLANES, Plane
+
+_PLANES: dict[str, Plane] = {
+    "transverse": "transverse", "t": "transverse", "quer": "transverse",
+    "longitudinal": "longitudinal", "l": "longitudinal", "längs": "longitudinal",
+    "laengs": "longitudinal",
+}  # fmt: skip
+_UNKNOWN = ("unknown", "-", "?")
+_NOTHING = ("", "none", "leave out")
+
+
+def channel_answer(about: str, text: str, recorded_in: str = "") -> dict[str, object]:
+    """An answer about a channel as keys of a sidecar; raises UsageError with what may be said.
+
+    `about` is place, plane, unit or sensitivity; `recorded_in` is the unit of the column.
+    """
+    if about == "place":
+        return {"x_m": "" if text.lower() in _UNKNOWN else _number(text)}
+    if about == "plane":
+        return {"plane": plane_named(text)}
+    if about == "unit":
+        if measured_unit(text) is None and seconds_of(text) is None:
+            raise UsageError(f"{text!r} is no unit that is read.", remedy=f"Give one of {KNOWN}.")
+        return {"unit": text}
+    return _calibrated(text, recorded_in)
+
+
+def answer_to(question: Question, text: str, found: Import) -> dict[str, object]:
+    """An answer to a question about a channel; to one about its unit, nothing leaves it out."""
+    plain = text.strip()
+    if question.about != "unit":
+        return channel_answer(question.about, plain)
+    if plain.lower() in _NOTHING:
+        return {"leave_out": True}
+    unit = unit_recorded(question.channel, found)
+    is_raw = volts_of(unit) is not None or unit == "full scale"
+    return channel_answer("sensitivity" if is_raw else "unit", plain, unit)
+
+
+def unit_recorded(name: str, found: Import) -> str:
+    """The unit in which a file says that a column is recorded."""
+    return next(column.unit for column in found.survey.columns if column.name == name)
+
+
+def plane_named(text: str) -> Plane:
+    """The plane that a person means; raises UsageError."""
+    plane = _PLANES.get(text.lower())
+    if plane is None:
+        raise UsageError(f"{text!r} is no plane.", remedy=f"Give {' or '.join(PLANES)}.")
+    return plane
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        raise UsageError(
+            f"{text!r} is no place.", remedy="Give metres from the deck end, or 'unknown'."
+        ) from None
+
+
+def _calibrated(text: str, recorded_in: str) -> dict[str, object]:
+    """Unit and calibration: by a sensitivity, or by what one recorded unit is worth."""
+    found, volts = sensitivity_of(text), volts_of(recorded_in)
+    if found is not None and volts is not None:
+        return {"unit": found.unit, "calibration": found.unit_per_volt * volts}
+    number, _, unit = text.strip().partition(" ")
+    if measured_unit(unit) is not None and volts is None:
+        return {"unit": unit, "calibration": _number(number)}
+    raise UsageError(
+        f"{text!r} is no sensitivity of a column in {recorded_in or 'no unit'}.",
+        remedy="Give '100 mV/g' or '2.25 mV/N' of a column in volts, else what one recorded unit"
+        " is worth: '50 g'.",
+    )
+
+
+def import_document(found: Import) -> dict[str, Any]:
+    """What is understood of a file and what is open; unknown numbers are NaN."""
+    survey = found.survey
+    return {
+        "format": survey.format,
+        "fingerprint": survey.layout.fingerprint,
+        "hanger": found.hanger,
+        "time": found.described.get("time", survey.time),
+        "temperature_c": found.described.get("temperature_c", survey.temperature_c),
+        "sampling_rate_hz": found.sampling_rate_hz,
+        "samples": survey.samples,
+        "columns": [_column(column) for column in found.columns],
+        "questions": [question_document(question) for question in found.questions],
+        "problems": list(found.problems),
+        "remarks": list(survey.remarks),
+    }
+
+
+def question_document(question: Question) -> dict[str, str]:
+    """A question, and the option of `shm import` that answers it."""
+    return {
+        "about": question.about,
+        "channel": question.channel,
+        "text": question.text,
+        "option": question.option,
+    }
+
+
+def _column(column: Understood) -> dict[str, Any]:
+    names = (
+        "name", "unit", "quantity", "plane", "x_m", "least", "largest", "overloads", "is_clipped",
+        "hits",
+    )  # fmt: skip
+    return {**{name: getattr(column, name) for name in names}, "outline": list(column.outline)}

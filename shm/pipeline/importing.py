@@ -1,0 +1,378 @@
+"""A file of any logger, the first time: what is understood of it, and what only a person knows.
+
+What the file says itself is not asked. What was answered once holds for all files of the same
+logger (`shm.read.profiles`); where nothing is open any more the file goes into the spool.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.pipeline.lineage import read_limits
+from shm.read import logger_words as words
+from shm.read.assemble import recording
+from shm.read.header import CHANNEL_KEYS, Entry, Header
+from shm.read.profiles import Described, Profile, completed, profile_for, save_profile
+from shm.read.sandbox import survey
+from shm.read.sidecar import document_beside
+from shm.read.survey import Survey, SurveyedColumn
+from shm.store import Workspace
+from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
+
+OUTLINE_BINS = 32
+"""Into how many parts of equal length the picture of a channel divides it."""
+_ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What a person says of a file; NaN and None where nothing.
+
+    `channels` are keys of a sidecar's table of a channel, by its name.
+    """
+
+    hanger: int | None = None
+    sampling_rate_hz: float = NAN
+    time: datetime | None = None
+    temperature_c: float = NAN
+    channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+
+    @property
+    def said(self) -> dict[str, Any]:
+        """The same as the keys of a sidecar."""
+        said: dict[str, Any] = {
+            "hanger": self.hanger,
+            "time": self.time,
+            "temperature_c": self.temperature_c,
+            "sampling_rate_hz": self.sampling_rate_hz,
+        }
+        known = {k: v for k, v in said.items() if v is not None and v == v}
+        tables = {name: dict(table) for name, table in self.channels.items() if table}
+        return {**known, "channel": tables} if tables else known
+
+
+@dataclass(frozen=True)
+class Question:
+    """What only a person knows: of a channel, or of the whole file where `channel` is empty."""
+
+    about: str
+    channel: str
+    text: str
+    option: str
+
+
+@dataclass(frozen=True)
+class Understood:
+    """A column as it will be read: `least` and `largest` in SI, NaN where it is left out.
+
+    `outline` is its largest absolute value in each of `OUTLINE_BINS` parts, as a share of the
+    largest of all; `hits` is None of anything but a force.
+    """
+
+    name: str
+    unit: str
+    quantity: Quantity | None
+    plane: Plane | None
+    x_m: float
+    least: float
+    largest: float
+    overloads: int
+    is_clipped: bool
+    hits: int | None
+    outline: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Import:
+    """A file as it is understood. `described` is its sidecar, `kept` what its logger's profile is
+    to say; `problems` are what nobody can answer.
+    """
+
+    survey: Survey
+    described: Described
+    kept: Described
+    profile: Profile | None
+    columns: tuple[Understood, ...]
+    sampling_rate_hz: float
+    hanger: int | None
+    questions: tuple[Question, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def is_ready(self) -> bool:
+        return not self.questions and not self.problems
+
+
+def look_into(path: Path, workspace: Workspace, answers: Answers) -> Import:
+    """What a file holds, with all that is known of it; raises BadInput where that is nothing."""
+    with ThreadPoolExecutor(1) as beside:
+        found = beside.submit(survey, path, read_limits(workspace.settings))
+        import_module("shm.identify.measuring")  # a second, while another process reads
+        return understand(found.result(), workspace, answers)
+
+
+def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
+    """The same of a file that was looked into before."""
+    path = Path(found.source)
+    profile = profile_for(found.layout, workspace.folder)
+    own = _joined(document_beside(path), answers.said)
+    _refuse_unknown(own, found, path)
+    known = profile.described if profile is not None else {}
+    described = _with_times(completed(known, found.layout, own), found)
+    hanger = described.get("hanger", found.hanger)
+    rate = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
+    questions = _questions(found, described, hanger, rate)
+    problems = _hanger_problem(hanger, workspace)
+    record, fault = _recording(found, described, rate, path)
+    if found.lines or any(question.about in ("unit", "rate") for question in questions):
+        fault = ""  # the answers may mend it
+    if _holds_nothing(found, described, questions):
+        questions, fault = [], "; ".join(found.problems) or fault
+    kept = _to_keep(known, answers.said, found)
+    columns = _columns(found, described, record, rate)
+    problems = (*problems, *((fault,) if fault else ()))
+    return Import(
+        found, described, kept, profile, columns, rate, hanger, tuple(questions), problems
+    )
+
+
+def keep_profile(found: Import, workspace: Workspace) -> Profile | None:
+    """Keeps what was said for the next file of this logger; None where nothing had to be."""
+    before = found.profile.described if found.profile is not None else {}
+    if not found.kept or found.kept == before:
+        return found.profile
+    return save_profile(found.kept, found.survey.layout, workspace.folder)
+
+
+def _joined(first: Described, then: Described) -> dict[str, Any]:
+    """Two sidecars as one; the second goes before the first."""
+    tables = {
+        name: {**first.get("channel", {}).get(name, {}), **then.get("channel", {}).get(name, {})}
+        for name in [*first.get("channel", {}), *then.get("channel", {})]
+    }
+    return {**first, **then, "channel": tables} if tables else {**first, **then}
+
+
+def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
+    names = [column.name for column in found.columns]
+    for name in own.get("channel", {}):
+        if name not in names:
+            raise BadInput(
+                "the file has no such column.",
+                file=path,
+                channel=name,
+                remedy=f"It has {', '.join(names)}.",
+            )
+
+
+def _with_times(described: dict[str, Any], found: Survey) -> dict[str, Any]:
+    """A column that is named as times in s, which its format's reader does not take for such."""
+    if not math.isnan(found.sampling_rate_hz) or "sampling_rate_hz" in described:
+        return described
+    for column in found.columns:
+        if column.quantity is None and words.means_time(column.name) and not column.unit:
+            tables = {**described.get("channel", {}), column.name: {"unit": "s"}}
+            return {**described, "channel": tables}
+    return described
+
+
+def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
+    """What holds for every file of the logger: not the hanger that the file itself says."""
+    kept = _joined(known, {k: v for k, v in said.items() if k not in ("time", "temperature_c")})
+    if found.layout.hanger is not None:
+        kept.pop("hanger", None)
+    return kept
+
+
+def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
+    if not isinstance(hanger, int):
+        return ()
+    try:
+        workspace.bridge.tested(hanger)
+    except BadInput as error:
+        return (str(error),)
+    return ()
+
+
+# ---------------------------------------------------------------- what is open
+
+
+def _questions(found: Survey, described: Described, hanger: object, rate: float) -> list[Question]:
+    asked: list[Question] = []
+    if hanger is None:
+        asked.append(Question("hanger", "", "Which hanger was tested?", "--hanger N"))
+    if math.isnan(rate) and not found.lines:
+        asked.append(Question("rate", "", "How many samples a second?", "--rate HZ"))
+    columns = [_told(column, described) for column in found.columns]
+    asked += [_of_unit(column) for column in _open(columns)]
+    for column in columns:
+        if column.quantity == "acceleration":
+            asked += _of_sensor(column, described)
+    return asked
+
+
+def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
+    """Whether no answer can make it a recording: no column is, or may be, an acceleration."""
+    may_be = any(question.about == "unit" for question in questions)
+    measured = {_told(column, described).quantity for column in found.columns}
+    return "acceleration" not in measured and not may_be
+
+
+def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
+    """A column with what the sidecar says of it."""
+    table = described.get("channel", {}).get(column.name, {})
+    unit = str(table.get("unit", column.described_unit))
+    measured = words.measured_unit(unit)
+    quantity = measured.quantity if measured is not None else None
+    if "unit" not in table and quantity is None:
+        quantity = column.quantity
+    if table.get("leave_out"):
+        quantity = None
+    return replace(
+        column,
+        quantity=quantity,
+        described_unit=unit,
+        plane=table.get("plane", column.plane) or None,
+        x_m=_number(table.get("x_m", column.x_m)),
+        calibration=_number(table.get("calibration", column.calibration)),
+        full_scale=_number(table.get("full_scale", column.full_scale)),
+        meant=None if "leave_out" in table or "unit" in table else column.meant,
+        unit="(answered)" if "leave_out" in table or "unit" in table else column.unit,
+    )
+
+
+def _number(value: object) -> float:
+    try:
+        return float(str(value))
+    except ValueError:
+        return NAN
+
+
+def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
+    """Columns that may be a force or an acceleration, of which nothing says in what unit."""
+    has = {column.quantity for column in columns}
+    unclear = [c for c in columns if c.quantity is None and c.unit != "(answered)"]
+    in_volts = [c for c in unclear if words.volts_of(c.unit) is not None]
+    plain = [c for c in unclear if c.unit.lower() in _ASKED_UNITS]
+    named = [c for c in plain if c.meant is not None]
+    if "acceleration" not in has and not named and not in_volts:
+        named = plain
+    return [c for c in columns if c in in_volts or c in named]
+
+
+def _of_unit(column: SurveyedColumn) -> Question:
+    quoted = shlex.quote(column.name)
+    if words.volts_of(column.unit) is None and column.unit != "full scale":
+        text = f"In what unit is {column.name} recorded (N, kN, m/s2, g)?"
+        option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
+    else:
+        text = f"What does the sensor of {column.name} give (such as 100 mV/g, 2.25 mV/N)?"
+        option = f"--sensitivity {quoted}='100 mV/g' or --leave-out {quoted}"
+        if column.unit == "full scale":
+            text = f"What is the full scale of {column.name} worth (such as 50 g, 2000 N)?"
+            option = f"--sensitivity {quoted}='50 g' or --leave-out {quoted}"
+    return Question("unit", column.name, text, option)
+
+
+def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
+    name, quoted = column.name, shlex.quote(column.name)
+    asked = []
+    if math.isnan(column.x_m) and "x_m" not in {
+        *described.get("channel", {}).get(name, {}),
+        *described,
+    }:
+        text = f"Where is {name}, in m from the deck end (or 'unknown')?"
+        asked.append(Question("place", name, text, f"--place {quoted}=M"))
+    if column.plane is None and "plane" not in described:
+        text = f"In which plane does {name} measure (transverse or longitudinal)?"
+        asked.append(Question("plane", name, text, f"--plane {quoted}=transverse|longitudinal"))
+    return asked
+
+
+# ---------------------------------------------------------------- what is shown
+
+
+def _recording(
+    found: Survey, described: Described, rate: float, path: Path
+) -> tuple[Recording | None, str]:
+    """The recording as it will be read, or why it will be refused."""
+    try:
+        columns = [_told(column, described) for column in found.columns]
+        used = [c for c in columns if c.quantity is not None and c.values is not None]
+        header = Header(path, {c.name: _entries(c, path) for c in used})
+        values = np.array([c.values for c in used]).reshape(len(used), found.samples)
+        return recording(header, values, path, rate), ""
+    except BadInput as error:
+        return None, str(error)
+
+
+def _entries(column: SurveyedColumn, path: Path) -> dict[str, Entry]:
+    said = {
+        "unit": column.described_unit,
+        "plane": column.plane,
+        "x_m": column.x_m,
+        "calibration": column.calibration,
+        "full_scale": column.full_scale,
+    }
+    known = {k: v for k, v in said.items() if v is not None and v == v and k in CHANNEL_KEYS}
+    return {key: Entry(value, path) for key, value in known.items()}
+
+
+def _columns(
+    found: Survey, described: Described, record: Recording | None, rate: float
+) -> tuple[Understood, ...]:
+    channels = {} if record is None else {c.name: c for c in record.channels}
+    return tuple(
+        _understood(column, _told(column, described), channels.get(column.name), rate)
+        for column in found.columns
+    )
+
+
+def _understood(
+    raw: SurveyedColumn, told: SurveyedColumn, channel: Channel | None, rate: float
+) -> Understood:
+    from shm.identify.measuring.hits import find_pulses
+    from shm.identify.measuring.signal_faults import clipped
+
+    values = raw.values if channel is None else channel.values
+    good = np.zeros(0) if values is None else values[np.isfinite(values)]
+    measured = told.quantity is not None and channel is not None and len(good) > 0
+    hits = None
+    if told.quantity == "force" and values is not None and rate > 0:
+        hits = len(find_pulses(values, rate))
+    limit = NAN if channel is None else channel.full_scale
+    return Understood(
+        name=raw.name,
+        unit=raw.unit or raw.described_unit,
+        quantity=told.quantity,
+        plane=told.plane,
+        x_m=told.x_m,
+        least=float(good.min()) if measured else NAN,
+        largest=float(good.max()) if measured else NAN,
+        overloads=raw.overloads,
+        is_clipped=raw.overloads > 0 or (measured and bool(clipped([good], limit)[0])),
+        hits=hits,
+        outline=_outline(values),
+    )
+
+
+def _outline(values: FloatArray | None) -> tuple[float, ...]:
+    """The largest departure from the middle in each part, as a share of the largest of all."""
+    if values is None or len(values) < OUTLINE_BINS or not np.isfinite(values).any():
+        return ()
+    middle = float(np.nanmedian(values))
+    away = np.nan_to_num(np.abs(values - middle), posinf=0.0)
+    parts = np.array([part.max() for part in np.array_split(away, OUTLINE_BINS)])
+    top = float(parts.max())
+    return tuple(float(part) for part in (parts / top if top > 0 else parts))

@@ -1,0 +1,242 @@
+"""What stands above the numbers of a logger's text: names, units, rate, time, hanger.
+
+Names and units may stand in one row (`Kraft [N]`), in two, or in rows that begin with a label
+(`Einheit;s;N;g`). All else is lines of a key and its value.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shm.read import logger_words as words
+from shm.read.logger_rows import Script, is_number, number_of
+from shm.read.stamps import parsed
+from shm.values import NAN
+
+_NAME_LABELS = {
+    "name", "names", "channel", "channels", "channelname", "kanal", "kanalname", "kanäle", "signal",
+    "signalname", "sensor", "messstelle", "bezeichnung", "label", "channellabel",
+}  # fmt: skip
+_UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "yunitlabel", "physicalunit", "dim",
+    "dimension", "engineeringunits", "eu", "phyeinheit"}  # fmt: skip
+_KEY = re.compile(r"\s*[:=]\s+|\s*=\s*|:\s*(?=\D|\d+(?:[.,]\d+)?\s*$)")
+_RATE_IN_WORDS = re.compile(
+    r"(?:rate|frequen|sampl|abtast|mess)\D{0,40}?(\d[\d.,]*)\s*(k?)(?:hz|s/s|sps|samples?/s)", re.I
+)
+_HERTZ = re.compile(r"(k?)(hz|s/s|sps|1/s|samples?/s(ec(ond)?)?|samples? ?per ?second)?", re.I)
+_VALUE = re.compile(r"([+-]?\d[\d.,'eE+-]*)\s*(.*)")
+_WITH_UNIT = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
+_PLAIN_COUNTER = "column"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """`names` and `units` by column, "" where nothing says one; `sensitivities` likewise.
+
+    `facts` are keys and values of the preamble, `names_line` counts from 1, 0 without names.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    sensitivities: tuple[words.Sensitivity | None, ...]
+    facts: tuple[tuple[str, str], ...]
+    names_line: int
+
+
+def heading_of(above: Sequence[str], script: Script) -> Heading:
+    """What the lines above the numbers say."""
+    rows = {
+        place: cells
+        for place, line in enumerate(above)
+        if (cells := _cells(line, script)) and len(cells) <= len(script.kinds) + 1
+    }
+    wide = {place: _padded(cells, script) for place, cells in rows.items() if len(cells) > 1}
+    at = _names_at(wide, script)
+    split = [words.name_and_unit(cell) for cell in wide.get(at, [""] * len(script.kinds))]
+    if at in wide and _label(wide[at][0]) in _NAME_LABELS:
+        split[0] = ("", "")
+    others = {place: cells for place, cells in wide.items() if place != at}
+    units_at = _units_at(others, at, script)
+    below = [_no_label(cell, place == 0) for place, cell in enumerate(others.get(units_at, []))]
+    units = [(below[i] if below else "") or own for i, (_, own) in enumerate(split)]
+    taken = {at, units_at}
+    facts = [
+        fact
+        for place, line in enumerate(above)
+        if place not in taken and (fact := _fact_at(place, above, script)) is not None
+    ]
+    names = unlike(tuple(name for name, _ in split))
+    return Heading(names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1)
+
+
+def _cells(line: str, script: Script) -> list[str]:
+    """The cells of a line without empty ones at its end, and without a sign of remarks."""
+    plain = line.lstrip("\ufeff#%! ") if line.strip() else ""
+    cells = _blank_parted(plain, script) if script.mark == " " else script.cells(plain)
+    while cells and not cells[-1]:
+        cells.pop()
+    return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def _blank_parted(line: str, script: Script) -> list[str]:
+    """The names above columns that blanks part: a name may hold one, before its unit."""
+    wide = [cell for cell in re.split(r"\s{2,}|\t", line.strip()) if cell]
+    if len(wide) == len(script.kinds):
+        return wide
+    return [cell.strip() for cell in _WITH_UNIT.findall(line)]
+
+
+def _padded(cells: list[str], script: Script) -> list[str]:
+    return (cells + [""] * len(script.kinds))[: max(len(script.kinds), 1)]
+
+
+def _label(text: str) -> str:
+    return words.key_of(text)
+
+
+def _no_label(text: str, is_first: bool) -> str:
+    return "" if is_first and _label(text) in _UNIT_LABELS else text.strip("[]() ")
+
+
+def _names_at(rows: dict[int, list[str]], script: Script) -> int:
+    """The row that names the columns, -1 where none does: what is understood, then the last."""
+    scored = {place: _score(cells, script) for place, cells in rows.items()}
+    best = max(scored, key=lambda place: (scored[place], place), default=-1)
+    return best if best >= 0 and scored[best] > 0 else -1
+
+
+def _score(cells: Sequence[str], script: Script) -> float:
+    """How well a row names the columns of numbers; 0 where it leaves one without a name."""
+    needed = [c for c, kind in zip(cells, script.kinds, strict=True) if kind == "number"]
+    named = [cell for cell in needed if cell and not is_number(cell, script.decimal)]
+    if not named or all(map(words.is_unit, named)) or cells[0].endswith(":"):
+        return 0.0
+    if any(not cell or is_number(cell, script.decimal) for cell in needed[1:]):
+        return 0.0
+    labelled = _label(cells[0]) in _NAME_LABELS
+    if not labelled and (_label(cells[0]) in _UNIT_LABELS or any(map(parsed, named))):
+        return 0.0
+    understood = sum(_is_understood(cell) for cell in cells if cell)
+    return 1.0 + understood + 0.5 * labelled
+
+
+def _is_understood(cell: str) -> bool:
+    name, unit = words.name_and_unit(cell)
+    return bool(unit) or words.means_time(name) or words.quantity_meant(name) is not None
+
+
+def _units_at(rows: dict[int, list[str]], names_at: int, script: Script) -> int:
+    """The row of units nearest to the names, -1 where there is none."""
+    fitting = [place for place, cells in rows.items() if _are_units(cells, script)]
+    return min(fitting, key=lambda place: abs(place - names_at), default=-1)
+
+
+def _are_units(cells: Sequence[str], script: Script) -> bool:
+    labelled = _label(cells[0]) in _UNIT_LABELS
+    said = [_no_label(cell, place == 0) for place, cell in enumerate(cells) if cell]
+    said = [cell for cell in said if cell]
+    measured = [cell for cell in said if words.measured_unit(cell) or words.volts_of(cell)]
+    if labelled:
+        return bool(measured)
+    return bool(measured) and len(said) > 1 and all(map(words.is_unit, said))
+
+
+def _sensitivities(
+    rows: dict[int, list[str]], script: Script
+) -> tuple[words.Sensitivity | None, ...]:
+    for cells in rows.values():
+        found = tuple(words.sensitivity_of(cell) for cell in cells)
+        if any(found):
+            return found
+    return (None,) * len(script.kinds)
+
+
+def unlike(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of printable characters, each once; a column without one by its number."""
+    taken: list[str] = []
+    for place, name in enumerate(names, start=1):
+        plain = "".join(c for c in name if c.isprintable() and ord(c) < 0x10000)[:60].strip()
+        plain = plain or f"{_PLAIN_COUNTER}_{place}"
+        twin, count = plain, 2
+        while twin in taken:
+            twin, count = f"{plain}_{count}", count + 1
+        taken.append(twin)
+    return tuple(taken)
+
+
+def _fact_at(place: int, above: Sequence[str], script: Script) -> tuple[str, str] | None:
+    """The fact of a line; where that is a key alone, `dt:`, its value is the line below."""
+    plain = above[place].strip()
+    if plain.endswith(":") and plain.count(":") == 1 and place + 1 < len(above):
+        below = _cells(above[place + 1], script)
+        return (plain[:-1], below[0]) if below else None
+    return _fact(above[place], script)
+
+
+def _fact(line: str, script: Script) -> tuple[str, str] | None:
+    """Key and value of a line of the preamble; its unit, where the key has one, after the value."""
+    plain = line.strip().lstrip("\ufeff#%!* ").strip()
+    cells = [cell for cell in _cells(line, script) if cell] if script.mark != " " else [plain]
+    if len(cells) > 1 and not cells[0].rstrip().endswith(("=",)):
+        key, value = cells[0].rstrip(":= "), _joined(cells[1:], script)
+        if ":" not in key and "=" not in key:
+            return _with_unit(key, value)
+    parts = _KEY.split(plain.strip('"'), maxsplit=1)
+    if len(parts) == 2 and parts[0].strip() and parts[1].strip():
+        return _with_unit(parts[0].strip(), parts[1].strip(' "'))
+    return ("", plain) if plain else None
+
+
+def _joined(cells: Sequence[str], script: Script) -> str:
+    """A value with its unit, or the first of several."""
+    more = cells[1] if len(cells) > 1 and not is_number(cells[1], script.decimal) else ""
+    return (
+        f"{cells[0]} {more}".strip() if words.is_unit(more) or _HERTZ.fullmatch(more) else cells[0]
+    )
+
+
+def _with_unit(key: str, value: str) -> tuple[str, str]:
+    name, unit = words.name_and_unit(key)
+    return (name, f"{value} {unit}") if unit and _VALUE.fullmatch(value) else (key, value)
+
+
+# ---------------------------------------------------------------- what the facts say
+
+
+def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
+    """The sampling rate that a preamble says, in Hz; NaN where it says none."""
+    for key, value in facts:
+        number, unit = quantity_said(value, decimal)
+        if not number > 0:
+            continue
+        hertz = _HERTZ.fullmatch(unit)
+        if words.means_rate(key) and hertz:
+            return number * (1e3 if hertz[1] else 1.0)
+        if words.means_interval(key):
+            seconds = words.seconds_of(unit) if unit else 1.0
+            if seconds:
+                return 1 / (number * seconds)
+    for key, value in facts:
+        found = _RATE_IN_WORDS.search(f"{key} {value}")
+        if found is not None and "filter" not in f"{key} {value}".lower():
+            number, _ = quantity_said(found[1], decimal)
+            return number * (1e3 if found[2] else 1.0)
+    return NAN
+
+
+def quantity_said(text: str, decimal: str) -> tuple[float, str]:
+    """The number at the beginning of a text, and what follows it; NaN where there is none.
+
+    A preamble does not always keep to the decimal mark of the numbers: 0.001 is a thousandth.
+    """
+    found = _VALUE.fullmatch(text.strip())
+    if found is None:
+        return NAN, ""
+    broken = re.match(r"[+-]?0([.,])", found[1])
+    marks = broken[1] if broken else (decimal, "," if decimal == "." else ".")
+    for mark in marks:
+        if is_number(found[1], mark):
+            return number_of(found[1], mark), found[2].strip(" []()")
+    return NAN, ""

@@ -1,0 +1,310 @@
+"""Where the numbers of a logger's text are, and how they are written.
+
+Found from lines in the midst of the file, where there is nothing but numbers: what separates the
+columns, which mark is decimal, what kind of cells each column has. From there up to the heading and
+down to the tail.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read.stamps import is_stamp
+from shm.values import NAN, FloatArray
+
+Kind = Literal["number", "stamp", "text", "empty"]
+
+_SAMPLE_LINES = 60  # judgement: enough that a bad line or two do not decide
+_MOST_PREAMBLE = 2000  # judgement: lines; the longest heading of a logger has some hundred
+_SHARE = 0.9  # judgement: of the sample; a heading in the midst is less than a tenth of it
+_MISSING = {
+    "", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nv", "#nv", "invalid", "bad",
+    "ungültig", "-nan", "1.#qnan", "-1.#ind", "nan.0", "#div/0!", "#value!", "#num!", "#ref!",
+}  # fmt: skip
+_OVER = re.compile(
+    r"[+-]?(ov(e?r)?(l|ld|f|flow|range|load)?|over[ _-]?(range|load|flow|fl)?|ol|o\.l\.?|∞"
+    r"|inf(inity)?"
+    r"|1\.#inf|überlauf|ueberlauf|übersteuert|uebersteuert|clip(ped)?|\*{2,}|#{2,}|9\.9e\+?37)"
+    r"(\.0*)?",
+    re.IGNORECASE,
+)
+_REMARK = "#"
+_BLANKS = re.compile(r"[ \u00a0\u202f]+")
+_GROUPS = r"[ \u00a0\u202f'\u2019]"
+_NUMBERS = {
+    ".": re.compile(
+        rf"(?=[+-]?[.,]?\d)[+-]?(?:\d{{1,3}}(?:,\d{{3}})+|\d{{1,3}}(?:{_GROUPS}\d{{3}})+|\d+)?(?:\.\d*)?(?:[eEdD][+-]?\d+)?"
+    ),
+    ",": re.compile(
+        rf"(?=[+-]?[.,]?\d)[+-]?(?:\d{{1,3}}(?:\.\d{{3}})+|\d{{1,3}}(?:{_GROUPS}\d{{3}})+|\d+)?(?:,\d*)?(?:[eEdD][+-]?\d+)?"
+    ),
+}
+_MARKS = ("\t", ";", "|", ", ", ",", " ")
+
+
+@dataclass(frozen=True)
+class Script:
+    """How the rows are written: `mark` between cells, decimal mark, kind of each column."""
+
+    mark: str
+    decimal: str
+    kinds: tuple[Kind, ...]
+    quoted: bool
+
+    def cells(self, line: str) -> list[str]:
+        """The cells of a line, without blanks and quotes around them."""
+        if self.quoted and '"' in line:
+            quoted = next(csv.reader([line], delimiter=self.mark[0], skipinitialspace=True), [])
+            return [cell.strip() for cell in quoted]
+        if self.mark == " ":
+            return _BLANKS.sub(" ", line.strip()).split(" ")
+        return [cell.strip() for cell in line.split(self.mark)]
+
+    def row(self, line: str) -> list[str] | None:
+        """The cells of a line as long as the columns; None where it cannot be a row of numbers."""
+        cells = self.cells(line)
+        count = len(self.kinds)
+        if len(cells) > count and not any(cells[count:]):
+            cells = cells[:count]
+        missing = self.kinds[len(cells) :]
+        if len(cells) > count or any(kind in ("number", "stamp") for kind in missing):
+            return None
+        cells += [""] * len(missing)
+        return cells if self._fits(cells) else None
+
+    def _fits(self, cells: Sequence[str]) -> bool:
+        some = False
+        for cell, kind in zip(cells, self.kinds, strict=True):
+            if kind == "number":
+                if is_number(cell, self.decimal):
+                    some = True
+                elif not is_gap(cell) and not is_over(cell):
+                    return False
+            elif (kind == "stamp" and not is_stamp(cell)) or (
+                kind == "empty" and not some and not is_gap(cell)
+            ):
+                return False
+        return some
+
+
+@dataclass(frozen=True)
+class Block:
+    """The rows of numbers: `above` are the lines before them, `first_line` counts from 1.
+
+    `rows` are cells by row, `lines` the number of the line of each; `seam` is the line at which a
+    heading stands in their midst, 0 without: then times must run on over it.
+    """
+
+    script: Script
+    above: tuple[str, ...]
+    rows: list[list[str]]
+    lines: list[int]
+    remarks: tuple[str, ...] = ()
+    seam: int = 0
+
+
+def is_number(text: str, decimal: str) -> bool:
+    """Whether a text is a number with that decimal mark, its thousands grouped or not."""
+    return _NUMBERS[decimal].fullmatch(text) is not None
+
+
+def is_gap(text: str) -> bool:
+    """Whether a cell says that there is no value."""
+    return text.lower() in _MISSING
+
+
+def is_over(text: str) -> bool:
+    """Whether a cell says that the value was beyond what the logger can record."""
+    return _OVER.fullmatch(text) is not None
+
+
+def number_of(text: str, decimal: str) -> float:
+    """The number that a text with that decimal mark says; raises ValueError."""
+    plain = re.sub(_GROUPS, "", text)
+    plain = plain.replace(".", "").replace(",", ".") if decimal == "," else plain.replace(",", "")
+    return float(plain.replace("d", "e").replace("D", "e"))
+
+
+# ---------------------------------------------------------------- how it is written
+
+
+def script_of(lines: Sequence[str]) -> Script | None:
+    """How the rows in the midst of a text are written; None where there are none."""
+    filled = [line for line in lines if line.strip()]
+    if len(filled) < 2:
+        return None
+    middle = max(0, (len(filled) + min(len(filled), 200)) // 2 - _SAMPLE_LINES // 2)
+    sample = filled[middle : middle + _SAMPLE_LINES] or filled[-_SAMPLE_LINES:]
+    quoted = any('"' in line for line in (*filled[:_SAMPLE_LINES], *sample))
+    for mark in _MARKS:
+        found = _script(sample, mark, quoted)
+        if found is not None:
+            return found
+    return None
+
+
+def _script(sample: Sequence[str], mark: str, quoted: bool) -> Script | None:
+    """How a sample is written if that is the mark; None where it is not."""
+    if sum(mark in line for line in sample) < _SHARE * len(sample):
+        return None
+    plain = Script(mark, ".", (), quoted)
+    rows = [plain.cells(line) for line in sample]
+    count, times = Counter(map(len, rows)).most_common(1)[0]
+    if count < 2 or times < _SHARE * len(rows):
+        return None
+    even = [row for row in rows if len(row) == count]
+    columns = list(zip(*even, strict=True))
+    decimal = "." if mark == "," and '"' not in "".join(sample) else _decimal(columns)
+    if mark == ", " and decimal != ",":
+        return None
+    kinds = tuple(_kind(column, decimal) for column in columns)
+    if "number" not in kinds or kinds.count("text") > kinds.count("number") + 1:
+        return None
+    return Script(mark, decimal, kinds, quoted)
+
+
+def _decimal(columns: Sequence[Sequence[str]]) -> str:
+    """The decimal mark by which more cells are numbers; where both do, by how they are grouped."""
+    cells = [c for column in columns for c in column if c and ("," in c or "." in c)]
+    cells = [cell for cell in cells if not is_stamp(cell)]
+    by_point, by_comma = (sum(is_number(c, mark) for c in cells) for mark in ".,")
+    if by_point != by_comma:
+        return "." if by_point > by_comma else ","
+    # All fit both, as 1,234 and 12,345 do: then commas alone are decimal, as grouped thousands
+    # without any decimals are rare.
+    return "," if cells and all("," in cell and "." not in cell for cell in cells) else "."
+
+
+def _kind(cells: Sequence[str], decimal: str) -> Kind:
+    said = [cell for cell in cells if not is_gap(cell) and not is_over(cell)]
+    if not said:
+        return "number" if any(map(is_over, cells)) else "empty"
+    if sum(is_number(cell, decimal) for cell in said) >= _SHARE * len(said):
+        return "number"
+    return "stamp" if sum(map(is_stamp, said)) >= _SHARE * len(said) else "text"
+
+
+# ---------------------------------------------------------------- where it is
+
+
+def block_of(lines: Sequence[str], script: Script, path: Path) -> Block | None:
+    """The rows of a text, up from its heading and down to its tail; None where there are none.
+
+    Raises BadInput for a line in their midst that is none.
+    """
+    start = _first(lines, script)
+    if start is None:
+        return None
+    stop, remarks = _last(lines, script, start)
+    rows: list[list[str]] = []
+    numbers: list[int] = []
+    keys = {cells[0] for line in lines[:start] if (cells := script.cells(line))[0]}
+    seam = 0
+    for place in range(start, stop):
+        line = lines[place]
+        if not line.strip() or line.lstrip().startswith(_REMARK):
+            continue
+        row = script.cells(line)
+        if len(row) != len(script.kinds):
+            row = script.row(line) or []
+        if row and row[0] in keys:
+            row = []
+        if not row and script.cells(line)[0] in keys:
+            seam = seam or place + 1
+            continue
+        if not row:
+            raise _no_row(script.cells(line), place + 1, script, path)
+        rows.append(row)
+        numbers.append(place + 1)
+    return Block(script, tuple(lines[:start]), rows, numbers, remarks, seam) if rows else None
+
+
+def _first(lines: Sequence[str], script: Script) -> int | None:
+    """The first line of two running that are rows."""
+    before: int | None = None
+    for place, line in enumerate(lines[:_MOST_PREAMBLE]):
+        if not line.strip():
+            continue
+        if script.row(line) is None:
+            before = None
+        elif before is not None:
+            return before
+        else:
+            before = place
+    return before
+
+
+def _last(lines: Sequence[str], script: Script, start: int) -> tuple[int, tuple[str, ...]]:
+    """The end of the rows, and a remark on what is left out behind it."""
+    stop = len(lines)
+    while stop > start and (not lines[stop - 1].strip() or script.row(lines[stop - 1]) is None):
+        stop -= 1
+    left = [line for line in lines[stop:] if line.strip(" \t\x1a\x00")]
+    if not left:
+        return stop, ()
+    return stop, (f"{len(left)} lines after the last row are no numbers; left out.",)
+
+
+def second_record(line: int, path: Path) -> BadInput:
+    """The refusal of a file in which a second record begins at a line."""
+    return BadInput(
+        "a second record begins here, with a heading of its own.",
+        file=path,
+        line=line,
+        remedy="Export each recording to a file of its own; `ingest --together` joins them.",
+    )
+
+
+def _no_row(cells: Sequence[str], line: int, script: Script, path: Path) -> BadInput:
+    """The refusal of a damaged line in the midst of the rows."""
+    return BadInput(
+        f"{' '.join(cells)[:60]!r} is no row of {len(script.kinds)} values.",
+        file=path,
+        line=line,
+        remedy="Complete or remove the line, or export again; a bad value may be left empty.",
+    )
+
+
+def values_of(block: Block, column: int, path: Path) -> tuple[FloatArray, int]:
+    """The numbers of a column, NaN where there are none, and how many were beyond the range.
+
+    Raises BadInput for a cell that is none of these.
+    """
+    texts = [row[column] for row in block.rows]
+    plain = _plainly(texts, block.script.decimal)
+    if plain is not None:
+        return plain, 0
+    over = 0
+    values = np.full(len(texts), NAN)
+    for place, text in enumerate(texts):
+        if is_number(text, block.script.decimal):
+            values[place] = number_of(text, block.script.decimal)
+            if np.isinf(values[place]):
+                raise _no_row(block.rows[place], block.lines[place], block.script, path)
+        elif is_over(text):
+            over += 1
+        elif not is_gap(text):
+            raise _no_row(block.rows[place], block.lines[place], block.script, path)
+    return values, over
+
+
+def _plainly(texts: Sequence[str], decimal: str) -> FloatArray | None:
+    """The numbers of cells that hold nothing else, without grouped thousands; else None."""
+    if decimal == ",":
+        if any("." in text for text in texts):
+            return None
+        texts = [text.replace(",", ".") for text in texts]
+    try:
+        found = np.array(list(map(float, texts)))
+    except ValueError:
+        return None
+    return found if np.isfinite(found).all() else None

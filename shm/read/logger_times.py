@@ -1,0 +1,206 @@
+"""The columns of times of a logger's text: seconds, milliseconds, clock times, counters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read import logger_words as words
+from shm.read.logger_heading import Heading
+from shm.read.logger_rows import Block, second_record, values_of
+from shm.read.stamps import parsed, seconds_of_stamps
+from shm.read.table import REMEDY, evened
+from shm.values import NAN, FloatArray
+
+# Judgement: no logger records a hammer test slower than this, and none faster.
+_SLOWEST_HZ, _FASTEST_HZ = 20.0, 200_000.0
+_LEAST_EPOCH_S, _EPOCHS = 1e8, ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3), (1e8, 1.0))
+_SHEET_DAYS = (30_000.0, 60_000.0)  # 1982 to 2064, as spreadsheets count days
+_SHEET_START = datetime(1899, 12, 30, tzinfo=UTC)  # day 0 of spreadsheets
+_EVEN = 0.1  # judgement: of a step, which may be rounded
+_FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give the rate alone
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """What the columns of times tell; `used` are the columns that hold no measurement."""
+
+    used: frozenset[int]
+    rate_hz: float = NAN
+    start: datetime | None = None
+    evened: Callable[[FloatArray], FloatArray] = lambda values: values
+    remarks: tuple[str, ...] = ()
+
+
+def clock_of(heading: Heading, block: Block, said_hz: float, path: Path) -> Clock:
+    """The times of the rows; raises BadInput naming the line where they are uneven.
+
+    `said_hz` is the rate by the preamble, which decides in what unit times are that have none.
+    """
+    stamps = [i for i, kind in enumerate(block.script.kinds) if kind == "stamp"]
+    numbers = [i for i, kind in enumerate(block.script.kinds) if kind == "number"]
+    times = [
+        i for i in numbers if _is_time(heading, i) or _keeps_step(heading, block, i, said_hz, path)
+    ]
+    counters = [i for i in numbers if i not in times and _is_counter(heading, block, i, path)]
+    if not times and not stamps and counters and math.isnan(said_hz):
+        times = _nameless_times(heading, block, counters, path)
+    used = frozenset([*stamps, *times, *counters])
+    if block.seam and not times and not stamps:
+        raise second_record(block.seam, path)
+    for place in times:
+        found = _of_numbers(heading, block, place, said_hz, path)
+        if found is not None:
+            seconds, start = found
+            start = start or _start_of(block, stamps)
+            return _even(seconds, said_hz, start, used, heading.names[place], block, path)
+    if stamps:
+        texts = [" ".join(row[i] for i in stamps) for row in block.rows]
+        return _of_stamps(texts, said_hz, used, heading.names[stamps[0]], block, path)
+    remarks = (f"the unit of {heading.names[times[0]]} is not said; left out.",) if times else ()
+    return Clock(used, remarks=remarks)
+
+
+def _is_time(heading: Heading, place: int) -> bool:
+    unit = heading.units[place]
+    named = words.means_time(heading.names[place])
+    in_seconds = words.seconds_of(unit) is not None
+    return (named and (in_seconds or not unit)) or (in_seconds and place == 0)
+
+
+def _keeps_step(heading: Heading, block: Block, place: int, said_hz: float, path: Path) -> bool:
+    """Whether a column without a name runs on by the step that the preamble says."""
+    if math.isnan(said_hz) or heading.names[place] != f"column_{place + 1}":
+        return False
+    values, _ = values_of(block, place, path)
+    steps = np.diff(values)
+    return bool(len(steps) and np.all(np.abs(steps * said_hz - 1) < _EVEN))
+
+
+def _is_counter(heading: Heading, block: Block, place: int, path: Path) -> bool:
+    """Whether a column counts the rows: by its name, or in the first place without a name."""
+    named = words.means_counter(heading.names[place])
+    if not named and not (place == 0 and heading.names[place] == "column_1"):
+        return False
+    values, _ = values_of(block, place, path)
+    steps = np.diff(values)
+    return bool(len(steps) and np.all(steps == steps[0]) and steps[0] > 0)
+
+
+def _nameless_times(heading: Heading, block: Block, counters: list[int], path: Path) -> list[int]:
+    """A nameless first column in even steps of less than one: times, as nothing counts so."""
+    first = counters[0]
+    values, _ = values_of(block, first, path)
+    is_times = heading.names[first] == "column_1" and 0 < values[1] - values[0] < 1
+    return [first] if is_times else []
+
+
+def _of_numbers(
+    heading: Heading, block: Block, place: int, said_hz: float, path: Path
+) -> tuple[FloatArray, datetime | None] | None:
+    """Seconds since the start, and the start where they say it; None where their unit is open."""
+    values, _ = values_of(block, place, path)
+    if len(values) < 2 or not np.isfinite(values).all():
+        return None
+    factor = words.seconds_of(heading.units[place])
+    if factor is None or values[0] > _LEAST_EPOCH_S:
+        since = _since_epoch(values)
+        if since is not None:
+            return since
+    if factor is None:
+        factor = _factor(values, said_hz)
+    return None if factor is None else (factor * (values - values[0]), None)
+
+
+def _since_epoch(values: FloatArray) -> tuple[FloatArray, datetime] | None:
+    """Times as seconds since 1970 or days since 1900."""
+    first, step = float(values[0]), float(np.median(np.diff(values)))
+    if _SHEET_DAYS[0] < first < _SHEET_DAYS[1] and 0 < step * 86400 < 1:
+        return 86400 * (values - first), _SHEET_START + timedelta(days=first)
+    for least, factor in _EPOCHS:
+        if least < first < 50 * least:
+            start = datetime.fromtimestamp(first * factor, UTC)
+            return factor * (values - first), start
+    return None
+
+
+def _factor(values: FloatArray, said_hz: float) -> float | None:
+    """The unit of times that have none, in s: by the rate that is said, else if only s can be."""
+    span = float(values[-1] - values[0])
+    if not span > 0:
+        return None
+    rate = (len(values) - 1) / span
+    if not math.isnan(said_hz):
+        return next((f for f in (1.0, 1e-3, 1e-6) if abs(rate / f / said_hz - 1) < 0.01), None)
+    return 1.0 if _SLOWEST_HZ <= rate <= _FASTEST_HZ else None
+
+
+def _start_of(block: Block, stamps: list[int]) -> datetime | None:
+    found = parsed(" ".join(block.rows[0][i] for i in stamps)) if stamps else None
+    return found[0] if found is not None and found[1] else None
+
+
+def _of_stamps(
+    texts: list[str], said_hz: float, used: frozenset[int], name: str, block: Block, path: Path
+) -> Clock:
+    seconds = seconds_of_stamps(texts)
+    first = parsed(texts[0])
+    if seconds is None or first is None:
+        wrong = next(place for place, text in enumerate(texts) if parsed(text) is None)
+        raise _fault(block, name, path)(wrong, f"{texts[wrong][:40]!r} is no time")
+    start = first[0] if first[1] else None
+    return _even(seconds, said_hz, start, used, name, block, path)
+
+
+def _even(
+    seconds: FloatArray, said_hz: float, start: datetime | None, used: frozenset[int],
+    name: str, block: Block, path: Path,
+) -> Clock:  # fmt: skip
+    """The clock of seconds that may be rounded so that several rows have the same."""
+    fault = _fault(block, name, path)
+    back = np.flatnonzero(np.diff(seconds) < 0)
+    if block.seam and len(back):
+        raise second_record(block.seam, path)
+    if len(seconds) < 2 or np.all(np.diff(seconds) > 0):
+        _, rate = evened(seconds, seconds[np.newaxis], fault)
+        return Clock(used, rate, start, lambda v: evened(seconds, v[np.newaxis], fault)[0][0])
+    rate = _rate_of_coarse(seconds, said_hz, fault)
+    return Clock(used, rate, start)
+
+
+def _rate_of_coarse(
+    seconds: FloatArray, said_hz: float, fault: Callable[[int, str], BadInput]
+) -> float:
+    """The rate by times of which several are the same; NaN where the preamble must say it."""
+    steps = np.diff(seconds)
+    back = np.flatnonzero(steps < 0)
+    if len(back):
+        raise fault(int(back[0]) + 1, "the time does not increase")
+    moves = np.flatnonzero(steps > 0)
+    if len(moves) < 2:
+        return NAN
+    coarse, span = float(steps[moves].min()), float(seconds[-1] - seconds[0])
+    even = np.arange(len(seconds)) * span / (len(seconds) - 1)
+    off = seconds - seconds[0] - even
+    if off.max() - off.min() > 2.2 * coarse:
+        raise fault(int(np.argmax(np.abs(off))), "the times are uneven")
+    if coarse / span <= _FINE:
+        return (len(seconds) - 1) / span
+    # From the first step of the clock to the last there are whole seconds, or whatever it counts.
+    inner = (moves[-1] - moves[0]) / (seconds[moves[-1] + 1] - seconds[moves[0] + 1])
+    counts = np.diff(moves)
+    if not math.isnan(said_hz):
+        return NAN if abs(inner / said_hz - 1) < 0.02 else float(inner)
+    return float(np.rint(inner)) if counts.max() - counts.min() <= 1 else NAN
+
+
+def _fault(block: Block, name: str, path: Path) -> Callable[[int, str], BadInput]:
+    return lambda row, what: BadInput(
+        f"{what}.", file=path, channel=name, line=block.lines[row], remedy=REMEDY
+    )

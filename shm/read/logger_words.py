@@ -1,0 +1,228 @@
+"""What the words of loggers mean, in German and English: units, names, keys of preambles.
+
+No word decides against a unit: a column is a force because it is in newtons. A name decides only
+where the unit is one of volts, and then says no more than which sensor to ask for.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from shm.read.units import Unit, plain_unit, unit_of
+from shm.values import Plane, Quantity
+
+# In s and in V; a day has 86,400 s.
+_SECONDS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), 1e-3),
+    **dict.fromkeys(("us", "usec", "microseconds", "mikrosekunden"), 1e-6),
+    **dict.fromkeys(("min", "minutes", "minuten"), 60.0),
+    **dict.fromkeys(("h", "hours", "stunden"), 3600.0),
+    **dict.fromkeys(("d", "days", "tage"), 86400.0),
+}
+_VOLTS = {**dict.fromkeys(("v", "volt", "volts"), 1.0), "mv": 1e-3, "uv": 1e-6}
+# What loggers measure besides: known so that a row of them is seen to be a row of units.
+_OTHERS = {
+    "", "-", "--", "1", "°c", "degc", "c", "k", "°f", "°", "deg", "rad", "%", "mm", "cm", "m", "um",
+    "um/m", "ue", "mm/m", "mv/v", "hz", "khz", "rpm", "1/min", "m/s", "mm/s", "cm/s", "bar", "mbar",
+    "pa", "kpa", "mpa", "n/mm2", "nm", "knm", "a", "ma", "ohm", "db", "counts", "count", "digit",
+    "digits", "lsb", "fs", "fullscale", "a.u.", "%rh", "kg", "none", "yyyy-mm-dd", "hh:mm:ss",
+    "ts", "rn", "smp", "dd.mm.yyyy", "hh:mm:ss.000", "hh:mm:ss,000",
+}  # fmt: skip
+_BRACKETED = re.compile(
+    r"\s*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|<([^<>]*)>|\{([^{}]*)\})\s*$"
+)
+_APART = re.compile(r"\s*(/| in |,|:|_| )\s*")
+_TIMES = re.compile(
+    r"(t|x|x[ _]?(value|werte?|achse|axis)|(rel(ative|ativ)?|elapsed|abs(olute?)?)?[ _.]*"
+    r"(time|zeit|zeitkanal|zeitachse)([ _]?(stamp|stempel|axis|channel|s|ms))?([ _]*\d)?|datum|date"
+    r"|uhrzeit|timestamp|zeitstempel|(date|datum)[ _/&-]*(time|zeit|uhrzeit)|elapsed|sekunden"
+    r"|seconds)([ _]*[-.]?[ _]*.*(rate|messrate).*)?",
+    re.IGNORECASE,
+)
+_COUNTERS = re.compile(
+    r"(n|nr|no|nummer|number|index|idx|i|#|sample|samples|scan|scans|zeile|row|record|punkt|point|"
+    r"sample ?(no|nr|number|index)|mess(wert|punkt)( ?nr)?|lfd ?nr|count|counter|z(ä|ae)hler)\.?",
+    re.IGNORECASE,
+)
+_FORCE = re.compile(
+    r"force|kraft|hammer|impact|impuls|schlag|\bf(_?\d|[xyz])?\b|load", re.IGNORECASE
+)
+_ACCELERATION = re.compile(
+    r"acc|beschl|\ba(_?\d+)?_?[xyz]?\b|\bb\d+\b|vibration|schwing|acz|\bicp|iepe", re.IGNORECASE
+)
+_TRANSVERSE = re.compile(r"transv|\bquer|_quer|querricht|lateral", re.IGNORECASE)
+_LONGITUDINAL = re.compile(r"longit|l(ä|ae)ngs", re.IGNORECASE)
+_SENSITIVITY = re.compile(
+    r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([mµμu]?)V\s*/\s*\(?\s*([^\s()\[\]]+(?:\s*\^?\s*2)?)\s*\)?"
+)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a sensor gives: `unit_per_volt` of `unit`, such as 10 g a volt at 100 mV/g."""
+
+    unit: str
+    unit_per_volt: float
+
+
+def sensitivity_of(text: str) -> Sensitivity | None:
+    """The sensitivity that a text such as "100 mV/g" or "2,25 mV/N" says; None for another text."""
+    found = _SENSITIVITY.fullmatch(text.strip().strip("[]"))
+    if found is None or unit_of(found[3]) is None:
+        return None
+    volts = float(found[1].replace(",", ".")) * {"": 1.0, "m": 1e-3}.get(found[2], 1e-6)
+    return Sensitivity(found[3].strip(), 1 / volts) if volts else None
+
+
+def volts_of(unit: str) -> float | None:
+    """How many volts a unit is; None where it is none of voltage."""
+    return _VOLTS.get(plain_unit(unit))
+
+
+def seconds_of(unit: str) -> float | None:
+    """How many seconds a unit is; None where it is none of time."""
+    return _SECONDS.get(plain_unit(unit))
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of anything that loggers measure."""
+    plain = plain_unit(text)
+    known = plain in _SECONDS or plain in _VOLTS or plain in _OTHERS
+    return known or unit_of(text) is not None or sensitivity_of(text) is not None
+
+
+def name_and_unit(text: str) -> tuple[str, str]:
+    """The name of a column and its unit, "" where the text has none.
+
+    "Kraft [N]", "Force (N)", "Acc / g", "a in m/s²" and "acc_1_g" have one; "Acc (top)" has not.
+    """
+    text = " ".join(text.split())
+    found = _BRACKETED.search(text)
+    if found is not None:
+        unit = next(part for part in found.groups() if part is not None).strip()
+        name = text[: found.start()].strip()
+        if is_unit(unit):
+            return name, unit
+        inner = name_and_unit(name) if name else ("", "")
+        return (f"{inner[0]} {found[0].strip()}", inner[1]) if inner[1] else (text, "")
+    for mark in _APART.finditer(text):
+        if mark.start() and _stands_apart(mark[1], text[mark.end() :]):
+            return text[: mark.start()], text[mark.end() :]
+    return text, ""
+
+
+def _stands_apart(mark: str, unit: str) -> bool:
+    """Whether the end of a name is a unit: after a mere blank or line, only a clear one."""
+    known = unit_of(unit) is not None or volts_of(unit) is not None
+    if mark in ("_", " ", ":"):  # a letter there may be a direction or a number
+        return known or plain_unit(unit) in ("ms", "sec")
+    return known or seconds_of(unit) is not None
+
+
+def quantity_meant(name: str) -> Quantity | None:
+    """What a column probably measures by its name; None where the name says nothing."""
+    if _FORCE.search(name) and not _ACCELERATION.match(name):
+        return "force"
+    return "acceleration" if _ACCELERATION.search(name) else None
+
+
+def plane_meant(name: str) -> Plane | None:
+    """The plane that a name says in words; None where it says a letter of an axis or nothing."""
+    if _TRANSVERSE.search(name):
+        return "transverse"
+    return "longitudinal" if _LONGITUDINAL.search(name) else None
+
+
+def means_time(name: str) -> bool:
+    """Whether a name is that of a column of times."""
+    return _TIMES.fullmatch(name.strip()) is not None
+
+
+def means_counter(name: str) -> bool:
+    """Whether a name is that of a column that counts the samples."""
+    return _COUNTERS.fullmatch(name.strip()) is not None
+
+
+def measured_unit(text: str) -> Unit | None:
+    """The unit of a force or an acceleration that a text is; None for any other."""
+    return unit_of(text)
+
+
+# ---------------------------------------------------------------- preambles
+
+_RATE = re.compile(
+    r"(standard)?(abtast|mess|sample|sampling|samples?|scan|data|acquisition|aufnahme|daq)?"
+    r"(ing)?(rate|frequenz|frequency|freq)(hz)?|fs|sps|samplespersec(ond)?|abtastratehz|fabtast"
+)
+_INTERVAL = re.compile(
+    r"delta[xt]|(x(axis)?)?delta|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
+    r"(intervall?|period|periode|step|schritt|schrittweite|zeit|inkrement|increment)|schrittweite"
+)
+_DATE = re.compile(
+    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|creation)?(datum|date)"
+)
+_MOMENT = re.compile(
+    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|begin(n)?|created?)*"
+    r"(zeit|time|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"
+    r"|datetimestamp|dateutc|timeutc|recorded|acquired|on|am|ed)(utc)?"
+)
+_TEMPERATURE = re.compile(
+    r"(bauteil|stahl|luft|umgebungs|steel|air|ambient|hanger)?temp(eratur|erature)?(c|degc)?"
+)
+_HANGER = re.compile(r"h(a|ä|ae)nger(nr|no|nummer|number|id)?|seil(nr|nummer)?|cable(no|number)?")
+_NUMBERED = re.compile(
+    r"(?:h(?:a|ä|ae)nger|seil|cable)\s*(?:nr\.?|no\.?|#)?[\s_:=-]*0*(\d{1,3})(?!\d|[.-]\d)",
+    re.IGNORECASE,
+)
+_TITLE = re.compile(r"(title|titel|signal|channel|kanal)(name)?")
+_UNIT_KEY = re.compile(r"y?(axis|achse)?(unit|einheit)(label)?")
+_SERIAL = re.compile(r".*(serial|serien|^sn)(number|nummer|nr|no)?.*")
+
+
+def key_of(text: str) -> str:
+    """A key of a preamble by its letters alone, in lower case."""
+    return "".join(c for c in text.lower() if c.isalpha())
+
+
+def means_rate(key: str) -> bool:
+    return _RATE.fullmatch(key_of(key)) is not None
+
+
+def means_interval(key: str) -> bool:
+    return _INTERVAL.fullmatch(key_of(key)) is not None
+
+
+def means_date(key: str) -> bool:
+    return _DATE.fullmatch(key_of(key)) is not None
+
+
+def means_moment(key: str) -> bool:
+    return _MOMENT.fullmatch(key_of(key)) is not None
+
+
+def means_temperature(key: str) -> bool:
+    return _TEMPERATURE.fullmatch(key_of(key)) is not None
+
+
+def means_hanger(key: str) -> bool:
+    return _HANGER.fullmatch(key_of(key)) is not None
+
+
+def means_title(key: str) -> bool:
+    return _TITLE.fullmatch(key_of(key)) is not None
+
+
+def means_unit(key: str) -> bool:
+    return _UNIT_KEY.fullmatch(key_of(key)) is not None
+
+
+def means_serial(key: str) -> bool:
+    return _SERIAL.fullmatch(key_of(key)) is not None
+
+
+def hanger_numbered(text: str) -> int | None:
+    """The hanger that a text or a file's name numbers, as "Hänger 3"; None where none or two."""
+    found = {int(number) for number in _NUMBERED.findall(text)}
+    return found.pop() if len(found) == 1 else None

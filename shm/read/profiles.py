@@ -1,0 +1,175 @@
+"""Profiles of loggers: what a person said once of the files of one logger, kept in the workspace.
+
+A profile is a sidecar for all files of one layout: `loggers/NAME.toml`, written by `shm import`.
+
+    fingerprint = "04130264baace706"
+    format = "Excel"
+    columns = ["Kraft [N]", "Beschl 1 [g]"]
+    hanger = 3
+
+    [channel."Beschl 1"]
+    plane = "transverse"
+    x_m = 2.52
+
+A sidecar of its own goes before it, and so does a hanger or a rate that the file itself says. Where
+a logger has been at two hangers, `hanger` is left out: each file must say its own.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from shm.documents import format_time
+from shm.errors import BadInput
+from shm.read.atomic import replace_text
+from shm.read.content import unreadable
+from shm.read.header import CHANNEL_KEYS
+from shm.read.survey import Layout
+
+FOLDER = "loggers"
+Described = Mapping[str, Any]
+"""Keys and values of a sidecar; `channel` holds a mapping for each channel by name."""
+_OF_PROFILE = ("hanger", "sampling_rate_hz", "channel")
+_COMMENT = (
+    "# What the files of one logger do not say themselves, as `shm import` asked. It holds for\n"
+    "# every file with these columns; correct it here, or import a file again.\n"
+)
+_WRITE_ANEW = "Correct it, or delete it and import a file of the logger again."
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A profile as its file says it; `described` as a sidecar would."""
+
+    path: Path
+    fingerprint: str
+    described: Described
+    roams: bool = False
+
+
+def profile_for(layout: Layout, workspace: Path) -> Profile | None:
+    """The profile of the logger whose files look so; None where there is none.
+
+    Raises BadInput naming a profile that is damaged.
+    """
+    found = (_load(path) for path in _files(workspace))
+    return next((each for each in found if each.fingerprint == layout.fingerprint), None)
+
+
+def any_profile(workspace: Path) -> bool:
+    """Whether any logger was imported into this workspace."""
+    return bool(_files(workspace))
+
+
+def completed(profile: Described, layout: Layout, own: Described) -> dict[str, Any]:
+    """The sidecar of one file: what its own says, and what the profile adds to that."""
+    added = {key: profile[key] for key in _OF_PROFILE if key in profile}
+    if layout.hanger is not None:
+        added.pop("hanger", None)
+    if layout.says_rate:
+        added.pop("sampling_rate_hz", None)
+    listed = own.keys() & set(CHANNEL_KEYS)  # lists in the order of the channels
+    names = {**added.get("channel", {}), **own.get("channel", {})}
+    channels = {
+        name: {
+            **{k: v for k, v in added.get("channel", {}).get(name, {}).items() if k not in listed},
+            **own.get("channel", {}).get(name, {}),
+        }
+        for name in names
+    }
+    whole = {**added, **own}
+    return {**whole, "channel": channels} if channels else whole
+
+
+def save_profile(described: Described, layout: Layout, workspace: Path) -> Profile:
+    """Keeps what was said of the files of a layout, in the place of what was kept before."""
+    before = profile_for(layout, workspace)
+    kept = {key: described[key] for key in _OF_PROFILE if key in described}
+    moved = before is not None and _moved(before, kept)
+    if moved:
+        kept.pop("hanger", None)
+    path = before.path if before is not None else _free_path(layout, workspace)
+    head = {
+        "fingerprint": layout.fingerprint,
+        "format": layout.format,
+        "columns": list(layout.columns),
+        **({"roams": True} if moved else {}),
+    }
+    path.parent.mkdir(exist_ok=True)
+    replace_text(path, _COMMENT + sidecar_text({**head, **kept}))
+    return Profile(path, layout.fingerprint, kept, moved)
+
+
+def _moved(before: Profile, kept: Described) -> bool:
+    """Whether a logger has been at two hangers, so that no profile can know the next."""
+    former = before.described.get("hanger")
+    return before.roams or (former is not None and kept.get("hanger", former) != former)
+
+
+def _files(workspace: Path) -> list[Path]:
+    return sorted((workspace / FOLDER).glob("*.toml"))
+
+
+def _free_path(layout: Layout, workspace: Path) -> Path:
+    first = layout.columns[0] if layout.columns else layout.format
+    word = re.sub(r"[^a-z0-9]+", "-", f"{layout.format} {first}".lower()).strip("-")[:40]
+    return workspace / FOLDER / f"{word or 'logger'}-{layout.fingerprint[:6]}.toml"
+
+
+def _load(path: Path) -> Profile:
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except (ValueError, RecursionError) as error:
+        what = f"not a readable TOML file: {error}."
+        raise BadInput(what, file=path, remedy=_WRITE_ANEW) from error
+    channels = document.get("channel", {})
+    if not isinstance(document.get("fingerprint"), str) or not isinstance(channels, dict):
+        raise BadInput("is no profile of a logger.", file=path, remedy=_WRITE_ANEW)
+    for name, table in channels.items():
+        unknown = set(table) - set(CHANNEL_KEYS) if isinstance(table, dict) else {str(table)}
+        if unknown:
+            raise BadInput(
+                f"{sorted(unknown)[0]!r} is not a key of a channel.",
+                file=path,
+                channel=name,
+                remedy=f"The keys are {', '.join(CHANNEL_KEYS)}.",
+            )
+    known = {key: document[key] for key in _OF_PROFILE if key in document}
+    return Profile(path, document["fingerprint"], known, document.get("roams") is True)
+
+
+# ---------------------------------------------------------------- writing
+
+
+def sidecar_text(described: Described) -> str:
+    """The TOML of a sidecar: keys of the whole, then a table for each channel."""
+    lines = [f"{key} = {_toml(value)}" for key, value in described.items() if key != "channel"]
+    for name, table in described.get("channel", {}).items():
+        lines += ["", f"[channel.{_quoted(name)}]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, datetime):
+        return str(format_time(value))
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return _quoted(value) if isinstance(value, str) else repr(value)
+
+
+def _quoted(text: str) -> str:
+    """A text as TOML takes it: control characters and half pairs as blanks."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return json.dumps(plain, ensure_ascii=False)

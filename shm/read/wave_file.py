@@ -1,0 +1,86 @@
+"""WAV: a recorder's channels as shares of its full scale; what each is, the sidecar says.
+
+Its `calibration` is what the full scale is worth, in `unit`: a recorder of 10 V with an
+accelerometer of 100 mV/g gives 100 g. Files of floating point may hold units already.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read import logger_text
+from shm.read.base import Format, Peek
+from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
+from shm.read.logger_table import LoggerColumn, LoggerTable
+from shm.read.logger_words import hanger_numbered
+from shm.values import NAN, Recording
+
+_NAME = "WAV"
+FULL_SCALE = "full scale"
+_FORMS = (b"RIFF", b"RIFX", b"RF64")
+_MOST_CHANNELS = 64  # judgement: four times what is read of a recording
+
+
+def recognises(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a WAV file."""
+    return head[:4] in _FORMS and head[8:12] == b"WAVE"
+
+
+def table_of(path: Path) -> LoggerTable:
+    """The channels of a file, `channel_1` and so on; raises BadInput where it is damaged."""
+    from scipy.io import wavfile
+
+    if path.stat().st_size > limits().bytes_at_once:
+        raise too_large(path)
+    with guarded(path):
+        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of notes that recorders add
+        rate, data = wavfile.read(path)
+    if data.ndim == 1:
+        data = data[:, np.newaxis]
+    if rate <= 0 or data.shape[1] > _MOST_CHANNELS or not len(data):
+        raise BadInput(
+            "no channel holds a sample.", file=path, remedy="The file is damaged: record again."
+        )
+    refuse_many_samples(len(data), path)
+    refuse_large(data.shape, 8, "", path)
+    unit = FULL_SCALE if data.dtype.kind in "iu" else ""
+    names = [f"channel_{place}" for place in range(1, data.shape[1] + 1)]
+    columns = tuple(
+        LoggerColumn(name, unit, _shares(data[:, place])) for place, name in enumerate(names)
+    )
+    layout = ("WAV", str(data.dtype), *names)
+    hanger = hanger_numbered(path.stem)
+    return LoggerTable(columns, float(rate), NAN, hanger, None, NAN, 0, layout, ())
+
+
+def _shares(values: np.ndarray) -> np.ndarray:
+    """Whole numbers as shares of the largest that the file can hold; others as they are."""
+    with np.errstate(invalid="ignore"):  # signalling NaNs of damaged files
+        found = values.astype(np.float64)
+    if values.dtype.kind == "u":
+        return (found - 128.0) / 128.0
+    return found / -float(np.iinfo(values.dtype).min) if values.dtype.kind == "i" else found
+
+
+def _read(path: Path) -> Recording:
+    return logger_text.recording(table_of(path), path)
+
+
+def _peek(path: Path) -> Peek:
+    return logger_text.peeked(table_of(path), _NAME, path)
+
+
+FORMAT = Format(
+    name=_NAME,
+    suffixes=(".wav",),
+    recognises=recognises,
+    peek=_peek,
+    read=_read,
+    holds_responses=False,
+    names_channels=False,
+    table=table_of,
+)

@@ -1,0 +1,250 @@
+"""`shm import`: the first file of a logger is asked about once, the second needs nothing."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyuff
+from scipy.io import wavfile
+
+from shm.modes_document import load_modes
+from shm.read import read, sidecar_path
+from shm.store import Stage, Workspace
+from shm.values import Recording
+from tests.cli.conftest import Shm
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import make_workspace
+
+HEAD = "catman\nMessung;quer\nAbtastrate;{rate:.0f} Hz\n\nZeit [s];Kraft [N];A1 [m/s²];A2 [g]\n"
+SAID = ("--hanger", 3, "--place", "2.52", "--plane", "transverse,longitudinal")
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return make_workspace(tmp_path / "bridge", hangers=(3, 4))
+
+
+def export(path: Path, seed: int = 1, columns: str = "A1") -> Path:
+    """A German export of numbers that look like a hammer test."""
+    rng = np.random.default_rng(seed)
+    rate, count = 500.0, 4000
+    times = np.arange(count) / rate
+    ring = np.exp(-0.3 * (times % 4.0)) * np.sin(2 * np.pi * 6.0 * times)
+    force = np.where(np.arange(count) % 2000 == 500, 900.0, rng.normal(0, 0.5, count))
+    rows = zip(times, force, ring + rng.normal(0, 0.01, count), ring / 9.81, strict=True)
+    body = "".join(";".join(f"{v:.5f}" for v in row) + "\n" for row in rows).replace(".", ",")
+    head = HEAD.format(rate=rate).replace("A1", columns)
+    path.write_bytes((head + body).encode("latin-1"))
+    return path
+
+
+def files_of(workspace: Workspace) -> list[str]:
+    return sorted(path.name for path in workspace.spool.iterdir() if path.is_file())
+
+
+def test_without_a_terminal_it_says_what_to_add_and_keeps_nothing(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"))
+    assert ended.code == 3
+    for word in ("Kraft", "force", "acceleration", "2 hits", "500 Hz", "█"):
+        assert word in ended.out
+    for option in ("--hanger N", "--place A1=M", "--plane A2=transverse|longitudinal"):
+        assert option in ended.err
+    assert files_of(workspace) == []
+    assert not (workspace.folder / "loggers").exists()
+
+
+def test_the_second_file_of_a_logger_needs_nothing(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    first = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    assert first.code == 0
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    kept = tomllib.loads(profile.read_text())
+    assert kept["hanger"] == 3
+    assert kept["channel"]["A2"] == {"x_m": 2.52, "plane": "longitudinal"}
+    second = shm("--workspace", workspace.folder, "import", export(tmp_path / "b.csv", 2), "--json")
+    assert second.code == 0
+    assert second.document["questions"] == []
+    assert second.document["hanger"] == 3
+    assert files_of(workspace) == ["a.csv", "a.toml", "b.csv", "b.toml"]
+    found = read(workspace.spool / "b.csv")
+    assert isinstance(found, Recording)
+    assert [(c.plane, c.x_m) for c in found.accelerations] == [
+        ("transverse", 2.52),
+        ("longitudinal", 2.52),
+    ]
+
+
+def test_what_is_dropped_into_the_spool_is_read_by_its_profile(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    for path in workspace.spool.iterdir():
+        if path.is_file():
+            path.unlink()
+    export(workspace.spool / "later.csv", 3)
+    sidecar_path(workspace.spool / "later.csv").write_text("temperature_c = 4.5\n")
+    ingest(workspace)
+    with workspace.store() as store:
+        (stored,) = store.recordings.list_all()
+        with workspace.archive.opened(stored.file) as path:
+            found = read(path)
+    assert isinstance(found, Recording)
+    assert (found.hanger, found.temperature_c) == (3, 4.5)
+    assert found.accelerations[0].plane == "transverse"
+    assert files_of(workspace) == []
+
+
+def test_a_file_of_an_unknown_logger_is_refused_with_the_command_to_give(
+    workspace: Workspace,
+) -> None:
+    export(workspace.spool / "first.csv")
+    ingest(workspace)
+    with workspace.store() as store:
+        (stored,) = store.recordings.list_all()
+    assert stored.stage is Stage.REFUSED
+    assert stored.reason is not None
+    assert "shm import FILE" in stored.reason["remedy"]
+
+
+def test_a_logger_that_goes_from_hanger_to_hanger_is_asked_each_time(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    other = export(tmp_path / "b.csv", 2)
+    moved = shm("--workspace", workspace.folder, "import", other, "--hanger", 4)
+    assert moved.code == 0
+    assert "each file must say its own" in moved.out
+    third = shm("--workspace", workspace.folder, "import", export(tmp_path / "c.csv", 3), "--json")
+    assert third.code == 3
+    assert [question["about"] for question in third.document["questions"]] == ["hanger"]
+    named = export(tmp_path / "haenger_03_c.csv", 4)
+    assert shm("--workspace", workspace.folder, "import", named).code == 0
+
+
+def test_another_layout_is_another_logger(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    other = export(tmp_path / "b.csv", 2, columns="B1")
+    assert shm("--workspace", workspace.folder, "import", other).code == 3
+
+
+def test_a_dry_run_keeps_nothing(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    path = export(tmp_path / "a.csv")
+    ended = shm("--workspace", workspace.folder, "import", path, *SAID, "--dry-run")
+    assert ended.code == 0
+    assert files_of(workspace) == []
+    assert not (workspace.folder / "loggers").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "words"),
+    [
+        (("--place", "1,2,3"), 2, "3 values for 2 channels"),
+        (("--plane", "up"), 2, "'up' is no plane"),
+        (("--place", "A9=1"), 2, "no column 'A9'"),
+        (("--unit", "A1=V"), 2, "no unit that is read"),
+        (("--sensitivity", "A1=much"), 2, "no sensitivity"),
+        (("--rate", "0"), 2, "no rate"),
+        ((*SAID[2:], "--hanger", 9), 3, "hanger 9 is not described"),
+    ],
+)
+def test_a_wrong_answer_is_refused_with_what_may_be_said(
+    shm: Shm, workspace: Workspace, tmp_path: Path, more: tuple[Any, ...], code: int, words: str
+) -> None:
+    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *more)
+    assert ended.code == code
+    assert words in ended.err
+    assert files_of(workspace) == []
+
+
+def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(1)
+    path = tmp_path / "tape.wav"
+    wavfile.write(path, 1000, (rng.normal(0, 0.1, (3000, 2)) * 32767).astype(np.int16))
+    asked = shm("--workspace", workspace.folder, "import", path, "--json").document
+    assert [q["about"] for q in asked["questions"]] == ["hanger", "unit", "unit"]
+    ended = shm(
+        "--workspace", workspace.folder, "import", path, "--hanger", 3,
+        "--sensitivity", "channel_1=2000 N", "--sensitivity", "channel_2=50 g",
+        "--place", "2.52", "--plane", "transverse",
+    )  # fmt: skip
+    assert ended.code == 0
+    found = read(workspace.spool / "tape.wav")
+    assert isinstance(found, Recording)
+    assert [c.quantity for c in found.channels] == ["force", "acceleration"]
+    assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
+
+
+def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncertainty(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    path = modes_file(tmp_path / "m.uff")
+    asked = shm("--workspace", workspace.folder, "import", path, "--json")
+    assert asked.code == 3
+    assert [q["about"] for q in asked.document["questions"]] == ["hanger", "plane", "plane"]
+    planes = "x=transverse,y=longitudinal"
+    ended = shm("--workspace", workspace.folder, "import", path, "--hanger", 3, "--plane", planes)
+    assert ended.code == 0
+    ingest(workspace)
+    with workspace.store() as store:
+        (test,) = (stored.test for stored in store.tests.list_all(3))
+    found = [(mode.plane, mode.order, mode.frequency_hz) for mode in test.modes]
+    assert found == [
+        ("transverse", 1, 6.1),
+        ("longitudinal", 1, 6.3),
+        ("transverse", 2, 13.0),
+        ("longitudinal", 2, 13.2),
+    ]
+    assert all(np.isnan(mode.frequency_sd_hz) for mode in test.modes)
+    assert test.modes[0].damping_ratio == pytest.approx(0.004)
+    assert [point.x_m for point in test.modes[0].shape] == [2.0, 4.0, 6.0, 8.0, 10.0]
+    again = shm("--workspace", workspace.folder, "import", path)
+    assert again.code == 0
+
+
+def test_modes_without_places_keep_no_shape_and_are_numbered_by_frequency(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    path = modes_file(tmp_path / "m.uff", with_nodes=False)
+    planes = "x=transverse,y=longitudinal"
+    ended = shm("--workspace", workspace.folder, "import", path, "--hanger", 3, "--plane", planes)
+    assert ended.code == 0
+    assert "numbered from 1 by frequency" in ended.out
+    (test,) = load_modes(workspace.spool / "m.modes.json")
+    assert [mode.order for mode in test.modes] == [1, 1, 2, 2]
+    assert all(mode.shape == () for mode in test.modes)
+
+
+def modes_file(path: Path, with_nodes: bool = True) -> Path:
+    """Two modes in each of two planes, with the nodes along z."""
+    places = np.array([2.0, 4.0, 6.0, 8.0, 10.0])
+    nodes = np.arange(1, 6)
+    zeros = np.zeros(5)
+    sets: list[dict[str, Any]] = [
+        {
+            "type": 2411, "node_nums": nodes, "def_cs": zeros, "disp_cs": zeros, "color": zeros,
+            "x": zeros, "y": zeros, "z": places,
+        }
+    ]  # fmt: skip
+    for number, (frequency, axis) in enumerate([(6.1, 1), (6.3, 2), (13.0, 1), (13.2, 2)], start=1):
+        shape = np.sin((number + 1) // 2 * np.pi * places / 12)
+        sets.append(
+            {
+                "type": 55, "id1": "Modal 7", "id2": "", "id3": "", "id4": "", "id5": "",
+                "model_type": 1, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8,
+                "data_type": 2, "n_data_per_node": 3, "node_nums": nodes, "load_case": 1,
+                "r1": shape if axis == 1 else zeros, "r2": shape if axis == 2 else zeros,
+                "r3": zeros, "mode_n": number, "freq": frequency, "modal_m": 1.0,
+                "modal_damp_vis": 0.004, "modal_damp_his": 0.0,
+            }
+        )  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(sets[not with_nodes :], mode="add")
+    return path

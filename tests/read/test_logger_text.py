@@ -1,0 +1,193 @@
+"""Text as loggers write it: every quirk beside the plain numbers that it stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput
+from shm.read import peek, read
+from shm.read.logger_words import hanger_numbered, name_and_unit, sensitivity_of
+from shm.read.stamps import moment, parsed
+from shm.values import Recording
+
+ROWS, RATE = 400, 500.0
+RNG = np.random.default_rng(11)
+FORCE, ACC = RNG.normal(0, 2000, ROWS).round(3), RNG.normal(0, 3, ROWS).round(4)
+
+
+def german(value: float, digits: int = 4) -> str:
+    return f"{value:.{digits}f}".replace(".", ",")
+
+
+def grouped(value: float) -> str:
+    return f"{value:,.3f}".replace(",", " ").replace(".", ",").replace(" ", ".")
+
+
+def rows(line: Callable[[int], str]) -> str:
+    return "".join(f"{line(i)}\n" for i in range(ROWS))
+
+
+def stamp(i: int, form: str = "%d.%m.%Y %H:%M:%S,%f") -> str:
+    time = datetime(2026, 5, 1, 23, 59, 59, 700_000) + timedelta(seconds=i / RATE)
+    return time.strftime(form)[:-3]
+
+
+PLAIN = rows(lambda i: f"{i / RATE:.3f},{FORCE[i]:.3f},{ACC[i]:.4f}")
+SHAPES: dict[str, str | bytes] = {
+    "german": (
+        "catman\nMessung;quer\nAbtastrate;500 Hz\n\nZeit [s];Kraft [N];Beschl. [m/s²]\n"
+        + rows(lambda i: f"{german(i / RATE)};{german(FORCE[i])};{german(ACC[i])}")
+    ).encode("latin-1"),
+    "two rows": "Time,Force,Acc\ns,N,m/s2\n" + PLAIN,
+    "two rows and a group": ",Hammer,Sensor 1\nTime,Force,Acc\n(s),(N),(m/s²)\n" + PLAIN,
+    "preamble": ("Recorder\nSample rate: 500 Hz\n\nTime (s),Force (N),Acc (m/s^2)\n" + PLAIN),
+    "utf-16": ("Time (s),Force (N),Acc (m/s²)\n" + PLAIN).encode("utf-16"),
+    "utf-16 unmarked": ("Time (s),Force (N),Acc (m/s2)\n" + PLAIN).encode("utf-16-le"),
+    "quotes": '"Time (s)","Force, top (N)","Acc (m/s2)"\n' + PLAIN,
+    "quoted german": '"Zeit [s]","Kraft [N]","Beschl [m/s2]"\n'
+    + rows(lambda i: f'"{german(i / RATE)}","{german(FORCE[i])}","{german(ACC[i])}"'),
+    "grouped thousands": "Zeit (ms);Kraft (N);Acc (m/s2)\n"
+    + rows(lambda i: f"{2 * i};{grouped(FORCE[i])};{german(ACC[i])}"),
+    "clock times over midnight": "Zeitstempel;Kraft [N];a_z [m/s²]\n"
+    + rows(lambda i: f"{stamp(i)};{german(FORCE[i])};{german(ACC[i])}"),
+    "clock alone over midnight": "Uhrzeit;Kraft [N];a_z [m/s²]\n"
+    + rows(lambda i: f"{stamp(i, '%H:%M:%S.%f')};{german(FORCE[i])};{german(ACC[i])}"),
+    "day and clock": "Date,Time,Force [N],Acc [m/s2]\n"
+    + rows(lambda i: f"{stamp(i, '%Y-%m-%d,%H:%M:%S.%f')},{FORCE[i]:.3f},{ACC[i]:.4f}"),
+    "clock to the second": "Time,Force [N],Acc [m/s2]\nSample rate: 500 Hz\n".replace(
+        "Time", "Sample rate: 500 Hz\nTime", 1
+    ).rsplit("Sample", 1)[0]
+    + rows(lambda i: f"10:00:{(i + 321) // 500:02d},{FORCE[i]:.3f},{ACC[i]:.4f}"),
+    "epoch in ms": "timestamp;force_N;acc_ms-2\n"
+    + rows(lambda i: f"{1777629600000 + 2 * i};{FORCE[i]:.3f};{ACC[i]:.4f}"),
+    "no times": "Abtastintervall: 2 ms\nKraft [N]\tBeschl [m/s²]\n"
+    + rows(lambda i: f"{german(FORCE[i])}\t{german(ACC[i])}"),
+    "counter": "Samplerate;500;Hz\nNr;Kraft (N);Beschl (m/s²)\n"
+    + rows(lambda i: f"{i + 1};{german(FORCE[i])};{german(ACC[i])}"),
+    "labelled rows": "Kanal;Zeit;Kraft;Beschl\nEinheit;s;N;m/s²\nFilter;-;200 Hz;200 Hz\n"
+    + rows(lambda i: f";{german(i / RATE)};{german(FORCE[i])};{german(ACC[i])}"),
+    "LabVIEW": "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n"
+    "Date\t2026/05/01\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t400\t400\t\n"
+    "Y_Unit_Label\tNewtons\tm/s^2\t\nDelta_X\t0.002000\t0.002000\t\n***End_of_Header***\t\t\t\n"
+    "X_Value\tForce\tUntitled\tComment\n"
+    + rows(lambda i: f"{i / RATE:.6f}\t{FORCE[i]:.3f}\t{ACC[i]:.4f}"),
+    "blanks": "   Time [s]     Force [N]   Acc [m/s2]\n"
+    + rows(lambda i: f"  {i / RATE:.3f}   {FORCE[i]:.3f}  {ACC[i]:.4f}"),
+    "tail": "Time (s),Force (N),Acc (m/s2)\n" + PLAIN + "\nMin,-1,-2\nMax,1,2\n",
+    "trailing marks": "Zeit [s];Kraft [N];Beschl [m/s2];\n"
+    + rows(lambda i: f"{german(i / RATE)};{german(FORCE[i])};{german(ACC[i])};"),
+    "other sensors": "Time (s),Force (N),Temp (°C),State,Acc (m/s2)\n"
+    + rows(lambda i: f"{i / RATE:.3f},{FORCE[i]:.3f},12.5,OK,{ACC[i]:.4f}"),
+    "lost sign of a square": "Time (s),Force (N),Acc (m/sÂ²)\n" + PLAIN,
+}  # fmt: skip
+
+
+def written(folder: Path, content: str | bytes, name: str = "export.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def recorded(path: Path) -> Recording:
+    found = read(path)
+    assert isinstance(found, Recording)
+    return found
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_holds_the_same_numbers(shape: str, tmp_path: Path) -> None:
+    found = recorded(written(tmp_path, SHAPES[shape]))
+    assert found.sampling_rate_hz == pytest.approx(RATE, rel=1e-5)
+    force, acceleration = found.channels
+    assert (force.quantity, acceleration.quantity) == ("force", "acceleration")
+    np.testing.assert_allclose(force.values, FORCE, atol=1e-9)
+    np.testing.assert_allclose(acceleration.values, ACC, atol=1e-9)
+    assert peek(tmp_path / "export.csv").problems == ()
+
+
+def test_an_overload_is_a_gap_that_is_counted(tmp_path: Path) -> None:
+    from shm.read.surveying import survey
+
+    text = "Time (s),Force (N),Acc (m/s2)\n" + PLAIN
+    lines = text.splitlines()
+    lines[7] = lines[7].rsplit(",", 1)[0] + ",OVL"
+    path = written(tmp_path, "\n".join(lines))
+    assert np.flatnonzero(np.isnan(recorded(path).channels[1].values)).tolist() == [6]
+    assert [column.overloads for column in survey(path).columns] == [0, 1]
+
+
+def test_preamble_and_name_say_hanger_time_temperature_and_plane(tmp_path: Path) -> None:
+    head = "Messstelle: Hänger 7\nDatum;01.05.2026\nUhrzeit;10:03:12\nTemperatur;12,5 °C\n"
+    head += "Zeit [s];Kraft [N];Beschl quer [m/s²]\n"
+    body = rows(lambda i: f"{german(i / RATE)};{german(FORCE[i])};{german(ACC[i])}")
+    found = recorded(written(tmp_path, head + body))
+    assert found.hanger == 7
+    assert found.time == datetime(2026, 5, 1, 10, 3, 12, tzinfo=UTC)
+    assert found.temperature_c == 12.5
+    assert found.channels[1].plane == "transverse"
+    other = recorded(written(tmp_path, head[21:] + body, "hanger_04_a.csv"))
+    assert other.hanger == 4
+
+
+def test_a_sensitivity_in_the_heading_turns_volts_into_units(tmp_path: Path) -> None:
+    head = "Sample Rate = 500 Hz\nSensitivity,2.5 mV/N,100 mV/g\nTime,AI0 [V],AI1 [mV]\n"
+    force, acceleration = recorded(written(tmp_path, head + PLAIN)).channels
+    np.testing.assert_allclose(force.values, 400 * FORCE)
+    np.testing.assert_allclose(acceleration.values, 0.01 * 9.80665 * ACC)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "Zeit,Kraft,Acc\n" + rows(lambda i: f"{german(i / RATE)},{german(FORCE[i])},1,5"),
+            "commas part the columns and the decimals",
+        ),
+        ("Sample rate: 2000 Hz\nTime (s),Force (N),Acc (g)\n" + PLAIN, "500 Hz"),
+        ("Time (s),Force (N),Acc (g)\n" + PLAIN * 2, "does not increase"),
+        (
+            "Time (s),Force (N),Acc (g)\n" + PLAIN + "Time (s),Force (N),Acc (g)\n" + PLAIN,
+            "second record",
+        ),
+        ("Force (N),Acc (g)\n" + rows(lambda i: f"{FORCE[i]},{ACC[i]}"), "rate is missing"),
+        ("Time (s),Force (N),Vel (mm/s)\n" + PLAIN, "no channel holds an acceleration"),
+        ("Time (s),Force,Acc 1\n" + PLAIN, "no channel holds an acceleration"),
+        ("Time (s),Force (N),Acc (g)\n" + PLAIN.replace(f"{ACC[9]:.4f}", "1.x4"), "no row of 3"),
+    ],
+)
+def test_what_must_not_be_guessed_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(BadInput, match=words) as refusal:
+        read(written(tmp_path, text))
+    assert refusal.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "unit"),
+    [
+        ("Kraft [N]", "Kraft", "N"), ("acc_1_g", "acc_1", "g"), ("a in m/s²", "a", "m/s²"),
+        ("Acc (top)", "Acc (top)", ""), ("Acc (m/s^2) (top)", "Acc (top)", "m/s^2"),
+        ("accel (m/(s^2))", "accel", "m/(s^2)"), ("Untitled", "Untitled", ""),
+        ("Acc / g", "Acc", "g"), ("Sensor m", "Sensor m", ""), ("AI 0 [V]", "AI 0", "V"),
+    ],
+)  # fmt: skip
+def test_a_unit_is_told_from_a_name(text: str, name: str, unit: str) -> None:
+    assert name_and_unit(text) == (name, unit)
+
+
+def test_words_of_sensors_hangers_and_days() -> None:
+    sensitivity = sensitivity_of("2,25 mV/N")
+    assert sensitivity is not None
+    assert sensitivity.unit_per_volt == pytest.approx(1 / 0.00225)
+    assert hanger_numbered("Haenger Nr. 07 quer") == 7
+    assert hanger_numbered("hanger_2026-05-01") is None
+    assert hanger_numbered("hanger 3 beside hanger 4") is None
+    assert moment("01.05.2026", "14:03:12") == datetime(2026, 5, 1, 14, 3, 12, tzinfo=UTC)
+    ambiguous = parsed("05/06/2026 10:00:00")
+    assert ambiguous is not None
+    assert not ambiguous[1]
+    assert parsed("12.5") is None
