@@ -60,7 +60,11 @@ class Channel:
 
 @dataclass(frozen=True)
 class Hit:
-    """One contact, in the file's time; also those that no force channel shows."""
+    """One contact, in the file's time; also those that no force channel shows.
+
+    Of a quick release the contact time is that in which the rope parts, the peak its pull.
+    `peak_n` is physical: the logger's filter leaves less of a contact that is short for its rate.
+    """
 
     time_s: float
     peak_n: float
@@ -83,6 +87,7 @@ class ModeTruth:
     order: int
     frequency_hz: float  # undamped, at small amplitude, with the sensors on
     mean_frequency_hz: float  # averaged over the record with the squared amplitude
+    change_at_peak: float  # relative, at the largest amplitude of the record
     bare_frequency_hz: float  # without the sensors' masses
     damping_ratio: float
     snr_db: float
@@ -350,6 +355,7 @@ class _Motion:
     background: Array
     energy: Array  # (modes,): the integral of q''^2 over the record
     mean_hz: Array
+    change: Array  # of the frequency at the largest amplitude
     lines: list[Line]
 
 
@@ -362,6 +368,7 @@ def _ring(
     modes = scene.modes
     ringing = Ringing(modes, pushes, Law(change, power=1 if plan.change < 0 else 2))
     motion = _still(scene, grid)
+    motion.change = change
     kept = [k for k, hz in enumerate(modes.frequency_hz) if hz < 0.45 / step]
     for k in kept:
         own = ringing.acceleration(k, grid.start_s, step, count)
@@ -394,7 +401,9 @@ def _double(
 def _still(scene: _Scene, grid: _Grid) -> _Motion:
     shape = (len(scene.places_m), 2, grid.size)
     hz = scene.modes.frequency_hz
-    return _Motion(np.zeros(shape), np.zeros(shape), np.zeros(len(hz)), hz.copy(), [])
+    return _Motion(
+        np.zeros(shape), np.zeros(shape), np.zeros(len(hz)), hz.copy(), np.zeros(len(hz)), []
+    )
 
 
 def _add(motion: Array, scene: _Scene, k: int, own: Array) -> None:
@@ -483,8 +492,6 @@ def _wires(rng: np.random.Generator, plan: Plan, scene: _Scene, logger: Logger) 
     """The hammer first, where it is recorded, then the sensors."""
     sensors = chain.random_wires(rng, logger, len(scene.places_m), plan.one_axis)
     wires = ([chain.hammer_wire(rng)] if plan.excitation == "hammer" else []) + sensors
-    if plan.structure != "hanger":  # one plane alone moves: nothing to hear across
-        wires = [replace(w, noise_density=w.noise_density / 10) for w in wires]
     if plan.hum_at_mode:
         wires = [replace(w, hum=float(rng.uniform(0.02, 0.2))) for w in wires]
     if plan.quiet:
@@ -535,9 +542,14 @@ def _modulated(rng: np.random.Generator, grid: _Grid, motion: _Motion) -> float:
 
 
 def _mode_truths(
-    scene: _Scene, grid: _Grid, wires: Sequence[Wire], motion: _Motion, unwanted: Array
+    scene: _Scene,
+    grid: _Grid,
+    wires: Sequence[Wire],
+    motion: _Motion,
+    unwanted: Array,
+    dead: int | None,
 ) -> tuple[ModeTruth, ...]:
-    """`wires` and `unwanted` of the accelerations alone."""
+    """`wires` and `unwanted` of the accelerations alone; no mode is heard in the `dead` one."""
     logger, truths = grid.logger, []
     per_place = max(1, len(wires) // len(scene.places_m))
     densities = [chain.density(trace, logger.true_rate_hz) for trace in unwanted.T]
@@ -552,7 +564,7 @@ def _mode_truths(
             shape.append(heard * float(scene.at_sensors[k, c // per_place]))
             density = densities[c].around(float(hz), width)
             density += chain.lsb(logger, wire) ** 2 / 6 / logger.true_rate_hz
-            energy = (shape[-1] * wire.gain * passed) ** 2 * motion.energy[k]
+            energy = (shape[-1] * wire.gain * passed) ** 2 * motion.energy[k] * (c != dead)
             ratios.append(energy / max(density * width * grid.seconds, 1e-300))
         truths.append(
             ModeTruth(
@@ -560,6 +572,7 @@ def _mode_truths(
                 order=scene.orders[k],
                 frequency_hz=float(hz),
                 mean_frequency_hz=float(motion.mean_hz[k]),
+                change_at_peak=float(motion.change[k]),
                 bare_frequency_hz=float(scene.bare_hz[k]),
                 damping_ratio=float(scene.modes.damping[k]),
                 snr_db=float(10 * np.log10(max(ratios))),
@@ -612,11 +625,18 @@ def _spoilt(
 
 
 def _channels(
-    plan: Plan, scene: _Scene, wires: Sequence[Wire], unit: str, bits: int
+    plan: Plan,
+    scene: _Scene,
+    wires: Sequence[Wire],
+    unit: str,
+    bits: int,
+    blows: Sequence[_Blow],
 ) -> tuple[Channel, ...]:
+    """What the crew writes down; where the hammer hit, to the decimetre."""
     channels, rest = [], list(wires)
     if plan.excitation == "hammer":
-        channels.append(Channel("Hammer", "force", "N", None, None, rest.pop(0).full_scale, bits))
+        where = round(float(np.mean([b.place_m for b in blows])), 1)
+        channels.append(Channel("Hammer", "force", "N", None, where, rest.pop(0).full_scale, bits))
     axes: tuple[tuple[str, str], ...] = (("y", PLANES[0]), ("z", PLANES[1]))
     if plan.one_axis:
         axes = ((("y", PLANES[0]) if plan.structure == "hanger" else ("", scene.planes[0])),)
@@ -657,12 +677,14 @@ def recorded(rng: np.random.Generator, plan: Plan, kind: str, seed: int) -> Reco
         np.max(np.abs(d)) >= w.full_scale * 0.9999 for d, w in zip(data.T, wires, strict=True)
     ]
     unit = "m/s2" if plan.quiet else str(rng.choice(["m/s2", "g"], p=[0.75, 0.25]))
-    channels = _channels(plan, scene, wires, unit, grid.logger.bits)
+    channels = _channels(plan, scene, wires, unit, grid.logger.bits, blows)
     step = np.array([chain.lsb(grid.logger, w) for w in wires])
     fault = _spoilt(rng, plan, data, hammer, grid.logger.rate_hz, step)
     data /= [G if c.unit == "g" else 1.0 for c in channels]
+    dead = fault.channel - hammer if plan.fault == "dead" and fault.channel is not None else None
+    noise = traces.unwanted[:, int(hammer) :]
     truth = Truth(
-        modes=_mode_truths(scene, grid, wires[hammer:], motion, traces.unwanted[:, int(hammer) :]),
+        modes=_mode_truths(scene, grid, wires[hammer:], motion, noise, dead),
         hits=_hits(grid, blows),
         lines=_lines(plan, grid, motion),
         clipped=tuple(c.name for c, at_end in zip(channels, reached, strict=True) if at_end),
