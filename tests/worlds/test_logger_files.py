@@ -23,6 +23,9 @@ from tests.worlds.logger_files import FORMATS, first_seconds, write
 from tests.worlds.logger_tables import Held
 from tests.worlds.recordings import Recording, case
 
+# Long, and true of no code of ours: with `make bench`.
+pytestmark = pytest.mark.trial
+
 Array = NDArray[np.float64]
 
 

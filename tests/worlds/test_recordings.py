@@ -24,6 +24,9 @@ from tests.worlds.recorded_structures import (
 )
 from tests.worlds.recordings import Recording, case, recorded
 
+# Long, and true of no code of ours: with `make bench`.
+pytestmark = pytest.mark.trial
+
 Array = NDArray[np.float64]
 BAR = Bar(8.0, 0.05, 2.0e5, (0.0, 0.0), timoshenko=False)
 QUIET = Plan(quiet=True, hits=(1, 1), rebounds=0.0, rates_hz=(2000,), seconds=(20, 20))
