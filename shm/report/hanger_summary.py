@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report import formatting
+from shm.report import formatting, outdated_baseline
 from shm.report.contents import HangerReport, status
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
@@ -29,8 +29,8 @@ def summary(data: HangerReport) -> str:
     """One paragraph in plain words."""
     sentences = (
         *data.warnings,
-        _redescribed(data),
-        _discarded(data),
+        outdated_baseline.redescribed(data),
+        outdated_baseline.discarded(data),
         *data.averaged.caveats,
         _tension(data),
         *_repeats_and_limits(data),
@@ -45,35 +45,6 @@ def summary(data: HangerReport) -> str:
         *advice(data),
     )
     return " ".join(sentence for sentence in sentences if sentence)
-
-
-def _redescribed(data: HangerReport) -> str:
-    """That the description has changed since the baseline, and what to do; empty where not."""
-    if not data.redescribed:
-        return ""
-    changed, more = data.redescribed[:_MOST_NAMED], data.redescribed[_MOST_NAMED:]
-    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
-    number = data.hanger.id
-    return (
-        f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"{_anew(number)} "
-        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
-    )
-
-
-def _discarded(data: HangerReport) -> str:
-    """That tests of the baseline count no more, and what to do; empty where all do."""
-    if not data.discarded:
-        return ""
-    names, number = ", ".join(data.discarded), data.hanger.id
-    return (
-        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
-        f"change stands on what counts no more. {_anew(number)}"
-    )
-
-
-def _anew(number: int) -> str:
-    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:

@@ -2,11 +2,11 @@
 
 The watch counts visits: a change has had time to come only between two, and only tests dated
 before another speak for it there. A clock that hardly moves, or files that come in another order,
-would take the evidence away. So where the clocks of two tests next to each other, as they came in
-or as they are dated, say that the second was no later visit, two that each read beyond the
-threshold to one side are told by themselves; so are those of which one is none that the watch has
-counted, being held or of planned works. Tests of two visits are the watch's to judge: it knows how
-often tests of this hanger do so without a change.
+would take the evidence away. So two tests next to each other, as they came in or as they are dated,
+that each read beyond the threshold to one side are told by themselves where one is none that the
+watch has counted, being held or of planned works; and where their clocks say that the second was no
+later visit, if they are further off than by any load that stands on the deck for a visit. Tests of
+two visits are the watch's to judge: it knows how often tests of this hanger do so without a change.
 
 One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
 thousand, and few of these read beyond a threshold, to one side and alike.
@@ -26,6 +26,7 @@ import numpy as np
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
+from shm.watch.persistence import LARGE
 from shm.watch.posterior_summary import threshold_of
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
@@ -34,6 +35,9 @@ from shm.watch.shift_mixture import beyond, shift_of_mixture
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
 lies that far to one side, fewer than are blunders."""
+
+BY_A_LOAD = 0.1
+"""Of the tension (judgement): a lift or a lorry that stands beside the hanger."""
 
 _PULL_STEPS = 10.0
 """Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
@@ -91,7 +95,11 @@ def agreement(
         others = [
             run[0]
             for run in runs
-            if run and (run[0][0].id in unwatched or not _is_later(newest[0], run[0][0]))
+            if run
+            and (
+                run[0][0].id in unwatched
+                or (is_no_load(quantity, mine) and not _is_later(newest[0], run[0][0]))
+            )
         ]
         is_old = any(_agree(mine, each[j]) for each in known)
         if others and not is_old and not any(map(partial(_have_told, beside), runs, are_later)):
@@ -99,6 +107,13 @@ def agreement(
             drift = _drift(quantity, newest, (mine, shown), hanger)
             return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
     return None
+
+
+def is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
+    """Whether a quantity is further off than by any load that stands on the deck."""
+    if quantity.name == TENSION:
+        return bool(abs(shift_of(quantity, shown.mean)) > BY_A_LOAD)
+    return shown.moves > LARGE
 
 
 def _known_before(

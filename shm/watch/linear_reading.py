@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from shm.models.base import Conditions
 from shm.values import BoolArray, FloatArray, IntArray
+
+SELDOM = 1e-3
+"""Of good tests, by their misfit (judgement): a worse one has larger errors than stated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +62,16 @@ class LinearReading:
     def gain(self, step: FloatArray) -> float:
         """Of a step, in units of the variance."""
         return float(step @ self.information @ step)
+
+
+def credible_share(misfit: FloatArray, fitted: int) -> float:
+    """The share of its stated information that a test deserves, by its misfit over sd (n,).
+
+    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
+    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
+    """
+    free = len(misfit) - fitted
+    if free < 1:
+        return 1.0
+    most = float(scipy.special.chdtri(free, SELDOM))
+    return most / max(most, float(misfit @ misfit))

@@ -31,8 +31,9 @@ _SHOWING = 0.9  # judgement: of the tests after a change; one in ten is disturbe
 _SLIPPING = (SPRINGS, BENDING_STIFFNESS)
 _SLIPPED, _SLIPPED_AS_FROM = 0.15, 20.0
 _SEEM, _AS_FROM = 0.03, 5.0
-# Of a log frequency: no load that passes does as much, but a blunder may.
-_LARGE, _LARGE_SEEM = 0.04, 0.01
+LARGE = 0.04
+"""Of a log frequency (judgement): no load that passes does as much, but a blunder may."""
+_LARGE_SEEM = 0.01
 # Of a log frequency: what only another hanger's test does, if it is no change; one in 10,000 first
 # tests, since it fitted the description.
 _GROSS, _GROSS_BEFORE = 0.08, 1e-4
@@ -116,7 +117,7 @@ def _of_change(
     is_after = np.arange(len(shown)) >= first
     before = shown[begun:first][sd[begun:first] < _TELLING]
     after = is_after & (sd < _TELLING * expected) & (expected >= _SHOWN)
-    least = _LARGE_SEEM if largest > _LARGE else _SEEM
+    least = _LARGE_SEEM if largest > LARGE else _SEEM
     slips = evidence.directions[d].name in _SLIPPING
     seem, as_from = (_SLIPPED, _SLIPPED_AS_FROM) if slips else (least, _AS_FROM)
     does = shown[after] >= _SHOWN * expected[after]

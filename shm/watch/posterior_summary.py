@@ -35,8 +35,7 @@ from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
-# Judgement: for the same reason a tenth of what an end does looks like another tension.
-_TRADED = 0.1
+_TRADED = 0.1  # judgement: of what an end does, that looks like another tension
 _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
@@ -44,7 +43,7 @@ _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 class Subject:
     """What all tests of one hanger share; `start` is the time of the first reading, and
     `baseline_years` from it the mean of the baseline's. `effects` (r, n + q) are what a change does
-    to the frequencies that owners look at: of each plane the first, then the mean."""
+    to what owners look at: of each plane the first frequency, then the mean."""
 
     quantities: tuple[WatchedQuantity, ...]
     hanger: Hanger
@@ -60,10 +59,9 @@ class Subject:
     def left_open(self, means: FloatArray) -> FloatArray:
         """Standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
 
-        A share of each, as far as the baseline's own stiffness and tension are open; and of what
-        the ends do to the frequencies some part may be tension's, or the other way round.
-        """
-        own = np.array([each.scale_sd for each in self.quantities]) * means
+        A share of each, as the baseline's own values are open; some of what ends do may be
+        tension's."""
+        own = means * [each.scale_sd for each in self.quantities]
         is_tension = np.array([each.name == TENSION for each in self.quantities])
         if is_tension.any() and not is_tension.all():
             of_ends = np.abs(means[:, ~is_tension]).sum(axis=1, keepdims=True)

@@ -47,7 +47,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.causes import columns_of
-from shm.watch.linear_reading import LinearReading, SeenModes
+from shm.watch.linear_reading import SELDOM, LinearReading, SeenModes, credible_share
 from shm.watch.loosening import loosening_of
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
@@ -74,7 +74,6 @@ _STARTS = 24  # technical: of a tension from a fiftieth to five times the nomina
 _SETTLED = 1e-2
 # Information, per step_sd, of which 10,000 tests together say as much as the prior of a change.
 _UNSEEN = 1e-4
-_SELDOM = 1e-3
 # How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
 _BEYOND = 0.05
 
@@ -289,7 +288,7 @@ class Reader:
         """
         near = self._descended(np.zeros(len(self.quantities)), seen)
         misfit = float(near.residual @ near.residual)
-        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
+        if misfit <= scipy.special.chdtri(len(near.residual), SELDOM):
             return near
         far = self._descended(self._far_start(seen), seen)
         return far if far.cost < near.cost else near
@@ -335,7 +334,7 @@ class Reader:
         shares, axes = np.linalg.eigh(slopes.T @ slopes)
         seen = shares > _UNSEEN
         steps = (off @ slopes @ axes)[:, seen] / shares[seen]
-        share = _credible_share(linear.residual, int(seen.sum()))
+        share = credible_share(linear.residual, int(seen.sum()))
         kept = shares[seen] * share > _UNSEEN
         shares, axes = shares[seen][kept] * share, axes[:, seen][:, kept]
         information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
@@ -353,19 +352,6 @@ class Reader:
         highest = max(order for _, order in self.modes)
         found = self._model.frequencies_at(theta, highest, seen.conditions)
         return np.asarray(np.log(found[:, seen.plane, seen.order]))
-
-
-def _credible_share(misfit: FloatArray, fitted: int) -> float:
-    """The share of its stated information that a test deserves, by its misfit over sd (n,).
-
-    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
-    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
-    """
-    free = len(misfit) - fitted
-    if free < 1:
-        return 1.0
-    most = float(scipy.special.chdtri(free, _SELDOM))
-    return most / max(most, float(misfit @ misfit))
 
 
 def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:

@@ -46,6 +46,39 @@ class WatchState:
     still_same: float = 1.0
     told: str = ""
 
+    @classmethod
+    def before_any(
+        cls,
+        key: str,
+        start: datetime,
+        reference_c: float,
+        sizes: tuple[int, int],
+        coefficient_sd: FloatArray,
+        scatter_variance: FloatArray,
+    ) -> WatchState:
+        """Of no test yet; `sizes` are how many modes and quantities there are."""
+        n, q = sizes
+        return cls(
+            key=key,
+            start=start,
+            last_time=start,
+            reference_c=reference_c,
+            values=np.zeros((0, n)),
+            variances=np.zeros((0, n)),
+            slopes=np.zeros((0, n, q)),
+            per_kelvin=np.zeros((0, n)),
+            years=np.zeros(0),
+            temperature_c=np.zeros(0),
+            log_amplitude=np.zeros(0),
+            weight=np.zeros(0),
+            counted=np.zeros(0, bool),
+            coefficients=np.zeros(len(coefficient_sd)),
+            coefficient_sd=coefficient_sd,
+            scatter_variance=scatter_variance,
+            called=np.zeros((0, 3)),
+            called_precision=np.zeros((0, n + q, n + q)),
+        )
+
     @property
     def tests(self) -> int:
         return len(self.years)

@@ -29,16 +29,8 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, Structure, structure_of
 from shm.watch.change_layout import Told
-from shm.watch.change_point import (
-    Evidence,
-    evidence_of,
-    log_probability_of_called,
-)
-from shm.watch.conditions import (
-    OF_ONE_VISIT_YEARS,
-    reference_of,
-    years_between,
-)
+from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
+from shm.watch.conditions import OF_ONE_VISIT_YEARS, reference_of, years_between
 from shm.watch.isolated_tests import counted, outlier_probability
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import what_stays
@@ -47,7 +39,7 @@ from shm.watch.state_sums import StateSums, begun_of, size_of
 from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 10
+_VERSION = 11
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
@@ -114,26 +106,13 @@ class Watcher:
                 f"{self.options.baseline_tests}."
             )
         time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
-        coefficients = q * self.structure.thermal_laws
-        state = WatchState(
-            key=self.key,
-            start=time,
-            last_time=time,
-            reference_c=reference_of([reading.temperature_c for reading in readings]),
-            values=np.zeros((0, n)),
-            variances=np.zeros((0, n)),
-            slopes=np.zeros((0, n, q)),
-            per_kelvin=np.zeros((0, n)),
-            years=np.zeros(0),
-            temperature_c=np.zeros(0),
-            log_amplitude=np.zeros(0),
-            weight=np.zeros(0),
-            counted=np.zeros(0, bool),
-            coefficients=np.zeros(coefficients),
-            coefficient_sd=self.structure.layout.prior_sd[n + q :][:coefficients],
-            scatter_variance=self.structure.scatter_variance,
-            called=np.zeros((0, 3)),
-            called_precision=np.zeros((0, n + q, n + q)),
+        state = WatchState.before_any(
+            self.key,
+            time,
+            reference_of([reading.temperature_c for reading in readings]),
+            (n, q),
+            self.structure.layout.prior_sd[n + q :][: q * self.structure.thermal_laws],
+            self.structure.scatter_variance,
         )
         tests = []
         for reading in readings:

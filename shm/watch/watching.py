@@ -34,9 +34,8 @@ from shm.values import (
     RepeatedMistake,
     WatchedTest,
 )
-from shm.values.drift import OF_ONE_VISIT
-from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_state import AlertState
+from shm.watch.agreement import agreement, way_of
+from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import message_of, message_of_odd, short_name
 from shm.watch.change_words import suspects
 from shm.watch.lone_baseline import (
@@ -167,12 +166,13 @@ def watch_newest(
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
         are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
-        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not told.beyond:
+        is_told = told.alone or bool(told.beyond)
+        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not is_told:
             agreed = first_tests_against(reader, later[-1], beside, hanger, options)
             told = replace(told, alone=told.alone or agreed is not None)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
-            alert, told = agreed, _with_beyond(told, agreed.drifts, agreed.time)
+            alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
             told = replace(told, agreed=told.agreed | two_told)
     return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
 
@@ -207,7 +207,7 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
     """What stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
-    standing = _still(told, test, hanger.thresholds.end_probability)
+    standing = still(told, test, hanger.thresholds.end_probability)
     news = _news(standing, test, level)
     call = test.time if news.call else standing.call
     called = (*standing.called, test.change) if test.change.called else standing.called
@@ -227,7 +227,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         # It waits while there is worse to tell.
         alert, noted = notice_of(test, hanger, new), wrong
     stands = replace(
-        _with_beyond(standing, (*news.beyond, *since_baseline), test.time),
+        with_beyond(standing, (*news.beyond, *since_baseline), test.time),
         call=call,
         called=called,
         odd=odd,
@@ -235,19 +235,9 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
         noted=noted,
         alone=alone,
         # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
-        agreed=standing.agreed | _conditions(since_baseline),
+        agreed=standing.agreed | conditions(since_baseline),
     )
     return stands, alert
-
-
-def _with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
-    """The state with shifts that were told at a test to be beyond their threshold."""
-    return replace(told, beyond={**told.beyond, **dict.fromkeys(_conditions(beyond), at)})
-
-
-def _conditions(drifts: Sequence[Drift]) -> frozenset[tuple[str, Way]]:
-    """Each quantity and the way that it went."""
-    return frozenset((each.quantity, way_of(each.shift_mean)) for each in drifts)
 
 
 def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
@@ -273,38 +263,6 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
         told, alert = after(told, test, hanger)
         alerts += [alert] if alert else []
     return tuple(alerts)
-
-
-def _still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """What still stands at a test: all but what tests of two visits have below `end`.
-
-    A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two tests
-    that agree have told was improbable to the watch all along: it ends once the shift has come
-    back, too.
-    """
-    over = {
-        (drift.quantity, way)
-        for drift in test.drifts
-        for way in ("up", "down")
-        if _probability(drift, way) < end
-        and not (
-            (drift.quantity, way) in told.agreed
-            and drift.may_be_beyond(-1.0 if way == "down" else 1.0)
-        )
-    }
-    fading = {each: told.fading.get(each, test.time) for each in told.beyond if each in over}
-    ended = {each for each, since in fading.items() if test.time - since > OF_ONE_VISIT}
-    beyond = {condition: at for condition, at in told.beyond.items() if condition not in ended}
-    fading = {each: since for each, since in fading.items() if each in beyond}
-    agreed = told.agreed - ended
-    if test.change.probability < end:
-        return AlertState(beyond, odd=told.odd, alone=told.alone, agreed=agreed, fading=fading)
-    return replace(told, beyond=beyond, agreed=agreed, fading=fading)
-
-
-def _probability(drift: Drift, way: Way) -> float:
-    """That the shift is beyond its threshold in one way; nearly none is where it went the other."""
-    return drift.probability * (way_of(drift.shift_mean) == way)
 
 
 def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:

@@ -19,7 +19,7 @@ from tests.helpers.workspaces import modelled_test
 
 BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
 SECOND = timedelta(seconds=1)
-LOST = 0.9
+LOST = 0.85
 
 
 def a_test(number: int, tension: float = LOST, temperature_c: float = 12.0) -> ModalTest:
@@ -64,7 +64,7 @@ def test_the_second_of_two_is_told_and_says_which_and_how_far() -> None:
     alert = told(a_test(2), came(a_test(1)))
     assert alert is not None
     assert alert.kinds == ("beyond threshold",)
-    assert alert.drifts[0].shift_mean == pytest.approx(-0.1, abs=0.02)
+    assert alert.drifts[0].shift_mean == pytest.approx(-0.15, abs=0.03)
     assert alert.drifts[0].probability > 0.95
     assert alert.key == "hanger-3:two-tests-agree:tension-down:t2"
     assert "Tests t1 and t2 both read beyond its threshold of 5 %." in alert.message
@@ -93,6 +93,7 @@ def test_it_may_stand_on_either_side_in_either_order(beside: Beside) -> None:
         (a_test(2), came(a_test(1, 1.1))),  # the other way
         (a_test(2), came(a_test(1, 0.6))),  # of quite another size
         (a_test(2, 0.96), came(a_test(1, 0.96))),  # below the threshold
+        (a_test(2, 0.92), came(a_test(1, 0.92))),  # a van may do that for a visit
         (a_test(2, 0.93, 45.0), came(a_test(1, 0.93, 45.0))),  # it may be the warmth
         (a_test(2, 1.0), came(a_test(1), a_test(3))),  # itself sound
         (a_test(3), came(a_test(2), a_test(1))),  # the two before it have told it

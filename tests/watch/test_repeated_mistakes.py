@@ -128,5 +128,6 @@ def test_a_further_mode_is_a_further_notice_that_names_it_alone() -> None:
 def test_the_notice_ends_once_the_mode_fits_again(tests: int, ends: bool) -> None:
     _, alert = after(AlertState(), watched(2, 3), HANGER_3)
     assert alert is not None
-    why = why_over(alert, watched(3, tests), HANGER_3, gap_stands=False)
-    assert bool(why) is ends
+    later = [watched(number, tests) for number in (3, 6)]
+    assert not why_over(alert, later[:1], HANGER_3, gap_stands=lambda _: False)
+    assert bool(why_over(alert, later, HANGER_3, gap_stands=lambda _: False)) is ends
