@@ -67,6 +67,18 @@ def why_over(
     return f"{both} do not show it any more"
 
 
+def is_told(alert: Alert, standing: Sequence[Alert]) -> bool:
+    """Whether alerts that stand tell already all that one says to be beyond its threshold.
+
+    The watch may have taken the first for over, by its own count of visits.
+    """
+    beyond = "beyond threshold"
+    if alert.kinds != (beyond,) or not alert.drifts:
+        return False
+    known = {each for one in standing if beyond in one.kinds for each in _conditions(one)}
+    return _conditions(alert) <= known
+
+
 def seen_again(
     resolved: Sequence[StoredAlert],
     standing: Sequence[StoredAlert],

@@ -13,7 +13,7 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
-from shm.pipeline.ending import gap_stands, seen_again, why_over
+from shm.pipeline.ending import gap_stands, is_told, seen_again, why_over
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
@@ -300,8 +300,8 @@ class Jobs:
                 earlier = [each.alert for each in self.store.alerts.list_all(hanger.id)]
                 works = works_before(alert, silences, earlier)
                 alert = alert if works is None else after_works(alert, works)
-            ended, again = self._ended(hanger, baseline, watched, alert)
-            alert, now = again or alert, self.clock()
+            ended, alert = self._ended(hanger, baseline, watched, alert)
+            now = self.clock()
             return self.store.watch.save(test, baseline, watched, alert, hooks, now, state, ended)
 
         return Step(run, keep)
@@ -309,12 +309,12 @@ class Jobs:
     def _ended(
         self, hanger: Hanger, baseline: Baseline, watched: WatchedTest, alert: Alert | None
     ) -> tuple[dict[int, str], Alert | None]:
-        """Which alerts a test ends, and why; and the resolved one that it shows again, unless the
-        watch itself calls for an alert."""
+        """Which alerts a test ends, and why; and the one to raise: that of the watch, unless one
+        that stands tells the same, or else a resolved one that is seen again."""
         standing = self.store.alerts.list_all(hanger.id, baseline.id, standing=True)
         resolved = self.store.alerts.list_all(hanger.id, baseline.id, standing=False)
         if not standing and not resolved:
-            return {}, None
+            return {}, alert
         before = [each.watched for each in self.store.watch.list_recent(baseline, _RECENT_TESTS)]
         tests = sorted([*before, watched], key=lambda each: each.time)
 
@@ -331,11 +331,10 @@ class Jobs:
             if (why := why_over(each.alert, tests, hanger, gap_stands=stands))
         }
         # The gap's alert has one key for good: what was raised before is raised no second time.
-        is_news = alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}
-        again = (
-            None if is_news else seen_again(resolved, standing, tests, hanger, gap_stands=stands)
-        )
-        return ended, again
+        if alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}:
+            left = [each.alert for each in standing if each.id not in ended]
+            return ended, None if is_told(alert, left) else alert
+        return ended, seen_again(resolved, standing, tests, hanger, gap_stands=stands) or alert
 
     def _deliver(self, notifier: Notifier, delivery: Delivery, message: Alert) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

@@ -83,26 +83,33 @@ def rebaseline(
 
 
 def still_shown(store: Store, hanger: Hanger, order: Order) -> tuple[Unrepaired, ...]:
-    """What of the alerts that an order ends its tests still show, against the baseline in force:
-    from then on it is the normal state.
+    """What of the alerts that an order ends its tests still show, each against the baseline that it
+    was raised against: a later one may hold the loss already.
 
     Raises NothingThere as `rebaseline` does.
     """
-    before = store.watch.baseline(hanger.id)
-    if before is None:
+    if store.watch.baseline(hanger.id) is None:
         return ()
     since = [(each.test, each.time) for each in _since(store, hanger, order.since)]
-    kept = kept_of(before.posterior, dated_tests(store, before)[0])
-    of_baseline = [test for test, _ in kept]
-    reader = Reader(before.posterior, of_baseline, hanger)
     tests = {each.test.id: each.test for each in store.tests.list_all(hanger.id)}
-    told = [
-        (each.id, each.alert, tests.get(each.alert.test))
-        for each in _explained(store, hanger, order)
-    ]
     kind = order.kind
     restores = kind is None or kind.restores or kind.accepts
-    return unrepaired((reader, of_baseline), told, since, hanger, restores=restores)
+    found: list[Unrepaired] = []
+    explained = _explained(store, hanger, order)
+    for number in dict.fromkeys(each.baseline_id for each in explained):
+        before = store.watch.baseline(hanger.id, number=number)
+        if before is None:
+            continue
+        kept = kept_of(before.posterior, dated_tests(store, before)[0])
+        of_baseline = [test for test, _ in kept]
+        reader = Reader(before.posterior, of_baseline, hanger)
+        told = [
+            (each.id, each.alert, tests.get(each.alert.test))
+            for each in explained
+            if each.baseline_id == number
+        ]
+        found += unrepaired((reader, of_baseline), told, since, hanger, restores=restores)
+    return tuple(found)
 
 
 def _explained(store: Store, hanger: Hanger, order: Order) -> list[StoredAlert]:

@@ -52,7 +52,7 @@ def raise_alert(
     alert_id = insert(connection, alerts, values)
     for hook in hooks:
         insert(connection, deliveries, _owed(alert_id, hook, News.RAISED, at))
-    return StoredAlert(alert_id, alert, at)
+    return StoredAlert(alert_id, alert, at, baseline_id=baseline_id)
 
 
 def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
@@ -101,7 +101,12 @@ def _owed(alert_id: int, hook: str, news: News, at: datetime) -> dict[str, Any]:
 def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
-        row.id, alert_of(row), row.raised_at, acknowledgement_of(row), resolution_of(row)
+        row.id,
+        alert_of(row),
+        row.raised_at,
+        acknowledgement_of(row),
+        resolution_of(row),
+        row.baseline_id,
     )
 
 

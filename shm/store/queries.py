@@ -114,9 +114,14 @@ _BASELINE = ("id", "set_at", "who", "why", "since")
 
 
 def read_baseline(
-    connection: Connection, hanger: int, model: str | None = None, time: datetime | None = None
+    connection: Connection,
+    hanger: int,
+    model: str | None = None,
+    time: datetime | None = None,
+    number: int | None = None,
 ) -> Baseline | None:
-    """The baseline in force, or the last of one class, with its posterior; for a test of `time`."""
+    """The baseline in force, the last of one class or that of a `number`, with its posterior; for a
+    test of `time`."""
     query = (
         sa.select(posteriors, *(baselines.c[name].label(f"b_{name}") for name in _BASELINE))
         .join(baselines)
@@ -124,7 +129,10 @@ def read_baseline(
         .order_by(baselines.c.id.desc())
         .limit(1)
     )
-    query = query.where(_in_force(hanger) if model is None else posteriors.c.model == model)
+    if number is not None:
+        query = query.where(baselines.c.id == number)
+    else:
+        query = query.where(_in_force(hanger) if model is None else posteriors.c.model == model)
     if time is not None:
         query = query.where(baselines.c.since.is_(None) | (baselines.c.since <= time))
     row = connection.execute(query).one_or_none()

@@ -284,13 +284,18 @@ class Resolution(Note):
 
 @dataclass(frozen=True)
 class StoredAlert:
-    """An alert and when it was raised; its condition stands while it has no resolution."""
+    """An alert and when it was raised; its condition stands while it has no resolution.
+
+    `baseline_id` is the number of the baseline against which it was raised, None of one that has
+    none: of a held test, say.
+    """
 
     id: int
     alert: Alert
     raised_at: datetime
     acknowledgement: Acknowledgement | None = None
     resolution: Resolution | None = None
+    baseline_id: int | None = None
 
     @property
     def is_open(self) -> bool:

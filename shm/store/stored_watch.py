@@ -107,14 +107,19 @@ class Watch(Repository):
             _drop_state(connection, baseline)
 
     def baseline(
-        self, hanger: int, model: str | None = None, time: datetime | None = None
+        self,
+        hanger: int,
+        model: str | None = None,
+        time: datetime | None = None,
+        number: int | None = None,
     ) -> Baseline | None:
-        """The baseline in force, or the last that was in force of one class, with its posterior.
+        """The baseline in force, the last that was in force of one class, or that of a `number`,
+        with its posterior.
 
         With `time` it is that for a test of then: a baseline set anew is none for earlier tests.
         """
         with self.reading() as connection:
-            return read_baseline(connection, hanger, model, time)
+            return read_baseline(connection, hanger, model, time, number)
 
     def baselines_in_force(self, hangers: Iterable[Hanger]) -> dict[int, BaselineGlance]:
         """The baseline in force of each hanger that has one, in numbers, by hanger."""

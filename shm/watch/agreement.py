@@ -27,10 +27,9 @@ from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, Watched
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
-from shm.watch.posterior_summary import threshold_of
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import beyond, shift_of_mixture
+from shm.watch.shift_mixture import beyond, shift_of_mixture, threshold_of
 
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740

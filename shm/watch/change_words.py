@@ -148,7 +148,12 @@ def beyond_words(drift: Drift) -> str:
 
 
 def undetected_words(latest: Change) -> str:
-    """How near the evidence for a change is to a detection."""
+    """How near the evidence for a change is to a detection, or that it is too small to be told."""
+    if latest.evidence_years > latest.limit_years:
+        return (
+            "Something changed since the baseline, by less than the watch is to tell: no first "
+            "frequency, and no plane's mean, moved by enough."
+        )
     share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
     return (
         "No change was detected since the baseline: the evidence for one is "

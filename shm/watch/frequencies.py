@@ -199,10 +199,11 @@ class FrequencySums(StateSums):
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
         return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
 
-    def effects(self, state: WatchState) -> FloatArray:
+    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
         """Each frequency counts: which of them matters no model says."""
         n = self.structure.layout.n
-        return np.hstack([np.eye(n), np.eye(n)])
+        every = np.hstack([np.eye(n), np.eye(n)])
+        return every, every
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,11 +35,10 @@ from shm.watch.agreement import BY_A_LOAD, CLEAR, Shown, are_of_two_visits, read
 from shm.watch.alert_text import message_of_baseline, short_name
 from shm.watch.change_words import is_stiffness, quantity_words, size_words
 from shm.watch.options import WatchOptions
-from shm.watch.posterior_summary import threshold_of
 from shm.watch.quantities import value_at
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import off_the_baseline
-from shm.watch.shift_mixture import beyond, shift_of_mixture
+from shm.watch.shift_mixture import beyond, shift_of_mixture, threshold_of
 
 FEW_TESTS = 2
 """Of a baseline: of three, those that agree outvote the odd one."""

@@ -23,19 +23,19 @@ from shm.values import (
     Moved,
     Reading,
     WatchedQuantity,
-    is_frequency,
     is_ratio,
 )
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import value_at
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
+from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture, threshold_of
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
 _DIGITS = 3  # probabilities that read alike are ordered by tension first
-_TRADED = 0.1  # judgement: of what an end does, that looks like another tension
+_TRADED = 0.25  # judgement: of what an end does, that looks like another tension
+_BEYOND_DOUBT = 1e4  # judgement: times what a detection takes
 _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
@@ -43,7 +43,8 @@ _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 class Subject:
     """What all tests of one hanger share; `start` is the time of the first reading, and
     `baseline_years` from it the mean of the baseline's. `effects` (r, n + q) are what a change does
-    to what owners look at: of each plane the first frequency, then the mean."""
+    to what owners look at: of each plane the first frequency, then the mean; `by_mode` (n, n + q)
+    to every mode."""
 
     quantities: tuple[WatchedQuantity, ...]
     hanger: Hanger
@@ -51,6 +52,7 @@ class Subject:
     start: datetime
     baseline_years: float
     effects: FloatArray
+    by_mode: FloatArray
 
     def at(self, years: float) -> datetime:
         """The time so many years from the start."""
@@ -120,8 +122,10 @@ def _materials(
     evidence: Evidence,
     changes: Sequence[tuple[int, ...]],
 ) -> FloatArray:
-    """The same (changes,) of each."""
+    """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
     effects, least, found = subject.effects, subject.options.least_frequency_shift, []
+    if evidence.log_evidence > math.log(_BEYOND_DOUBT * subject.options.limit_years):
+        effects = np.vstack([effects, subject.by_mode])
     for each in changes:
         mean, factor = evidence.change_at(each)
         middle = effects @ mean
@@ -365,16 +369,6 @@ def _shifts(
         sds.append(np.sqrt(np.maximum(variance, 0)))
     shape = (-1, layout.q)
     return weights, np.array(means).reshape(shape), np.array(sds).reshape(shape), changes
-
-
-def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:
-    """The shift of which its owner must know: a fraction of the tension, or decades."""
-    limits = hanger.thresholds
-    if quantity.name == TENSION:
-        return limits.tension_shift_fraction
-    if is_frequency(quantity.name):  # it goes with the root of a stiffness, as with a tension's
-        return limits.tension_shift_fraction / 2
-    return limits.stiffness_shift_decades
 
 
 def _drift(

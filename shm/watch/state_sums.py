@@ -168,15 +168,17 @@ class StateSums:
             int((rows < self.options.baseline_tests).sum()),
         )
 
-    def effects(self, state: WatchState) -> FloatArray:
-        """What a change does to each plane's first frequency and to its mean (r, n + q)."""
+    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
+        """What a change does to each plane's first frequency and to its mean (r, n + q), and to
+        every mode (n, n + q)."""
         measured = np.isfinite(state.variances)
         count = np.maximum(measured.sum(axis=0), 1)[:, None]
         slopes = np.where(measured[:, :, None], state.slopes, 0.0).sum(axis=0) / count
         of_modes = np.hstack([np.eye(self.structure.layout.n), slopes])
         planes = np.array([plane for plane, _ in self.modes])
         of_planes = [of_modes[planes == plane] for plane in dict.fromkeys(planes.tolist())]
-        return np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
+        rows = np.vstack([row for own in of_planes for row in (own[0], own.mean(axis=0))])
+        return rows, of_modes
 
 
 def _levels(log_amplitude: FloatArray) -> FloatArray:

@@ -37,7 +37,7 @@ from shm.values import (
 from shm.watch.agreement import agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import message_of, message_of_odd, short_name
-from shm.watch.change_words import suspects
+from shm.watch.change_words import CAUSES, suspects
 from shm.watch.lone_baseline import (
     FEW_TESTS,
     FIRST_TESTS,
@@ -223,8 +223,9 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     alert = alert or _of_odd(test, hanger, odd)
     wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
     noted = told.noted & wrong
-    if alert is None and (new := news_of(test.mistaken, noted)):
-        # It waits while there is worse to tell.
+    explained = any(each.moved and each.moved[0].quantity in CAUSES for each in called)
+    if alert is None and not explained and (new := news_of(test.mistaken, noted)):
+        # It waits while there is worse to tell; a mass or lost section is why modes go astray.
         alert, noted = notice_of(test, hanger, new), wrong
     stands = replace(
         with_beyond(standing, (*news.beyond, *since_baseline), test.time),

@@ -151,6 +151,17 @@ def test_works_that_no_test_shows_end_no_alert(
     assert baseline.since is None, "the former baseline stays"
 
 
+def test_another_event_first_repairs_no_loss_either(shm: Shm, workspace: Path) -> None:
+    """The baseline of that event holds the loss; the alert is of the one before."""
+    order = (*ANEW, "--since", "2026-06-30", "--kind")
+    assert shm("--workspace", workspace, *order, "sensor replaced").code == 0
+    ended = shm("--workspace", workspace, *order, "repaired")
+    assert ended.code == 3, ended.out
+    assert "alert 2: tension fell by 20" in " ".join(ended.err.split())
+    with Workspace.open(workspace, {}).store() as store:
+        assert loss_in(store).resolution is None
+
+
 def test_a_loss_that_is_accepted_as_it_is_ends_on_record(shm: Shm, workspace: Path) -> None:
     ended = shm("--workspace", workspace, *ANEW, "--since", "2026-06-30", "--who", "Jansen",
                 "--kind", "accepted as it is", "--json")  # fmt: skip
