@@ -1,12 +1,14 @@
 """Tests that agree with none beside them: another hanger was hit, a clock was off, a bad day.
 
-A test counts where it agrees with what was before it or with a test next to it, before or after.
-So a blunder counts in nothing as long as it stands alone, and what lasts counts from its second
-test on, however large it is. Nothing here asks which cause it is.
+A test counts where it agrees with what was before it or with a test next to it, before or after,
+and none of its modes strays: two tests agree by the modes that they share, and these may be without
+the one that is mistaken. So a blunder counts in nothing as long as it stands alone, and what lasts
+counts from its second test on, however large it is. Nothing here asks which cause it is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,8 @@ _SELDOM = 1e-3  # of tests that agree so many are taken for such that do not
 _NEAR = 2  # tests to each side: a blunder may lie between two that agree
 _BEFORE = 5  # counted tests that say where the hanger was
 _AGREEING = 0.4  # judgement: of those before; two of five
+# Of a log frequency (judgement): further off than by any load, and nearer than orders are.
+_STRAYS, _SAME = 0.04, 0.02
 _WIDER, _TAIL = 10.0, 2.0  # judgement: how a blunder lies, ten times as wide and with heavy tails
 
 
@@ -78,10 +82,23 @@ def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
         near = [
             test + step for step in range(-_NEAR, _NEAR + 1) if step and 0 <= test + step < tests
         ]
-        found[test] = agreeing >= _AGREEING * len(before) or any(
-            seen.agree(test, each) for each in near if each >= first
-        )
+        near = [each for each in near if each >= first]
+        agrees = agreeing >= _AGREEING * len(before) or any(seen.agree(test, n) for n in near)
+        found[test] = agrees and not _strays(seen, found, test, near)
     return found
+
+
+def _strays(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
+    """Whether a mode of a test lies where no counted test before has it, and none beside it."""
+    for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
+        measured = np.isfinite(seen.variances[:, mode])
+        before = np.flatnonzero(found[:test] & measured[:test])[-_BEFORE:]
+        own, others = seen.values[test, mode], seen.values[:, mode]
+        if not len(before) or abs(own - np.median(others[before])) <= _STRAYS:
+            continue
+        if not any(measured[each] and abs(own - others[each]) < _SAME for each in near):
+            return True
+    return False
 
 
 def _of_baseline(seen: Seen, first: int) -> BoolArray:

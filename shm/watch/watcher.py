@@ -39,7 +39,7 @@ from shm.watch.state_sums import StateSums, begun_of, size_of
 from shm.watch.watch_state import WatchState
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 12
+_VERSION = 13
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5

@@ -85,3 +85,21 @@ def test_the_probability_of_a_blunder_grows_with_its_distance() -> None:
 
     assert found == sorted(found)
     assert found[0] < 0.01 < 0.99 < found[-1]
+
+
+def test_a_mistaken_mode_that_no_test_beside_it_has_lets_the_test_count_for_nothing() -> None:
+    """By the modes that they share it agrees with its neighbours: these lack the mistaken one."""
+    every = seen(np.zeros(8))
+    variances = every.variances.copy()
+    variances[[3, 5], 2] = np.inf
+    strayed, lasts = every.values.copy(), every.values.copy()
+    strayed[4, 2] += 0.12
+    lasts[4:, 2] += 0.12
+
+    def count(values: FloatArray) -> list[bool]:
+        part = Seen(values, variances, every.doubt, every.factors, every.sds)
+        return [bool(each) for each in counted(part, np.zeros(0, bool), 1)]
+
+    assert count(every.values) == [True] * 8
+    assert count(strayed) == [n != 4 for n in range(8)]
+    assert count(lasts)[6:] == [True, True], "what lasts counts once another test has it"
