@@ -28,7 +28,10 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Hit:
-    """One hammer hit: where it begins in which record, how hard it was, whether it was used."""
+    """One hammer hit: where it begins in which record, how hard it was, whether it was used.
+
+    `reason` is why not; `cut`: why a used one's ring-down is taken from later on than its end.
+    """
 
     record: int
     start: int
@@ -36,6 +39,7 @@ class Hit:
     peak_force_n: float
     used: bool = True
     reason: str = ""
+    cut: str = ""
 
 
 @dataclass(frozen=True)

@@ -201,7 +201,7 @@ def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
     lead = int(LEAD_SECONDS * sampling_rate_hz) + reach
     begin = hit.pulse.start - lead - reach
-    free = hit.pulse.end + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
+    free = hit.free + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
     signals = _centred(hit, begin, free)
     driven, rate = band_limited(signals, sampling_rate_hz, band_high_hz)
     first_free = -((begin - free) // factor)

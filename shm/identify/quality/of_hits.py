@@ -55,14 +55,20 @@ def _reasons(reasons: list[str]) -> str:
 
 
 def double_hits(inspection: Inspection) -> QualityCheck | None:
-    """How many hits were left out because a second blow fell into their ring-down."""
-    return fault_count(
-        inspection,
-        "double hits",
-        (DOUBLE_HIT,),
-        "each hit is a single blow",
-        "Hit from the wrist and let the hammer spring back at once; repeat these hits.",
+    """How many hits have a second blow in their ring-down.
+
+    They are left out, or used from after it where there are fewer than three others.
+    """
+    remedy = "Hit from the wrist and let the hammer spring back at once; repeat these hits."
+    figure = fault_count(
+        inspection, "double hits", (DOUBLE_HIT,), "each hit is a single blow", remedy
     )
+    late = [hit for hit in hits_of(inspection) if hit.cut == DOUBLE_HIT]
+    if figure is None or not late:
+        return figure
+    told = f"used from after the second blow: {places(inspection, late)}"
+    found = f"{figure.found}; {told}" if figure.value else told
+    return QualityCheck("double hits", "warning", figure.value + len(late), 0.0, "", found, remedy)
 
 
 def pre_trigger(inspection: Inspection) -> QualityCheck | None:
