@@ -30,7 +30,8 @@ class Dropped:
 class Hit:
     """One hammer hit: where it begins in which record, how hard it was, whether it was used.
 
-    `reason` is why not; `cut`: why a used one's ring-down is taken from later on than its end.
+    `peak_force_n` is NaN where no force was recorded. `reason` is why it was not used; `cut`: why a
+    used one's ring-down is taken from later on than its end.
     """
 
     record: int
@@ -67,11 +68,12 @@ class Measurement:
     `decays` holds the ring-down after each used hit, each (points, samples), low-passed to the
     band and sampled at `sampling_rate_hz`; a hit's forced part is not in it. `driven` holds the
     same hits from just before the hammer strikes, each (1 + points, samples), the force first; it
-    is empty where only frequency responses are known, or nobody hit. `spectra` holds those of each
+    is empty where only frequency responses are known, or no force. `spectra` holds those of each
     used hit, windowed, on the lines of `frequency_response`: (hits, 1 + points, lines), the force
-    first. `hammer` is where and in which direction it hit. Ambient records have none of these:
-    their `decays` are parts of the record. Exponential windows of `window_time_constant_s` and
-    `decay_time_constant_s` (inf: none) lie on spectra and frequency responses, and on `decays`.
+    first. `hammer` is where and in which direction it hit. Hits of unknown force have `decays` and
+    `hits` alone. Ambient records have none of these: their `decays` are parts of the record.
+    Exponential windows of `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on
+    spectra and frequency responses, and on `decays`.
     """
 
     source: str

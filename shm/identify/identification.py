@@ -97,7 +97,7 @@ def identify(
         hits=tuple(hits),
         dropped=_all_dropped(measurements, found.finding),
         poles=found.finding.poles,
-        notes=(*placement.notes, *found.notes, *_few_hits(measurements)),
+        notes=(*placement.notes, *found.notes, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=quality,
         set_aside=placement.set_aside,
@@ -193,9 +193,18 @@ def _few_hits(measurements: Sequence[Measurement]) -> tuple[str, ...]:
     )
 
 
+def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
+    if not any(m.hits and m.frequency_response is None for m in measurements):
+        return ()
+    return (
+        "no force was recorded: hits are known by the motion after them, amplitudes and frequency "
+        "responses are not",
+    )
+
+
 def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     """Median peak force of the used hits over that of the reference level."""
-    forces = [hit.peak_force_n for hit in hits if hit.used]
+    forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 

@@ -64,7 +64,7 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
     mixed = references(measurement.decays)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if measurement.frequency_response is None:
+    if measurement.frequency_response is None and not measurement.hits:
         options = replace(options, max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd)
     return modes_of_hankel(matrices, rows, measurement, options)
 

@@ -23,6 +23,7 @@ from shm.identify.measuring.hits import (
     PULSE_SECONDS,
     RINGING_SAMPLES,
     HitRecord,
+    Pulse,
     find_pulses,
 )
 from shm.identify.measuring.signal_faults import (
@@ -34,6 +35,7 @@ from shm.identify.measuring.signal_faults import (
     clipped_ends,
     faults_of_channels,
 )
+from shm.identify.measuring.unforced_hits import find_unforced
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
 
@@ -64,7 +66,7 @@ class Screening:
 
 def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
     """What can be used of records of one set-up; raises NotIdentifiable where nothing can."""
-    hits, ring_downs = _hits(records)
+    hits, ring_downs = _hits(records, options)
     channels, rate = records[0].accelerations, records[0].sampling_rate_hz
     ends = clipped_ends(channels, ring_downs)
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
@@ -72,7 +74,8 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
-    reasons = _with_outliers(ring_downs, reasons, rate, options)
+    if records[0].force is not None:
+        reasons = _with_outliers(ring_downs, reasons, rate, options)
     reasons = _with_double_hits(reasons, faults, rows)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
@@ -84,17 +87,27 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
 
 
-def _hits(records: Sequence[Recording]) -> tuple[list[Hit], list[HitRecord]]:
+def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
+    """The hits of a record: by its force where that is recorded, else by the motion after them."""
+    rate = record.sampling_rate_hz
+    if record.force is not None:
+        return find_pulses(record.force.values, rate)
+    accelerations = np.array([channel.values for channel in record.accelerations])
+    return find_unforced(accelerations, rate, options.band_high_hz)
+
+
+def _hits(
+    records: Sequence[Recording], options: IdentifyOptions
+) -> tuple[list[Hit], list[HitRecord]]:
     """Each hit of each record, as a row of the result and with its signals."""
     hits, ring_downs = [], []
     for index, record in enumerate(records):
-        force = record.force
-        assert force is not None
         accelerations = np.array([channel.values for channel in record.accelerations])
-        for pulse in find_pulses(force.values, record.sampling_rate_hz):
+        force = np.zeros(record.samples) if record.force is None else record.force.values
+        for pulse in pulses_of(record, options):
             start_s = pulse.start / record.sampling_rate_hz
             hits.append(Hit(index, pulse.start, start_s, pulse.peak_force_n))
-            ring_downs.append(HitRecord(force.values, accelerations, pulse))
+            ring_downs.append(HitRecord(force, accelerations, pulse))
     return hits, ring_downs
 
 

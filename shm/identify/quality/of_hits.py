@@ -36,6 +36,8 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     used = [hit for hit in hits if hit.used]
     fewest = min(sum(h.used for h in m.hits) for m in inspection.measurements)
     found = f"{len(used)} of {len(hits)} hits are used{_reasons([h.reason for h in hits])}"
+    if _unforced(inspection):
+        found += "; no force was recorded, so they are known by what they set in motion"
     remedy = "Hit at least three times, better five, with time to ring down."
     if len(used) == 1 and used[0].start < RINGING_SAMPLES:
         found = "one hit that begins with its record: nothing tells its vibration from noise"
@@ -46,6 +48,11 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     if fewest < LEAST_HITS:
         return QualityCheck("hits", "warning", fewest, float(LEAST_HITS), "", found, remedy)
     return QualityCheck("hits", "good", fewest, float(LEAST_HITS), "", found)
+
+
+def _unforced(inspection: Inspection) -> bool:
+    """Whether the hits are known from the accelerations alone."""
+    return any(record.force is None for record in inspection.records)
 
 
 def _reasons(reasons: list[str]) -> str:
@@ -78,7 +85,7 @@ def pre_trigger(inspection: Inspection) -> QualityCheck | None:
     filter may announce it. The ring-down is as good without.
     """
     hits = hits_of(inspection)
-    if not hits:
+    if not hits or _unforced(inspection):
         return None
     limit = max(
         PULSE_SECONDS + RINGING_SAMPLES / record.sampling_rate_hz for record in inspection.records
@@ -126,7 +133,7 @@ def _level_db(decay: FloatArray) -> float:
 
 def repeatability(inspection: Inspection) -> QualityCheck | None:
     """How far apart the used hits' responses are (0 alike, 1 unlike), worst set-up."""
-    if not hits_of(inspection):
+    if not hits_of(inspection) or _unforced(inspection):
         return None
     dropped = hits_for(inspection, (OUTLIER, KNOCK))
     values = [_apart(m, inspection) for m in inspection.measurements]
@@ -177,7 +184,7 @@ def _hit_records(
 def force_spectrum(inspection: Inspection) -> QualityCheck | None:
     """Force at the band's upper end over its largest in the band, in dB, median over the hits."""
     used = [hit for hit in hits_of(inspection) if hit.used]
-    if not used:
+    if not used or _unforced(inspection):
         return None
     high = inspection.options.band_high_hz
     curves = [_spectrum_db(inspection, hit) for hit in used]
