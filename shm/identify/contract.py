@@ -96,7 +96,7 @@ class FoundMode:
 
     `shape` and `shape_sd` (points,): real, largest absolute value 1. Standard deviations are NaN
     where there are too few hits to know them. `acceleration_m_s2`: see `Mode`; an identifier
-    leaves it out.
+    leaves it out, as it does `amplitude_slope`: see `Mode`.
     """
 
     frequency_hz: float
@@ -106,6 +106,8 @@ class FoundMode:
     shape: FloatArray
     shape_sd: FloatArray
     acceleration_m_s2: float = NAN
+    amplitude_slope: float = NAN
+    amplitude_slope_sd: float = NAN
 
 
 @dataclass(frozen=True, eq=False)

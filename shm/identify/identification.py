@@ -13,6 +13,7 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
+from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.measuring.setups import measured
@@ -147,7 +148,8 @@ def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
 
 
 def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    return coherent_only(without_window(found, measurement), measurement, options)
+    found = coherent_only(without_window(found, measurement), measurement, options)
+    return with_amplitude_dependence(found, measurement)
 
 
 def _test(
