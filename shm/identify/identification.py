@@ -16,6 +16,7 @@ from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement,
 from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.measuring.setups import measured
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
@@ -135,7 +136,17 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
         every = together(measurements)
         whole = _finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)
-    return _allowed_for(found, options.shape_allowance)
+    return _allowed_for(_of_modes_alone(found), options.shape_allowance)
+
+
+def _of_modes_alone(found: Joined) -> Joined:
+    """Without the sidebands of modes."""
+    finding = without_sidebands(found.finding)
+    kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
+    apart = tuple(
+        tuple(mode for mode, keep in zip(modes, kept, strict=True) if keep) for modes in found.apart
+    )
+    return replace(found, finding=finding, apart=apart)
 
 
 def _allowed_for(found: Joined, shape_allowance: float) -> Joined:

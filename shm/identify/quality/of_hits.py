@@ -4,6 +4,7 @@ other, a tip too soft for the band.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -18,6 +19,8 @@ from shm.values import NAN, FloatArray, QualityCheck, Recording
 
 _RUNG_DOWN_DB = -3.0
 """Above it less than a third of a time constant is seen: damping rests on a small difference."""
+_DIES_AWAY_DB = -10.0
+"""Of stationary motion hardly a tenth is above another by so much, if it is of ten values."""
 _LEAST_FORCE_DB = -20.0
 """Usual in impact testing (Ewins 2000, 3.4): a tenth of the force still excites."""
 _LONGEST_PULSE_S = 0.05  # judgement: ten soft pulses; what follows is noise in the spectrum
@@ -27,8 +30,9 @@ _TRANSFORM_S = 1.0
 def hits_used(inspection: Inspection) -> QualityCheck | None:
     """Used hits of the set-up with the fewest, below three a warning.
 
-    A single hit with which its record begins is refused: nothing repeats it and nothing shows the
-    noise it stands in, so that nobody can say which of its vibration is the hanger's.
+    A single hit with which its record begins is refused, as nothing repeats it and nothing shows
+    the noise it stands in; but for one whose vibration dies away, as noise does not, in modes that
+    keep their phase from early to late.
     """
     hits = hits_of(inspection)
     if not hits:
@@ -39,7 +43,7 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     if _unforced(inspection):
         found += "; no force was recorded, so they are known by what they set in motion"
     remedy = "Hit at least three times, better five, with time to ring down."
-    if len(used) == 1 and used[0].start < RINGING_SAMPLES:
+    if len(used) == 1 and used[0].start < RINGING_SAMPLES and not _dies_away(inspection):
         found = "one hit that begins with its record: nothing tells its vibration from noise"
         return QualityCheck(
             "hits", "refused", 1.0, float(LEAST_HITS), "",
@@ -48,6 +52,15 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     if fewest < LEAST_HITS:
         return QualityCheck("hits", "warning", fewest, float(LEAST_HITS), "", found, remedy)
     return QualityCheck("hits", "good", fewest, float(LEAST_HITS), "", found)
+
+
+def _dies_away(inspection: Inspection) -> bool:
+    """Whether ring-downs fall by 10 dB, and most modes are seen to turn steadily as they do."""
+    decays = [decay for m in inspection.measurements for decay in m.decays]
+    modes = inspection.finding.modes if inspection.finding else ()
+    steady = [mode for mode in modes if math.isfinite(mode.amplitude_slope)]
+    falls = max((_level_db(decay) for decay in decays), default=0.0) <= _DIES_AWAY_DB
+    return falls and len(modes) > 0 and 2 * len(steady) >= len(modes)
 
 
 def _unforced(inspection: Inspection) -> bool:
