@@ -55,7 +55,7 @@ _BLOCK_ROWS_AMBIENT = (60, 120)
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
 _REFERENCES = 4  # judgement: two planes, and two modes that are close in each
-_MAX_ORDER = 160  # judgement: two each of 40 modes a plane of a long hanger below 100 Hz
+_MAX_ORDER = 132  # judgement: two each of 33 modes a plane; each order more costs seconds
 _MAX_ORDER_AMBIENT = 120
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
 _LEAST_ORDER = 2  # one mode
