@@ -61,6 +61,9 @@ def test_document(test: ModalTest) -> dict[str, Any]:
     for mode in document["modes"]:
         if not mode["irregular"]:
             mode.pop("irregular")
+        if math.isnan(mode["amplitude_slope"]):
+            mode.pop("amplitude_slope")
+            mode.pop("amplitude_slope_sd")
     return document
 
 

@@ -28,7 +28,11 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Hit:
-    """One hammer hit: where it begins in which record, how hard it was, whether it was used."""
+    """One hammer hit: where it begins in which record, how hard it was, whether it was used.
+
+    `peak_force_n` is NaN where no force was recorded. `reason` is why it was not used; `cut`: why a
+    used one's ring-down is taken from later on than its end.
+    """
 
     record: int
     start: int
@@ -36,6 +40,7 @@ class Hit:
     peak_force_n: float
     used: bool = True
     reason: str = ""
+    cut: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,11 +68,12 @@ class Measurement:
     `decays` holds the ring-down after each used hit, each (points, samples), low-passed to the
     band and sampled at `sampling_rate_hz`; a hit's forced part is not in it. `driven` holds the
     same hits from just before the hammer strikes, each (1 + points, samples), the force first; it
-    is empty where only frequency responses are known, or nobody hit. `spectra` holds those of each
+    is empty where only frequency responses are known, or no force. `spectra` holds those of each
     used hit, windowed, on the lines of `frequency_response`: (hits, 1 + points, lines), the force
-    first. `hammer` is where and in which direction it hit. Ambient records have none of these:
-    their `decays` are parts of the record. Exponential windows of `window_time_constant_s` and
-    `decay_time_constant_s` (inf: none) lie on spectra and frequency responses, and on `decays`.
+    first. `hammer` is where and in which direction it hit. Hits of unknown force have `decays` and
+    `hits` alone. Ambient records have none of these: their `decays` are parts of the record.
+    Exponential windows of `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on
+    spectra and frequency responses, and on `decays`.
     """
 
     source: str
@@ -90,7 +96,7 @@ class FoundMode:
 
     `shape` and `shape_sd` (points,): real, largest absolute value 1. Standard deviations are NaN
     where there are too few hits to know them. `acceleration_m_s2`: see `Mode`; an identifier
-    leaves it out.
+    leaves it out, as it does `amplitude_slope`: see `Mode`.
     """
 
     frequency_hz: float
@@ -100,6 +106,8 @@ class FoundMode:
     shape: FloatArray
     shape_sd: FloatArray
     acceleration_m_s2: float = NAN
+    amplitude_slope: float = NAN
+    amplitude_slope_sd: float = NAN
 
 
 @dataclass(frozen=True, eq=False)

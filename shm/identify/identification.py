@@ -13,8 +13,10 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
+from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.measuring.setups import measured
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
@@ -97,7 +99,7 @@ def identify(
         hits=tuple(hits),
         dropped=_all_dropped(measurements, found.finding),
         poles=found.finding.poles,
-        notes=(*placement.notes, *found.notes, *_few_hits(measurements)),
+        notes=(*placement.notes, *found.notes, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=quality,
         set_aside=placement.set_aside,
@@ -134,7 +136,17 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
         every = together(measurements)
         whole = _finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)
-    return _allowed_for(found, options.shape_allowance)
+    return _allowed_for(_of_modes_alone(found), options.shape_allowance)
+
+
+def _of_modes_alone(found: Joined) -> Joined:
+    """Without the sidebands of modes."""
+    finding = without_sidebands(found.finding)
+    kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
+    apart = tuple(
+        tuple(mode for mode, keep in zip(modes, kept, strict=True) if keep) for modes in found.apart
+    )
+    return replace(found, finding=finding, apart=apart)
 
 
 def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
@@ -147,7 +159,8 @@ def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
 
 
 def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    return coherent_only(without_window(found, measurement), measurement, options)
+    found = coherent_only(without_window(found, measurement), measurement, options)
+    return with_amplitude_dependence(found, measurement)
 
 
 def _test(
@@ -193,9 +206,18 @@ def _few_hits(measurements: Sequence[Measurement]) -> tuple[str, ...]:
     )
 
 
+def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
+    if not any(m.hits and m.frequency_response is None for m in measurements):
+        return ()
+    return (
+        "no force was recorded: hits are known by the motion after them, amplitudes and frequency "
+        "responses are not",
+    )
+
+
 def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     """Median peak force of the used hits over that of the reference level."""
-    forces = [hit.peak_force_n for hit in hits if hit.used]
+    forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
 
 

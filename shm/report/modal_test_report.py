@@ -62,7 +62,7 @@ def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
 
 
 def _force(sheet: ModalTestReport) -> str:
-    forces = [hit.peak_force_n for hit in sheet.used_hits]
+    forces = [hit.peak_force_n for hit in sheet.used_hits if math.isfinite(hit.peak_force_n)]
     if not forces:
         return "no force was recorded"
     return f"peak force {formatting.plain(min(forces))} to {formatting.plain(max(forces))} N"

@@ -27,6 +27,9 @@ class Mode:
     `acceleration_m_s2` is the amplitude with which it rings right after a hit, at the sensor that
     moves most (median over the hits). `irregular`: it is well off the tensioned beam that the
     others follow, as sag raises a first order. Diagnoses take it, no tension is inferred from it.
+    `amplitude_slope` is the change of the frequency, as a fraction, from small amplitude to
+    that of a median hit, negative where a joint slips, with its standard deviation; NaN where the
+    ring-downs do not say.
     """
 
     plane: Plane
@@ -38,6 +41,8 @@ class Mode:
     shape: tuple[ShapePoint, ...] = ()
     acceleration_m_s2: float = NAN
     irregular: bool = False
+    amplitude_slope: float = NAN
+    amplitude_slope_sd: float = NAN
 
 
 @dataclass(frozen=True)

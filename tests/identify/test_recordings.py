@@ -151,3 +151,40 @@ def test_rates_read_off_rounded_times_are_one_rate() -> None:
     rounded = replace(RECORD, sampling_rate_hz=RECORD.sampling_rate_hz * (1 + 1e-7))
     (measurement,) = measured([RECORD, rounded], OPTIONS)
     assert len(measurement.decays) == 2 * len(measured([RECORD], OPTIONS)[0].decays)
+
+
+def test_a_ring_down_is_used_from_where_it_is_no_longer_clipped() -> None:
+    """A clipped signal still says how a mode decays, later."""
+    limit = 0.15 * float(np.abs(RECORD.channels[1].values).max())  # of a ring-down's 0.21 or more
+    clipped = [
+        replace(c, values=np.clip(c.values, -limit, limit), full_scale=limit)
+        if c.name == "acc_1"
+        else c
+        for c in RECORD.channels
+    ]
+    record = _channels(RECORD, *clipped)
+    measurement = measurement_of_recordings([record], OPTIONS)
+    assert all(hit.used for hit in measurement.hits)
+    assert {hit.cut for hit in measurement.hits} == {"clipped acceleration: acc_1"}
+    found, sound = (identify([each], OPTIONS, test_id="t").test for each in (record, RECORD))
+    assert len(found.modes) == len(sound.modes)
+    for mode, true in zip(found.modes, sound.modes, strict=True):
+        assert mode.damping_ratio == pytest.approx(true.damping_ratio, rel=0.05)
+
+
+def test_double_hits_are_used_where_fewer_than_three_others_are_left() -> None:
+    force = RECORD.channels[0].values.copy()
+    for hit in (1, 2, 3):
+        begin = hit * SLOT + 307 + 60
+        force[begin : begin + 4] += half_sine(1024.0, 600.0)
+    record = _channels(RECORD, replace(RECORD.channels[0], values=force), *RECORD.channels[1:])
+    measurement = measurement_of_recordings([record], OPTIONS)
+    assert [hit.cut for hit in measurement.hits] == [
+        "",
+        "double hit",
+        "double hit",
+        "double hit",
+        "",
+    ]
+    assert all(hit.used for hit in measurement.hits)
+    assert measurement.decays[1].shape[1] < measurement.decays[0].shape[1]

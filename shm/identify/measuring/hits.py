@@ -36,7 +36,8 @@ class Pulse:
     """One hit in samples: force above the noise from `start` up to `end`, quiet up to `stop`.
 
     `stop` is shortly before the next hit begins, or where the record ends. `second_peak` is the
-    largest share of the peak force that strikes again before `stop`; 0 where none does.
+    largest share of the peak force that strikes again before `stop`, and `second_end` the first
+    sample after that; both 0 where none does.
     """
 
     start: int
@@ -45,15 +46,31 @@ class Pulse:
     stop: int
     peak_force_n: float
     second_peak: float = 0.0
+    second_end: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class HitRecord:
-    """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples)."""
+    """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples).
+
+    `clipped_end` is the first sample from which no acceleration is clipped any more, 0 where none
+    is in the ring-down.
+    """
 
     force: FloatArray
     accelerations: FloatArray
     pulse: Pulse
+    clipped_end: int = 0
+
+    @property
+    def free(self) -> int:
+        """The first sample at which the hanger rings freely and is recorded as it rings."""
+        return max(self.struck, self.clipped_end)
+
+    @property
+    def struck(self) -> int:
+        """The first sample at which nothing strikes any more."""
+        return max(self.pulse.end, self.pulse.second_end)
 
 
 def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
@@ -132,8 +149,8 @@ def _pulse(
     falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
     end = first + int(falls[0]) if len(falls) else stop
     hardest = max(_between_samples(push, peak) for peak in peaks)
-    second = _second_peak(push[first:stop], end - first, noise, rate)
-    return Pulse(start, first, end, stop, hardest, second)
+    second, over = _second_peak(push[first:stop], end - first, noise, rate)
+    return Pulse(start, first, end, stop, hardest, second, first + over if second else 0)
 
 
 def _between_samples(push: FloatArray, peak: int) -> float:
@@ -150,8 +167,12 @@ def _same_pulse(sampling_rate_hz: float) -> int:
     return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
 
 
-def _second_peak(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> float:
-    """Share of the first peak's force (`after[0]`) that strikes again; 0 where nothing does.
+def _second_peak(
+    after: FloatArray, fall: int, noise: float, sampling_rate_hz: float
+) -> tuple[float, int]:
+    """Share of the first peak's force (`after[0]`) that strikes again, and the sample after that.
+
+    Both 0 where nothing does.
 
     Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse is
     long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more near the pulse,
@@ -162,4 +183,6 @@ def _second_peak(after: FloatArray, fall: int, noise: float, sampling_rate_hz: f
     ringing = RINGING / np.arange(skip, len(after))
     limit = np.maximum(after[0] * np.maximum(DOUBLE_SHARE, ringing), DOUBLE_SIGMAS * noise)
     struck = later > limit
-    return float(np.max(later[struck], initial=0.0) / after[0])
+    if not np.any(struck):
+        return 0.0, 0
+    return float(np.max(later[struck]) / after[0]), skip + int(np.flatnonzero(struck)[-1]) + 1

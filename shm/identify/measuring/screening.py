@@ -1,8 +1,10 @@
 """Which hits and channels of a set-up can be used: nothing bad gets through to an identifier.
 
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
-force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. A hit
-that disagrees with the others fell at a wrong place or direction, or somebody held the hanger.
+force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
+an acceleration that is clipped at first: the ring-down begins later. A double hit's begins after
+the second blow, and is used where there are fewer than three others. A hit that disagrees with the
+others fell at a wrong place or direction, or somebody held the hanger.
 """
 
 from __future__ import annotations
@@ -21,19 +23,24 @@ from shm.identify.measuring.hits import (
     PULSE_SECONDS,
     RINGING_SAMPLES,
     HitRecord,
+    Pulse,
     find_pulses,
 )
 from shm.identify.measuring.signal_faults import (
+    CLIPPED,
     CUT_OFF,
     DOUBLE_HIT,
     NOT_A_NUMBER,
     OUTLIER,
+    clipped_ends,
     faults_of_channels,
 )
+from shm.identify.measuring.unforced_hits import find_unforced
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
+LEAST_HITS = 3  # that say how well they repeat
 FEWEST_TO_COMPARE = 3
 """Of two that differ nobody can say which is right."""
 # identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
@@ -59,35 +66,68 @@ class Screening:
 
 def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
     """What can be used of records of one set-up; raises NotIdentifiable where nothing can."""
-    hits, ring_downs = _hits(records)
+    hits, ring_downs = _hits(records, options)
     channels, rate = records[0].accelerations, records[0].sampling_rate_hz
+    ends = clipped_ends(channels, ring_downs)
+    ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
-    reasons = _with_outliers(ring_downs, reasons, rate, options)
+    if records[0].force is not None:
+        reasons = _with_outliers(ring_downs, reasons, rate, options)
+    reasons = _with_double_hits(reasons, faults, rows)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
         raise _nothing_left(records, reasons, dropped)
     judged = [
-        replace(hit, used=not reason, reason=reason)
-        for hit, reason in zip(hits, reasons, strict=True)
+        replace(hit, used=not reason, reason=reason, cut="" if reason else _cut(ring_down, names))
+        for hit, reason, ring_down, (_, names) in zip(hits, reasons, ring_downs, ends, strict=True)
     ]
     return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
 
 
-def _hits(records: Sequence[Recording]) -> tuple[list[Hit], list[HitRecord]]:
+def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
+    """The hits of a record: by its force where that is recorded, else by the motion after them."""
+    rate = record.sampling_rate_hz
+    if record.force is not None:
+        return find_pulses(record.force.values, rate)
+    accelerations = np.array([channel.values for channel in record.accelerations])
+    return find_unforced(accelerations, rate, options.band_high_hz)
+
+
+def _hits(
+    records: Sequence[Recording], options: IdentifyOptions
+) -> tuple[list[Hit], list[HitRecord]]:
     """Each hit of each record, as a row of the result and with its signals."""
     hits, ring_downs = [], []
     for index, record in enumerate(records):
-        force = record.force
-        assert force is not None
         accelerations = np.array([channel.values for channel in record.accelerations])
-        for pulse in find_pulses(force.values, record.sampling_rate_hz):
+        force = np.zeros(record.samples) if record.force is None else record.force.values
+        for pulse in pulses_of(record, options):
             start_s = pulse.start / record.sampling_rate_hz
             hits.append(Hit(index, pulse.start, start_s, pulse.peak_force_n))
-            ring_downs.append(HitRecord(force.values, accelerations, pulse))
+            ring_downs.append(HitRecord(force, accelerations, pulse))
     return hits, ring_downs
+
+
+def _with_double_hits(
+    reasons: Sequence[str], faults: Sequence[Sequence[str]], rows: Sequence[int]
+) -> list[str]:
+    """The reasons without that of double hits, where fewer than three others can be used."""
+    if sum(not reason for reason in reasons) >= LEAST_HITS:
+        return list(reasons)
+    return [
+        next((each[row] for row in rows if each[row]), "") if reason == DOUBLE_HIT else reason
+        for reason, each in zip(reasons, faults, strict=True)
+    ]
+
+
+def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
+    """Why a used ring-down begins later than its first pulse ends."""
+    if ring_down.clipped_end:
+        return f"{CLIPPED}: {', '.join(clipped_channels)}"
+    return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ""
 
 
 def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
@@ -141,7 +181,7 @@ def _reasons(
     options: IdentifyOptions,
 ) -> list[str]:
     """Why each hit cannot be used; empty where it can."""
-    longest = max((r.pulse.stop - r.pulse.end for r in ring_downs), default=0)
+    longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
     least = max(
         least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
     )
@@ -154,10 +194,10 @@ def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float
         return NOT_A_NUMBER
     if NOT_A_NUMBER in faults:
         return NOT_A_NUMBER
+    if pulse.stop - ring_down.free < least_samples:
+        return CUT_OFF
     if pulse.second_peak > 0:
         return DOUBLE_HIT
-    if pulse.stop - pulse.end < least_samples:
-        return CUT_OFF
     return next((fault for fault in faults if fault), "")
 
 
@@ -209,15 +249,15 @@ def disagreement(
     Of hits j and k over all channels and lines: 1 - |h_j . h_k|^2 / (|h_j|^2 |h_k|^2) (the modal
     assurance criterion, Allemang 1982, of two responses), which a hammer's level and calibration
     do not move; for each hit the lower median over the others. NaN where there are none, for a hit
-    whose pulse the record's beginning may cut off, and for one so soon after another that nobody
-    can say what of its ring-down is its own.
+    whose pulse the record's beginning may cut off, that struck twice or was clipped, and for one so
+    soon after another that nobody can say what of its ring-down is its own.
     """
     apart = np.full(len(hits), np.nan)
     step = _step(hits, sampling_rate_hz, band_hz)
     known = [
         index
         for index, hit in enumerate(hits)
-        if hit.pulse.start > 0 and not _comes_too_soon(hit, step)
+        if hit.pulse.start > 0 and hit.free == hit.pulse.end and not _comes_too_soon(hit, step)
     ]
     if len(known) < 2:
         return apart

@@ -28,10 +28,11 @@ from shm.identify.measuring.frf import (
 )
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.responses import measurement_of_responses, point_of
-from shm.identify.measuring.screening import Screening, screened
+from shm.identify.measuring.screening import Screening, pulses_of, screened
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording
 
+_MOST_SECONDS_A_HIT = 90.0  # judgement: crews wait half a minute at most
 _SAME_RATE = 1e-5
 """Rates read off columns of rounded times differ by less, and no frequency feels it."""
 
@@ -74,11 +75,16 @@ def measured_recordings(
         _refuse_incomplete(record, hammered, options)
         _refuse_other_rate(records[0], record)
     set_ups = _grouped(records)
-    if not hammered:
+    if not hammered and not all(_struck(record, options) for record in records):
         return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
     if len(set_ups) == 1:
         return (measurement_of_recordings(records, options),)
     return _measured_apart(set_ups, options)
+
+
+def _struck(record: Recording, options: IdentifyOptions) -> bool:
+    """Whether somebody struck in it, not just a lorry the joint, once in many minutes."""
+    return record.duration_s <= _MOST_SECONDS_A_HIT * len(pulses_of(record, options))
 
 
 def _measured_apart(set_ups: Sequence[_SetUp], options: IdentifyOptions) -> tuple[Measurement, ...]:
@@ -201,7 +207,7 @@ def cut(hit: HitRecord, sampling_rate_hz: float, band_high_hz: float) -> Cut:
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
     lead = int(LEAD_SECONDS * sampling_rate_hz) + reach
     begin = hit.pulse.start - lead - reach
-    free = hit.pulse.end + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
+    free = hit.free + min(RINGING_SAMPLES, int(0.002 * sampling_rate_hz) + 1)
     signals = _centred(hit, begin, free)
     driven, rate = band_limited(signals, sampling_rate_hz, band_high_hz)
     first_free = -((begin - free) // factor)
@@ -240,6 +246,16 @@ def screened_measurement(
     """The measurement in records of one set-up, of which `found` says what can be used."""
     rate = records[0].sampling_rate_hz
     cuts = [cut(hit, rate, options.band_high_hz) for hit in found.used]
+    if records[0].force is None:
+        return Measurement(
+            source=records[0].source,
+            points=tuple(point_of(records[0].accelerations[row]) for row in found.rows),
+            decays=tuple(each.decay for each in cuts),
+            sampling_rate_hz=cuts[0].sampling_rate_hz,
+            frequency_response=None,
+            hits=found.hits,
+            dropped=found.dropped,
+        )
     response, spectra = _response(records[0], found, window, options)
     force = records[0].force
     return Measurement(

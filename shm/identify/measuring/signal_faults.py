@@ -45,6 +45,7 @@ _OFFSET_SECONDS = 0.5
 _OFFSET_MOVES = 2.0
 _SILENT_SHARE = 1e-3
 _COPY_SAMPLES = 256  # noise in the last bit alone makes as many alike once in 2^256
+_MOST_CLIPPED = 0.5  # judgement: with less than half of it left, a ring-down says little
 LEAST_REPEATS = 3  # judgement: a crest may hold two equal samples
 FULL_SCALE_SHARE = 0.999
 """A converter's largest code lies below its full scale: by 1/2048 of it for 12 bits."""
@@ -77,14 +78,14 @@ def faults_of_channels(
     """What is wrong with each channel after each hit, [hit][channel]; empty where nothing is."""
     if not ring_downs:
         return []
-    cuts = [r.accelerations[:, r.pulse.start : r.pulse.stop] for r in ring_downs]
+    cuts = [r.accelerations[:, r.clipped_end or r.pulse.start : r.pulse.stop] for r in ring_downs]
     faults = [_plain_faults(cut) for cut in cuts]
-    rings = [r.accelerations[:, r.pulse.end : r.pulse.stop] for r in ring_downs]
+    rings = [r.accelerations[:, r.free : r.pulse.stop] for r in ring_downs]
     _add(faults, _copies(cuts, faults))
     _add(faults, _clipped(channels, rings, faults))
     free = [
         thinned(
-            r.accelerations[:, r.pulse.end + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES],
+            r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES],
             sampling_rate_hz,
             RATE_OVER_BAND * options.band_high_hz,
         )
@@ -94,8 +95,7 @@ def faults_of_channels(
         1, int(sampling_rate_hz / (RATE_OVER_BAND * options.band_high_hz))
     )
     _add(faults, _wanders(free, faults, rate))
-    single = [r.pulse.second_peak == 0 for r in ring_downs]
-    _add(faults, _surprises(free, faults, single))
+    _add(faults, _surprises(free, faults))
     return faults
 
 
@@ -165,15 +165,12 @@ def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Fault
     return faults
 
 
-def _surprises(free: Sequence[FloatArray], known: Faults, single: Sequence[bool]) -> Faults:
-    """Jumps, bursts and loose contacts; where more than half the channels have them, a knock.
-
-    The second strike of a double hit is a knock that is known already.
-    """
+def _surprises(free: Sequence[FloatArray], known: Faults) -> Faults:
+    """Jumps, bursts and loose contacts; where more than half the channels have them, a knock."""
     channels = len(free[0])
     found = np.zeros((len(free), channels))
     for row in range(channels):
-        sound = [hit for hit in range(len(free)) if single[hit] and not known[hit][row]]
+        sound = [hit for hit in range(len(free)) if not known[hit][row]]
         if sound:
             found[sound, row] = surprise([free[hit][row] for hit in sound])
     wild = found > _SURPRISE
@@ -194,6 +191,36 @@ def clipped(parts: Sequence[FloatArray], full_scale: float) -> BoolArray:
         tops = [np.max(np.abs(part), initial=0.0) for part in parts]
         return np.array([top >= FULL_SCALE_SHARE * full_scale for top in tops], dtype=bool)
     return np.asarray(_flat_topped(parts) | _flat_topped([-part for part in parts]))
+
+
+def clipped_ends(
+    channels: Sequence[Channel], ring_downs: Sequence[HitRecord]
+) -> list[tuple[int, tuple[str, ...]]]:
+    """Of each hit, from which sample on no channel is clipped any more, and which channels were.
+
+    A clipped signal is not the hanger's motion; what follows is. 0 where nothing is clipped. A
+    channel that is clipped beyond half of a ring-down is no matter of where to begin.
+    """
+    rings = [r.accelerations[:, r.pulse.end : r.pulse.stop] for r in ring_downs]
+    ends = [0] * len(rings)
+    names: list[list[str]] = [[] for _ in rings]
+    for row, channel in enumerate(channels):
+        parts = [ring[row] for ring in rings]
+        for hit, is_clipped in enumerate(clipped(parts, channel.full_scale)):
+            last = _last_clipped(parts[hit], channel.full_scale) if is_clipped else 0
+            if 0 < last <= _MOST_CLIPPED * len(parts[hit]):
+                ends[hit] = max(ends[hit], ring_downs[hit].pulse.end + last)
+                names[hit].append(channel.name)
+    return [(end, tuple(each)) for end, each in zip(ends, names, strict=True)]
+
+
+def _last_clipped(part: FloatArray, full_scale: float) -> int:
+    """The first sample after those at the limits of what is recorded."""
+    if np.isfinite(full_scale):
+        at_limit = np.abs(part) >= FULL_SCALE_SHARE * full_scale
+    else:
+        at_limit = (part == np.nanmax(part)) | (part == np.nanmin(part))
+    return int(np.flatnonzero(at_limit)[-1]) + 1
 
 
 def _flat_topped(parts: Sequence[FloatArray]) -> BoolArray:

@@ -148,6 +148,8 @@ def _mode(candidate: _Candidate, order: int, irregular: bool, pairs: Sequence[Fo
         shape=candidate.shape,
         acceleration_m_s2=found.acceleration_m_s2,
         irregular=irregular,
+        amplitude_slope=found.amplitude_slope,
+        amplitude_slope_sd=found.amplitude_slope_sd,
     )
 
 

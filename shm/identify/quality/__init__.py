@@ -25,6 +25,7 @@ CHECKS: tuple[Check, ...] = (
     of_hits.ring_down,
     of_hits.force_spectrum,
     of_modes.coherence,
+    of_modes.amplitude_dependence,
     of_signals.noise,
     steady_tones,
     of_hits.repeatability,

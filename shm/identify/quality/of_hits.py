@@ -4,6 +4,7 @@ other, a tip too soft for the band.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -18,6 +19,8 @@ from shm.values import NAN, FloatArray, QualityCheck, Recording
 
 _RUNG_DOWN_DB = -3.0
 """Above it less than a third of a time constant is seen: damping rests on a small difference."""
+_DIES_AWAY_DB = -10.0
+"""Of stationary motion hardly a tenth is above another by so much, if it is of ten values."""
 _LEAST_FORCE_DB = -20.0
 """Usual in impact testing (Ewins 2000, 3.4): a tenth of the force still excites."""
 _LONGEST_PULSE_S = 0.05  # judgement: ten soft pulses; what follows is noise in the spectrum
@@ -27,8 +30,9 @@ _TRANSFORM_S = 1.0
 def hits_used(inspection: Inspection) -> QualityCheck | None:
     """Used hits of the set-up with the fewest, below three a warning.
 
-    A single hit with which its record begins is refused: nothing repeats it and nothing shows the
-    noise it stands in, so that nobody can say which of its vibration is the hanger's.
+    A single hit with which its record begins is refused, as nothing repeats it and nothing shows
+    the noise it stands in; but for one whose vibration dies away, as noise does not, in modes that
+    keep their phase from early to late.
     """
     hits = hits_of(inspection)
     if not hits:
@@ -36,8 +40,10 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     used = [hit for hit in hits if hit.used]
     fewest = min(sum(h.used for h in m.hits) for m in inspection.measurements)
     found = f"{len(used)} of {len(hits)} hits are used{_reasons([h.reason for h in hits])}"
+    if _unforced(inspection):
+        found += "; no force was recorded, so they are known by what they set in motion"
     remedy = "Hit at least three times, better five, with time to ring down."
-    if len(used) == 1 and used[0].start < RINGING_SAMPLES:
+    if len(used) == 1 and used[0].start < RINGING_SAMPLES and not _dies_away(inspection):
         found = "one hit that begins with its record: nothing tells its vibration from noise"
         return QualityCheck(
             "hits", "refused", 1.0, float(LEAST_HITS), "",
@@ -48,6 +54,20 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     return QualityCheck("hits", "good", fewest, float(LEAST_HITS), "", found)
 
 
+def _dies_away(inspection: Inspection) -> bool:
+    """Whether ring-downs fall by 10 dB, and most modes are seen to turn steadily as they do."""
+    decays = [decay for m in inspection.measurements for decay in m.decays]
+    modes = inspection.finding.modes if inspection.finding else ()
+    steady = [mode for mode in modes if math.isfinite(mode.amplitude_slope)]
+    falls = max((_level_db(decay) for decay in decays), default=0.0) <= _DIES_AWAY_DB
+    return falls and len(modes) > 0 and 2 * len(steady) >= len(modes)
+
+
+def _unforced(inspection: Inspection) -> bool:
+    """Whether the hits are known from the accelerations alone."""
+    return any(record.force is None for record in inspection.records)
+
+
 def _reasons(reasons: list[str]) -> str:
     counts = Counter(reason for reason in reasons if reason)
     told = "; ".join(f"{count} {reason}" for reason, count in counts.items())
@@ -55,14 +75,20 @@ def _reasons(reasons: list[str]) -> str:
 
 
 def double_hits(inspection: Inspection) -> QualityCheck | None:
-    """How many hits were left out because a second blow fell into their ring-down."""
-    return fault_count(
-        inspection,
-        "double hits",
-        (DOUBLE_HIT,),
-        "each hit is a single blow",
-        "Hit from the wrist and let the hammer spring back at once; repeat these hits.",
+    """How many hits have a second blow in their ring-down.
+
+    They are left out, or used from after it where there are fewer than three others.
+    """
+    remedy = "Hit from the wrist and let the hammer spring back at once; repeat these hits."
+    figure = fault_count(
+        inspection, "double hits", (DOUBLE_HIT,), "each hit is a single blow", remedy
     )
+    late = [hit for hit in hits_of(inspection) if hit.cut == DOUBLE_HIT]
+    if figure is None or not late:
+        return figure
+    told = f"used from after the second blow: {places(inspection, late)}"
+    found = f"{figure.found}; {told}" if figure.value else told
+    return QualityCheck("double hits", "warning", figure.value + len(late), 0.0, "", found, remedy)
 
 
 def pre_trigger(inspection: Inspection) -> QualityCheck | None:
@@ -72,7 +98,7 @@ def pre_trigger(inspection: Inspection) -> QualityCheck | None:
     filter may announce it. The ring-down is as good without.
     """
     hits = hits_of(inspection)
-    if not hits:
+    if not hits or _unforced(inspection):
         return None
     limit = max(
         PULSE_SECONDS + RINGING_SAMPLES / record.sampling_rate_hz for record in inspection.records
@@ -120,7 +146,7 @@ def _level_db(decay: FloatArray) -> float:
 
 def repeatability(inspection: Inspection) -> QualityCheck | None:
     """How far apart the used hits' responses are (0 alike, 1 unlike), worst set-up."""
-    if not hits_of(inspection):
+    if not hits_of(inspection) or _unforced(inspection):
         return None
     dropped = hits_for(inspection, (OUTLIER, KNOCK))
     values = [_apart(m, inspection) for m in inspection.measurements]
@@ -171,7 +197,7 @@ def _hit_records(
 def force_spectrum(inspection: Inspection) -> QualityCheck | None:
     """Force at the band's upper end over its largest in the band, in dB, median over the hits."""
     used = [hit for hit in hits_of(inspection) if hit.used]
-    if not used:
+    if not used or _unforced(inspection):
         return None
     high = inspection.options.band_high_hz
     curves = [_spectrum_db(inspection, hit) for hit in used]

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from shm.identify.contract import Measurement
+from shm.identify.estimation.amplitude_dependence import is_sure
 from shm.identify.quality.inspection import Inspection, listed
 from shm.values import NAN, BoolArray, FloatArray, QualityCheck, Verdict
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
+_SLOPE = 1e-4
+"""What differs between tests unseen (`frequency_allowance`): less does not matter."""
 _WARNING = 0.8
 _LINES_AROUND = 2  # judgement: within the half-power width of most modes
 _STRONGEST = 0.05  # judgement: a twentieth of the lines holds the peaks of a dozen modes
@@ -83,6 +88,28 @@ def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:
     spacing = float(frequency_hz[1] - frequency_hz[0])
     distance = np.abs(frequency_hz[:, None] - modes_hz)
     return np.asarray(np.any(distance <= (_LINES_AROUND + 0.5) * spacing, axis=1))
+
+
+def amplitude_dependence(inspection: Inspection) -> QualityCheck | None:
+    """Largest sure change of a frequency with amplitude, as a fraction, at that of a hit."""
+    found = inspection.finding.modes if inspection.finding else ()
+    known = [mode for mode in found if math.isfinite(mode.amplitude_slope)]
+    if not known:
+        return None
+    sure = [mode for mode in known if is_sure(mode.amplitude_slope, mode.amplitude_slope_sd)]
+    worst = max(sure, key=lambda mode: abs(mode.amplitude_slope), default=None)
+    if worst is None or abs(worst.amplitude_slope) < _SLOPE:
+        value = abs(worst.amplitude_slope) if worst else 0.0
+        told = "frequencies do not depend on amplitude"
+        return QualityCheck("amplitude", "good", value, _SLOPE, "", told)
+    side = "lower" if worst.amplitude_slope < 0 else "higher"
+    return QualityCheck(
+        "amplitude", "warning", abs(worst.amplitude_slope), _SLOPE, "",
+        f"{len(sure)} frequencies change with amplitude; right after a hit that of "
+        f"{worst.frequency_hz:.2f} Hz is {side} by {abs(worst.amplitude_slope):.2%}: "
+        "those of small amplitude are given",
+        "Hit equally hard in every test; look for a joint that slips.",
+    )  # fmt: skip
 
 
 def agreement(inspection: Inspection) -> QualityCheck | None:

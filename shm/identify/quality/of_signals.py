@@ -49,23 +49,33 @@ _LEAST_STRETCH_S = 0.1
 def clipping(inspection: Inspection) -> QualityCheck | None:
     """How many hits have a clipped signal.
 
-    A clipped ring-down is left out. A clipped pulse is used: frequencies and damping come from
-    after it; the frequency responses are off by what was cut.
+    A ring-down that is clipped at first is used from where it is not. A clipped pulse is used:
+    frequencies and damping come from after it; the frequency responses are off by what was cut.
     """
     if not hits_of(inspection):
         return None
     dropped = hits_for(inspection, (CLIPPED,))
     channels = channels_for(inspection, (CLIPPED,))
+    late = [hit for hit in hits_of(inspection) if hit.cut.startswith(CLIPPED)]
+    clipped_channels = sorted({hit.cut.removeprefix(f"{CLIPPED}: ") for hit in late})
     pulses = _clipped_pulses(inspection)
     told = [
         *([f"left out: {listed([places(inspection, dropped)])}"] if dropped else []),
         *([f"left out: {listed(channels)}"] if channels else []),
+        *(
+            [
+                f"{' and '.join(clipped_channels)} clipped: {places(inspection, late)} used from "
+                "after that, frequency responses are not right"
+            ]
+            if late
+            else []
+        ),
         *(f"{name} is clipped in the pulse of {places(inspection, h)}" for name, h in pulses),
     ]
     if not told:
         return QualityCheck("clipping", "good", 0.0, 0.0, "", "no signal is clipped")
     struck = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
-    struck |= {(hit.record, hit.start) for hit in dropped}
+    struck |= {(hit.record, hit.start) for hit in (*dropped, *late)}
     return QualityCheck(
         "clipping", "warning", float(max(len(struck), len(channels))), 0.0, "", "; ".join(told),
         "Set larger ranges of hammer and sensors in the logger, or hit more softly.",
@@ -76,7 +86,7 @@ def _clipped_pulses(inspection: Inspection) -> list[tuple[str, list[Hit]]]:
     """Channels by name with the hits in whose pulses they are clipped."""
     found: dict[str, list[Hit]] = {}
     for measurement in inspection.measurements:
-        hits = [hit for hit in measurement.hits if not hit.reason]
+        hits = [hit for hit in measurement.hits if hit.used and not hit.cut]
         if not hits:
             continue
         first = inspection.records[hits[0].record]

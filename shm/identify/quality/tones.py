@@ -275,7 +275,7 @@ def stretches(
     later = tuple(
         _stretch(signals, a, b)
         if hit is None
-        else replace(_stretch(signals, a, b), hit=hit.start / factor, force_n=abs(hit.peak_force_n))
+        else replace(_stretch(signals, a, b), hit=hit.start / factor, force_n=_size(hit))
         for (a, b), hit in zip(spans, struck, strict=True)
         if b - a >= LEAST_SAMPLES
     )
@@ -283,6 +283,11 @@ def stretches(
     known = quiet >= _LEAST_BEFORE_S * rate
     before = _stretch(signals, 0, quiet) if known else None
     return Stretches(later, before, rate, signals.shape[1])
+
+
+def _size(hit: Hit) -> float:
+    """How hard it was; 1 where nobody measured that."""
+    return abs(hit.peak_force_n) if math.isfinite(hit.peak_force_n) else 1.0
 
 
 def _smoothed(values: FloatArray, samples: int) -> FloatArray:

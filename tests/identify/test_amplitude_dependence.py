@@ -1,0 +1,65 @@
+"""A frequency that depends on amplitude is given for small amplitude, with its slope.
+
+The phase of a mode whose frequency is f (1 + c A / A_hit), A falling as exp(-s t), is
+2 pi f (t + c (1 - exp(-s t)) / s).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shm.identify import Identification, IdentifyOptions, identify
+from shm.values import Channel, Recording
+
+RATE_HZ, SLOT_S, HITS = 512.0, 6.0, 4
+FREQUENCIES_HZ, DAMPING_RATIO = (9.0, 21.0, 34.0), 0.003
+SHAPES = ((1.0, 0.7), (0.8, -0.6), (0.5, 1.0))
+
+
+def _recording(slope: float) -> Recording:
+    rng = np.random.default_rng(5)
+    slot, before = int(SLOT_S * RATE_HZ), int(0.4 * RATE_HZ)
+    motion = 1e-3 * rng.standard_normal((2, before + HITS * slot))
+    force = 0.1 * rng.standard_normal(before + HITS * slot)
+    for hit in range(HITS):
+        begin = hit * slot + before
+        strength = 1.0 + 0.1 * (hit - 1.5)
+        force[begin : begin + 4] += 1000 * strength * np.array([0.4, 1.0, 1.0, 0.4])
+        t = np.arange(slot) / RATE_HZ
+        for frequency_hz, shape in zip(FREQUENCIES_HZ, SHAPES, strict=True):
+            decay = 2 * np.pi * frequency_hz * DAMPING_RATIO
+            late = t + slope * strength * -np.expm1(-decay * t) / decay
+            ring = strength * np.exp(-decay * t) * np.sin(2 * np.pi * frequency_hz * late)
+            motion[:, begin : begin + slot] += np.outer(shape, ring)
+    channels = [Channel("force", "force", force, None, 1.0)] + [
+        Channel(f"acc_{row}", "acceleration", values, "transverse", 1.0 + row)
+        for row, values in enumerate(motion)
+    ]
+    return Recording("made.csv", tuple(channels), RATE_HZ)
+
+
+def _identified(slope: float) -> Identification:
+    return identify([_recording(slope)], IdentifyOptions(2.0, 50.0), test_id="t")
+
+
+@pytest.mark.parametrize("slope", [-1e-3, -2e-4, 5e-4])
+def test_the_slope_is_told_and_the_frequency_is_that_of_small_amplitude(slope: float) -> None:
+    found = _identified(slope)
+    assert len(found.test.modes) == len(FREQUENCIES_HZ)
+    for mode, frequency_hz in zip(found.test.modes, FREQUENCIES_HZ, strict=True):
+        assert mode.amplitude_slope == pytest.approx(slope, rel=0.3)
+        assert abs(mode.amplitude_slope - slope) < 4 * mode.amplitude_slope_sd
+        assert abs(mode.frequency_hz / frequency_hz - 1) < 0.1 * abs(slope)
+        assert abs(mode.frequency_hz - frequency_hz) < 3 * mode.frequency_sd_hz
+    (check,) = [check for check in found.quality if check.name == "amplitude"]
+    assert check.verdict == "warning"
+    assert ("lower" if slope < 0 else "higher") in check.found
+
+
+def test_a_linear_hanger_has_no_slope_and_no_warning() -> None:
+    found = _identified(0.0)
+    for mode in found.test.modes:
+        assert abs(mode.amplitude_slope) < 1e-5
+    (check,) = [check for check in found.quality if check.name == "amplitude"]
+    assert check.verdict == "good"
