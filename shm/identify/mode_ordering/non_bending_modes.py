@@ -86,6 +86,27 @@ def explained(
     return ForeignMode("deck", frequency_hz, damping, _fits_nothing(mode, hanger_modes))
 
 
+def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
+    """A mode of the plane that no sensor measures, of that order."""
+    reason = (
+        f"It is order {order} of the other plane, which the sensors hear askew, or a neighbour's "
+        "motion near it."
+    )
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+
+
+def unsure_mode(mode: FoundMode, order: int) -> ForeignMode:
+    """A mode that may be of that order, or of another."""
+    reason = f"Its order may be {order}, another fits nearly as well: it is not guessed."
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+
+
+def unnumbered_mode(mode: FoundMode) -> ForeignMode:
+    """A mode where none has an order."""
+    reason = "The modes fit neither the hanger's description nor any tensioned bar."
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+
+
 def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode] | None:
     """The stronger mode of like shape of which this is a multiple, and which."""
     found = [
