@@ -39,17 +39,20 @@ _NEAR = 0.03  # judgement: words alone depend on it
 
 
 def without_tones(
-    found: Sequence[FoundMode], tones: Sequence[Tone]
+    found: Sequence[FoundMode], tones: Sequence[Tone], *, unordered: bool = False
 ) -> tuple[list[FoundMode], list[ForeignMode]]:
     """The modes that are none of the `tones`, and those that are.
 
-    A mode is a tone where it lies at one and hardly decays beside the other modes.
+    A mode is a tone where it lies at one and hardly decays beside the other modes; where no order
+    could tell that it is one (`unordered`), its place is enough.
     """
     rest, aside = [], []
     for mode in found:
         tone = next((tone for tone in tones if _lies_at(mode, tone)), None)
-        if tone and _is_steady(mode, found):
-            reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}) and hardly decays."
+        steady = _is_steady(mode, found)
+        if tone and (steady or unordered):
+            decay = " and hardly decays" if steady else ""
+            reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}){decay}."
             aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
         else:
             rest.append(mode)

@@ -86,9 +86,9 @@ def placed(
     tones: Sequence[Tone] = (),
 ) -> Placement:
     """The modes with plane, order and shape by position; `tones` are known to be there anyway."""
-    found, steady = without_tones(found, tones)
     if hanger is not None and not hanger.is_modelled:
-        return _listed(found, points, steady)
+        return _listed(*without_tones(found, tones, unordered=True), points)
+    found, steady = without_tones(found, tones)
     turned_rad = principal_angle(found, points)
     known = hanger if hanger and hanger.as_hanger else None
     numbered = _numbered(found, points, known, turned_rad)
@@ -315,7 +315,7 @@ def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, s
 
 
 def _listed(
-    found: Sequence[FoundMode], points: Sequence[ResponsePoint], steady: Sequence[ForeignMode]
+    found: Sequence[FoundMode], steady: Sequence[ForeignMode], points: Sequence[ResponsePoint]
 ) -> Placement:
     """The modes of a structure that no model describes, counted by frequency.
 
