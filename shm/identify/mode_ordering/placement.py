@@ -77,6 +77,9 @@ _Ordered: TypeAlias = tuple[_Candidate, int, bool]
 LEAST_MARGIN = 6.0
 """Of costs, by which another order is 20 times less likely: in 112 tests of
 tests/worlds/recordings.py all of the wrong orders were below, and 4 of 107 right ones."""
+_LONG_SERIES, _LEAST_OF_LONG = 10, 1.0
+"""Of so many modes all must fit a wrong order: below LEAST_MARGIN such series were right, and are
+kept with a warning; those of six and fewer were wrong in every second test."""
 
 
 def placed(
@@ -193,8 +196,9 @@ def _sure(
     """Without the orders that may be others, where a description should have told them."""
     if described and numbering.basis == "counting":
         return _Numbered([], numbering, 0.0)
-    kept = [each for each in every if not described or each[-1] >= LEAST_MARGIN]
-    unsure = {id(c.found): n for c, n, _, margin in every if described and margin < LEAST_MARGIN}
+    least = LEAST_MARGIN if len(every) < _LONG_SERIES else _LEAST_OF_LONG
+    kept = [each for each in every if not described or each[-1] >= least]
+    unsure = {id(c.found): n for c, n, _, margin in every if described and margin < least}
     margin = min((each[-1] for each in kept), default=0.0)
     return _Numbered([each[:3] for each in kept], numbering, margin, unsure=unsure)
 
@@ -270,6 +274,9 @@ def _plane_notes(points: Sequence[ResponsePoint], turned_rad: float) -> list[str
     return []
 
 
+_MORE = "Measure more of the lowest modes: hit with a softer tip, and away from the ends."
+
+
 def _check(numbered: _Numbered, known: Hanger | None) -> QualityCheck | None:
     """Whether the orders are known, or guessed."""
     if not numbered.ordered:
@@ -294,11 +301,14 @@ def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, s
             "Correct length, section and nominal tension in the description, or the hanger.",
         )
     if numbered.margin < LEAST_MARGIN:
-        return "other numbers fit these modes nearly as well", "Describe the hanger."
+        return (
+            "other numbers fit these modes nearly as well",
+            _MORE if known else "Describe the hanger.",
+        )
     if numbered.unsure:
         return (
             f"of {len(numbered.unsure)} modes the orders are not known: two fit nearly as well",
-            "Measure more of the lowest modes: hit with a softer tip, and away from the ends.",
+            _MORE,
         )
     if numbered.undecided:
         return (
