@@ -19,11 +19,12 @@ from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Respons
 
 @dataclass(frozen=True)
 class Dropped:
-    """Something that was left out: what, how many of them, and why."""
+    """Something that was left out: what, how many of them, and why; of a mode its frequency."""
 
     what: str
     count: int
     reason: str
+    frequency_hz: float = NAN
 
 
 @dataclass(frozen=True)

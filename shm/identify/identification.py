@@ -101,7 +101,7 @@ def identify(
         poles=found.finding.poles,
         notes=(*placement.notes, *found.notes, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
-        quality=quality,
+        quality=(*quality, *([placement.check] if placement.check else [])),
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options),
     )

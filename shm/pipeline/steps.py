@@ -81,8 +81,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     records = read_test(path, read_limits(settings))
     hanger = _hanger(records[0].hanger, bridge)
     options = identify_options(settings, bridge)
-    described = hanger if hanger.is_modelled else None
-    result = identify(records, options, test_id=path.stem, hanger=described)
+    result = identify(records, options, test_id=path.stem, hanger=hanger)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
     measured = [each for each in records if isinstance(each, Recording)]
     return IdentifiedTest(

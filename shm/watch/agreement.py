@@ -4,9 +4,10 @@ The watch counts visits: a change has had time to come only between two, and onl
 before another speak for it there. A clock that hardly moves, or files that come in another order,
 would take the evidence away. So two tests next to each other, as they came in or as they are dated,
 that each read beyond the threshold to one side are told by themselves where one is none that the
-watch has counted, being held or of planned works; and where their clocks say that the second was no
-later visit, if they are further off than by any load that stands on the deck for a visit. Tests of
-two visits are the watch's to judge: it knows how often tests of this hanger do so without a change.
+watch has counted, being held or of planned works; where the second is dated earlier; and where both
+are dated as of one visit, if they are further off than by any load that stands on the deck for it.
+Tests of two visits are the watch's to judge: it knows how often those of this hanger do so without
+a change.
 
 One blunder in a hundred tests (`WatchOptions.outlier_probability`) makes two in a row once in ten
 thousand, and few of these read beyond a threshold, to one side and alike.
@@ -97,6 +98,7 @@ def agreement(
             if run
             and (
                 run[0][0].id in unwatched
+                or _is_later(run[0][0], newest[0])
                 or (is_no_load(quantity, mine) and not _is_later(newest[0], run[0][0]))
             )
         ]

@@ -145,15 +145,3 @@ def test_without_any_description_a_foreign_mode_is_still_found() -> None:
     placement = placed(found, POINTS, None)
     assert orders_of(placement) == COUNTED
     assert [each.frequency_hz for each in placement.set_aside] == [3.1]
-
-
-def test_two_modes_too_near_for_one_plane_are_not_both_numbered_and_a_note_says_why() -> None:
-    """A single-axis sensor mounted askew sees the other plane, too."""
-    transverse = [mode for mode in hanger_modes() if abs(mode.shape[0]) > abs(mode.shape[1])]
-    points = [point for point in POINTS if point.plane == "transverse"]
-    found = [replace(m, shape=m.shape[::2], shape_sd=m.shape_sd[::2]) for m in transverse]
-    askew = replace(found[2], frequency_hz=1.01 * found[2].frequency_hz)
-    placement = placed([*found[:3], askew, *found[3:]], points, HANGER)
-    assert [mode.order for mode in placement.modes] == [1, 2, 3, 4, 5, 6, 7]
-    assert any("biaxial" in note for note in placement.notes)
-    assert len(placement.set_aside) == 1

@@ -572,7 +572,7 @@ def test_a_counted_test_that_agrees_with_a_held_one_raises_an_alert(held: Worksp
 def test_a_loss_that_is_told_by_two_tests_is_not_told_by_the_third(workspace: Workspace) -> None:
     for number, seconds in enumerate((0, 1, 2, 3)):
         time = day(0) + timedelta(seconds=seconds)
-        spool(workspace, f"t{number}", time, tension=0.9 if number else 1.0)
+        spool(workspace, f"t{number}", time, tension=0.85 if number else 1.0)
         ingest(workspace)
     with workspace.store() as store:
         (loss,) = alerts_but_notices(store)

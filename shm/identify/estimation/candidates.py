@@ -27,6 +27,7 @@ from shm.values import ComplexArray, FloatArray
 FREQUENCY_TOLERANCE = 0.005
 SHAPE_TOLERANCE = 0.1
 _ORDERS_MISSED_AT_MOST = 8  # judgement: one step of 4 or three of 2 missed
+_DOUBLE = "double of a mode too near to be told apart"
 FAR = 1e6  # of a pair that must not be: far above the cost of any allowed one, 2
 
 
@@ -134,7 +135,7 @@ def resolved(
     for candidate in sorted(candidates, key=lambda c: c.frequency_spread):
         if any(_double(candidate, other, seconds) for other in kept):
             what = f"mode at {candidate.frequency_hz:.4g} Hz"
-            dropped.append(Dropped(what, 1, "double of a mode too near to be told apart"))
+            dropped.append(Dropped(what, 1, _DOUBLE, candidate.frequency_hz))
         else:
             kept.append(candidate)
     return kept, tuple(dropped)

@@ -114,7 +114,8 @@ def proven(
     ):
         reason = doubt(candidate, repeat, options)
         if reason:
-            dropped.append(Dropped(f"mode at {candidate.frequency_hz:.4g} Hz", 1, reason))
+            what = f"mode at {candidate.frequency_hz:.4g} Hz"
+            dropped.append(Dropped(what, 1, reason, candidate.frequency_hz))
         else:
             kept.append(candidate)
             again.append(repeat)
@@ -142,18 +143,22 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
     if candidate.collinearity < options.min_collinearity:
         return "its shape is not real (phase collinearity below the limit)"
     strict = 1.0 if len(repeat.frequency_hz) >= LEAST_HITS else _FEW_HITS
-    if candidate.frequency_spread > strict * options.max_frequency_spread:
+    best = options.at_best(candidate.frequency_hz, candidate.damping_ratio)
+    frequency_wide, damping_wide = (options.ambient_width * each for each in best)
+    # What the order moves it by is part of its standard deviation.
+    if candidate.frequency_spread > max(strict * options.max_frequency_spread, frequency_wide):
         return "its frequency changes with the model order"
-    if candidate.damping_spread > strict * options.max_damping_spread:
+    if candidate.damping_spread > max(strict * options.max_damping_spread, damping_wide):
         return "its damping changes with the model order"
     if not np.all(np.isfinite(repeat.frequency_hz)):
         return "not found again when one hit is left out"
     by_hits = float(jackknife_sd(repeat.frequency_hz))
     frequency_sd = math.hypot(by_hits, _within(candidate)) / candidate.frequency_hz
     damping_sd = jackknife_sd(repeat.damping_ratio) / candidate.damping_ratio
-    if frequency_sd > options.max_frequency_sd:
+    if frequency_sd > max(options.max_frequency_sd, frequency_wide):
         return "its frequency changes from hit to hit"
-    if damping_sd > options.max_damping_sd and frequency_sd > _SHARP * options.max_frequency_sd:
+    sharp = frequency_sd <= _SHARP * options.max_frequency_sd
+    if damping_sd > max(options.max_damping_sd, damping_wide) and not sharp:
         return "its frequency and damping change from hit to hit"
     return ""
 

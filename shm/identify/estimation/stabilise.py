@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.contract import Dropped, Finding, Poles
+from shm.identify.contract import Dropped, Finding, FoundMode, Poles
 from shm.identify.estimation.candidates import diagram, resolved, stable_candidates
 from shm.identify.estimation.close_pairs import told_apart
-from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.poles import PoleSet, modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS, find_again, proven
 from shm.identify.options import IdentifyOptions
 
+# judgement: as a pole is followed from order to order, see `candidates`; chance at three deviations
+_SAME, _LIKE, _DEVIATIONS = 0.005, 0.8, 3.0
 _FINAL_ORDERS = 5  # judgement: the median of five bears two strays; each costs a fit a hit
 
 
@@ -48,6 +51,29 @@ def stabilised(
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     return Finding(modes, (*unstable, followed, *doubles, *doubtful), diagram(sets, kept, options))
+
+
+def completed(found: Finding, other: Finding) -> Finding:
+    """`found` with those modes of `other` that it lacks; what was dropped is what both did."""
+    added = [mode for mode in other.modes if not any(_same(mode, each) for each in found.modes)]
+    modes = tuple(sorted((*found.modes, *added), key=lambda mode: mode.frequency_hz))
+    dropped = tuple(
+        entry for entry in found.dropped if not any(_of(entry, mode.frequency_hz) for mode in added)
+    )
+    return replace(found, modes=modes, dropped=dropped)
+
+
+def _same(one: FoundMode, other: FoundMode) -> bool:
+    """Whether it may be one mode; of two at one place, the one that is known stays alone."""
+    sd_hz = np.hypot(one.frequency_sd_hz, other.frequency_sd_hz)
+    reach_hz = max(_SAME * one.frequency_hz, _DEVIATIONS * float(np.nan_to_num(sd_hz)))
+    near = abs(one.frequency_hz - other.frequency_hz) < reach_hz
+    return near and modal_assurance(one.shape, other.shape) > _LIKE
+
+
+def _of(entry: Dropped, frequency_hz: float) -> bool:
+    """Whether that was dropped which is known as a mode of that frequency."""
+    return abs(entry.frequency_hz - frequency_hz) < _SAME * frequency_hz
 
 
 def nothing_moves(hits: int) -> Finding:

@@ -22,12 +22,15 @@ from shm.values import BoolArray, Channel, FloatArray, Recording
 # only be shorter, fewer leave the standard deviations vague
 MOST_PARTS = 20
 LEAST_PARTS = 8
+LOUDER = 5.0
+"""judgement: gusts move parts of one record by up to three, trucks and hits by ten."""
+LOUD = "louder than the rest: a truck or a hit"
 LEAST_PERIODS = 10
 """Of the lowest frequency of the band, in one part."""
 
 
 def ambient_measurement(records: Sequence[Recording], options: IdentifyOptions) -> Measurement:
-    """The measurement in records of one set-up that nobody hit; gaps are cut out.
+    """The measurement in records of one set-up that nobody hit; gaps are cut out, trucks set apart.
 
     Raises NotIdentifiable where no channel can be used or the records are too short.
     """
@@ -43,14 +46,36 @@ def ambient_measurement(records: Sequence[Recording], options: IdentifyOptions) 
     parts = _parts(pieces, least)
     if len(parts) < LEAST_PARTS:
         raise _too_short(records, least)
+    parts, loud = set_apart(parts)
     return Measurement(
         source=records[0].source,
         points=tuple(point_of(records[0].accelerations[row]) for row in rows),
-        decays=tuple(parts),
+        decays=tuple(part / loudness(part) for part in parts),
         sampling_rate_hz=pieces[0][1],
         frequency_response=None,
-        dropped=dropped,
+        dropped=(*dropped, *([Dropped("parts of the record", loud, LOUD)] if loud else [])),
     )
+
+
+def set_apart(parts: Sequence[FloatArray]) -> tuple[list[FloatArray], int]:
+    """The parts without those of trucks and hits, as long as enough are left, and how many went.
+
+    What moves the structure for seconds is no noise, and its modes are those under the load.
+    """
+    level = np.array([loudness(part) for part in parts])
+    quiet = [p for p, own in zip(parts, level, strict=True) if own <= LOUDER * np.median(level)]
+    if len(quiet) < LEAST_PARTS:
+        return list(parts), 0
+    return quiet, len(parts) - len(quiet)
+
+
+def loudness(part: FloatArray) -> float:
+    """Root mean square of a part's differences from sample to sample: drift does not count.
+
+    Parts are divided by it, so that no gust outweighs the rest: on records with trucks 90 % of the
+    intervals of frequencies held the truth in 96 instead of 88 % (tests/worlds/recordings.py).
+    """
+    return float(np.sqrt(np.mean(np.diff(part, axis=1) ** 2))) or 1.0
 
 
 def _least_part_seconds(options: IdentifyOptions) -> float:

@@ -26,7 +26,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.values import BoolArray, FloatArray, IntArray
+from shm.values import NAN, BoolArray, FloatArray, IntArray
 
 Costs: TypeAlias = NDArray[np.float32]
 
@@ -65,7 +65,8 @@ class PlaneModes:
 
     `frequency_hz` (modes,); `position` (points,) as x/L, empty where unknown; `shapes`
     (modes, points); `shape_sd` and `doubt` (modes,), empty for none: standard deviation of the
-    shape's values, and the cost of taking each for a mode of the hanger at all.
+    shape's values, and the cost of taking each for a mode of the hanger at all. `missing_cost`, NaN
+    for the grid's, is that of an order of this plane without a mode.
     """
 
     frequency_hz: FloatArray
@@ -73,6 +74,7 @@ class PlaneModes:
     shapes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     shape_sd: FloatArray = field(default_factory=lambda: np.empty(0))
     doubt: FloatArray = field(default_factory=lambda: np.empty(0))
+    missing_cost: float = NAN
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +119,19 @@ class Alignment:
             found[mode] = order + 1
         return found
 
+    def all_numbers(self) -> IntArray:
+        """Orders from 1 at the best springs of every beam, 0 aside: (modes, levels, tensions)."""
+        spring = np.argmin(self.total, axis=2)[..., np.newaxis]
+        rows = [
+            np.where(
+                np.take_along_axis(costs, spring, axis=2) < ASIDE_COST,
+                np.take_along_axis(orders, spring, axis=2) + 1,
+                0,
+            )[..., 0]
+            for orders, costs in zip(self.orders, self.costs, strict=True)
+        ]
+        return np.asarray(rows, dtype=int).reshape(len(rows), *self.total.shape[:2])
+
     def is_first_irregular(self, level: int, tension: int) -> bool:
         """Whether the first order at the best springs of one beam is off that beam's."""
         numbers = self.numbers(level, tension)
@@ -147,7 +162,9 @@ def aligned(plane: PlaneModes, grid: Grid, tolerance: Tolerance) -> Alignment:
         orders.append(order)
         costs.append(np.minimum(cost, ASIDE_COST).astype(np.float32))
         irregular.append(first & (misfit + spread + doubt[mode] >= ASIDE_COST))
-    return Alignment(_total(orders, costs, grid), orders, costs, irregular)
+    missing_cost = grid.missing_cost if np.isnan(plane.missing_cost) else plane.missing_cost
+    total = _total(orders, costs, grid, np.float32(missing_cost))
+    return Alignment(total, orders, costs, irregular)
 
 
 def _of_orders(table: Costs, order: IntArray) -> Costs:
@@ -156,7 +173,9 @@ def _of_orders(table: Costs, order: IntArray) -> Costs:
     return np.asarray(table[tension, spring, order])
 
 
-def _total(orders: Sequence[IntArray], costs: Sequence[Costs], grid: Grid) -> Costs:
+def _total(
+    orders: Sequence[IntArray], costs: Sequence[Costs], grid: Grid, missing_cost: np.float32
+) -> Costs:
     """Sum over the modes; the better of two at one order counts, the other is set aside."""
     springs = tensioned_beam_pattern().log_frequency.shape[1]
     shape = (len(grid.levels), len(grid.tensions), springs)
@@ -166,7 +185,7 @@ def _total(orders: Sequence[IntArray], costs: Sequence[Costs], grid: Grid) -> Co
         aside = cost >= ASIDE_COST
         rival = (order == last) & ~aside
         better = np.minimum(cost, last_cost)
-        gap = np.float32(grid.missing_cost) * (order - last - 1)
+        gap = missing_cost * (order - last - 1)
         total += np.where(
             aside, ASIDE_COST, np.where(rival, ASIDE_COST + better - last_cost, cost + gap)
         )

@@ -39,17 +39,20 @@ _NEAR = 0.03  # judgement: words alone depend on it
 
 
 def without_tones(
-    found: Sequence[FoundMode], tones: Sequence[Tone]
+    found: Sequence[FoundMode], tones: Sequence[Tone], *, unordered: bool = False
 ) -> tuple[list[FoundMode], list[ForeignMode]]:
     """The modes that are none of the `tones`, and those that are.
 
-    A mode is a tone where it lies at one and hardly decays beside the other modes.
+    A mode is a tone where it lies at one and hardly decays beside the other modes; where no order
+    could tell that it is one (`unordered`), its place is enough.
     """
     rest, aside = [], []
     for mode in found:
         tone = next((tone for tone in tones if _lies_at(mode, tone)), None)
-        if tone and _is_steady(mode, found):
-            reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}) and hardly decays."
+        steady = _is_steady(mode, found)
+        if tone and (steady or unordered):
+            decay = " and hardly decays" if steady else ""
+            reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}){decay}."
             aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
         else:
             rest.append(mode)
@@ -84,6 +87,27 @@ def explained(
         )
         return ForeignMode("harmonic", frequency_hz, damping, reason)
     return ForeignMode("deck", frequency_hz, damping, _fits_nothing(mode, hanger_modes))
+
+
+def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
+    """A mode of the plane that no sensor measures, of that order."""
+    reason = (
+        f"It is order {order} of the other plane, which the sensors hear askew, or a neighbour's "
+        "motion near it."
+    )
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+
+
+def unsure_mode(mode: FoundMode, order: int) -> ForeignMode:
+    """A mode that may be of that order, or of another."""
+    reason = f"Its order may be {order}, another fits nearly as well: it is not guessed."
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+
+
+def unnumbered_mode(mode: FoundMode) -> ForeignMode:
+    """A mode where none has an order."""
+    reason = "The modes fit neither the hanger's description nor any tensioned bar."
+    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
 
 
 def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode] | None:

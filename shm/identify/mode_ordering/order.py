@@ -20,6 +20,7 @@ from scipy.linalg import eigh
 
 from shm.identify.mode_ordering.alignment import (
     HIGHEST_ORDER,
+    Alignment,
     Grid,
     PlaneModes,
     Tolerance,
@@ -59,12 +60,16 @@ class Numbering:
     """Orders from 1 of the modes of each plane, None for a mode set aside, and how they are known.
 
     `irregular` (planes,): whether the first order is off the beam that the others follow. `basis`:
-    the hanger's `description`, the `pattern` of a tensioned beam, or mere `counting`.
+    the hanger's `description`, the `pattern` of a tensioned beam, or mere `counting`. `cost`: twice
+    the negative log likelihood, inf where counted; `margins` (planes, modes): how much more it
+    costs at least to give a mode another order, 0 where counted.
     """
 
     orders: Orders
     irregular: tuple[bool, ...]
     basis: Basis
+    cost: float = np.inf
+    margins: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,11 +121,12 @@ def assign_orders(planes: Sequence[PlaneModes], expected: Expected | None = None
         if expected:
             bases = [("description", expected), *bases]
         for basis, each in bases:
-            orders, irregular = _fitted(planes, each)
-            if sum(plane.count(None) for plane in orders) <= _most_aside(sum(counts), basis):
-                return Numbering(orders, irregular, basis)
+            found = _fitted(planes, each, basis)
+            if sum(plane.count(None) for plane in found.orders) <= _most_aside(sum(counts), basis):
+                return found
     counted = tuple(tuple(range(1, count + 1)) for count in counts)
-    return Numbering(counted, (False,) * len(counts), "counting")
+    margins = tuple((0.0,) * count for count in counts)
+    return Numbering(counted, (False,) * len(counts), "counting", margins=margins)
 
 
 def _most_aside(modes: int, basis: Basis) -> float:
@@ -131,9 +137,7 @@ def _most_aside(modes: int, basis: Basis) -> float:
     return MOST_ASIDE * (modes if basis == "description" else max(modes - _FREE, 0))
 
 
-def _fitted(
-    planes: Sequence[PlaneModes], expected: Expected | None
-) -> tuple[Orders, tuple[bool, ...]]:
+def _fitted(planes: Sequence[PlaneModes], expected: Expected | None, basis: Basis) -> Numbering:
     """The cheapest numbering over all beams, tolerances, and ways to leave out or set aside."""
     grid = expected.grid() if expected else _wide_grid(planes)
     prior = expected.cost(grid) if expected else np.zeros((1, 1))
@@ -144,11 +148,33 @@ def _fitted(
         cost = cost + prior
         level, tension = divmod(int(np.argmin(cost)), cost.shape[1])
         levels = [level, level + int(shift[level, tension])]
-        fits.append((float(cost[level, tension]), alignments, levels, tension))
-    _, best, levels, tension = min(fits, key=lambda fit: fit[0])
+        fits.append((float(cost[level, tension]), alignments, levels, tension, (cost, shift)))
+    least, best, levels, tension, _ = min(fits, key=lambda fit: fit[0])
     own = list(zip(best, levels, strict=False))
     orders = tuple(tuple(fit.numbers(level, tension)) for fit, level in own)
-    return orders, tuple(fit.is_first_irregular(level, tension) for fit, level in own)
+    irregular = tuple(fit.is_first_irregular(level, tension) for fit, level in own)
+    others = [_least_otherwise(orders, each, *costs) for _, each, _, _, costs in fits]
+    margins = tuple(
+        tuple(min(both) - least for both in zip(*plane, strict=True))
+        for plane in zip(*others, strict=True)
+    )
+    return Numbering(orders, irregular, basis, least, margins)
+
+
+def _least_otherwise(
+    orders: Orders, alignments: Sequence[Alignment], cost: FloatArray, shift: IntArray
+) -> list[list[float]]:
+    """The least of `cost` (levels, tensions) where a mode has another order; inf for nowhere."""
+    level = np.arange(cost.shape[0])[:, np.newaxis]
+    found = []
+    for alignment, known, by in zip(alignments, orders, (0 * shift, shift), strict=False):
+        at = np.clip(level + by, 0, cost.shape[0] - 1)
+        numbers = np.take_along_axis(alignment.all_numbers(), at[np.newaxis], axis=1)
+        found.append([
+            float(np.min(cost[(number > 0) & (number != (own or 0))], initial=np.inf))
+            for own, number in zip(known, numbers, strict=True)
+        ])  # fmt: skip
+    return found
 
 
 def _wide_grid(planes: Sequence[PlaneModes]) -> Grid:

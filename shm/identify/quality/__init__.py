@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.errors import NotIdentifiable
-from shm.identify.quality import of_hits, of_modes, of_signals
+from shm.identify.quality import of_ambient, of_hits, of_modes, of_signals
 from shm.identify.quality.inspection import Check, Inspection
 from shm.identify.quality.tones import steady_tones, tones
 from shm.values import QualityCheck
@@ -27,6 +27,9 @@ CHECKS: tuple[Check, ...] = (
     of_modes.coherence,
     of_modes.amplitude_dependence,
     of_signals.noise,
+    of_ambient.stationarity,
+    of_ambient.signal_to_noise,
+    of_ambient.peaks,
     steady_tones,
     of_hits.repeatability,
     of_modes.agreement,

@@ -1,0 +1,140 @@
+"""What can be wrong with a record that nobody hit: unsteady, drowned, or with peaks unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import find_peaks, welch
+
+from shm.identify.contract import Measurement
+from shm.identify.measuring.ambient import LOUD, loudness
+from shm.identify.quality.inspection import Inspection, listed
+from shm.values import NAN, FloatArray, QualityCheck, Recording
+
+_UNSTEADY, _STRETCH_S = 2.5, 5.0
+"""Loudest stretch over the median: in 36 records of steady wind up to 2.0, in 11 of 12 with trucks
+above 3.5 (tests/worlds/recordings.py)."""
+_LEAST_DB = 10.0
+"""judgement: below, a mode's peak is hardly told from the chance of twenty spectra, 1 to 3 dB."""
+_AROUND = 0.15  # of a frequency, to either side: where the floor beside a peak is looked for
+_FLOOR = 0.2  # quantile of the spectrum there; neighbouring modes fill less than the rest
+_PROMINENCE_DB = 5.0  # judgement: five deviations of a mean of twenty spectra
+_SAME = 0.02  # judgement: half-power width of 1 % damping
+_MOST_TOLD = 4  # technical: of a sentence that can be read
+
+
+def stationarity(inspection: Inspection) -> QualityCheck | None:
+    """How much the loudest stretch is louder than the median, and what was set apart."""
+    records = _ambient(inspection)
+    value = max((_unrest(record) for record in records), default=NAN)
+    if not records or np.isnan(value):
+        return None
+    apart = sum(d.count for m in inspection.measurements for d in m.dropped if d.reason == LOUD)
+    told = f"the loudest {_STRETCH_S:g} s move {value:.1f} times as much as the median"
+    if apart:
+        told += f"; {apart} parts are set apart: {LOUD}"
+    if apart or value > _UNSTEADY:
+        return QualityCheck(
+            "stationarity", "warning", value, _UNSTEADY, "", told,
+            "Measure in steady wind without traffic, or longer.",
+        )  # fmt: skip
+    return QualityCheck("stationarity", "good", value, _UNSTEADY, "", told)
+
+
+def signal_to_noise(inspection: Inspection) -> QualityCheck | None:
+    """The median height of the modes' peaks over the spectrum beside them, in dB."""
+    if not _ambient(inspection) or inspection.finding is None or not inspection.finding.modes:
+        return None
+    heights = []
+    for mode in inspection.finding.modes:
+        spectra = [_spectrum(m) for m in inspection.measurements]
+        heights.append(max(_height_db(f, power, mode.frequency_hz) for f, power in spectra))
+    value = float(np.median(heights))
+    found = f"the modes' peaks stand {value:.0f} dB above the spectrum beside them"
+    if value >= _LEAST_DB:
+        return QualityCheck("peak height", "good", value, _LEAST_DB, "dB", found)
+    return QualityCheck(
+        "peak height", "warning", value, _LEAST_DB, "dB", found,
+        "Measure in more wind, with quieter sensors, or hit the hanger.",
+    )  # fmt: skip
+
+
+def peaks(inspection: Inspection) -> QualityCheck | None:
+    """Peaks of the spectrum that are neither mode nor tone, and stronger than one that is."""
+    if not _ambient(inspection) or inspection.finding is None:
+        return None
+    known = [mode.frequency_hz for mode in inspection.finding.modes]
+    missed = sorted({hz for m in inspection.measurements for hz in _missed(m, known, inspection)})
+    count = float(len(missed))
+    if not missed:
+        found = "every strong peak of the spectrum is a mode or a tone"
+        return QualityCheck("missed peaks", "good", count, 0.0, "", found)
+    named = listed([f"{hz:.3g} Hz" for hz in missed[:_MOST_TOLD]])
+    more = f" and {len(missed) - _MOST_TOLD} more" if len(missed) > _MOST_TOLD else ""
+    return QualityCheck(
+        "missed peaks", "warning", count, 0.0, "",
+        f"no mode was proven at strong peaks of the spectrum: {named}{more}",
+        "Measure longer, and look at the spectrum before using the modes.",
+    )  # fmt: skip
+
+
+def _ambient(inspection: Inspection) -> Sequence[Recording]:
+    """The records, where nobody hit; empty where somebody did."""
+    hit = any(m.hits or m.frequency_response is not None for m in inspection.measurements)
+    return () if hit else inspection.records
+
+
+def _unrest(record: Recording) -> float:
+    """Loudest over median stretch of a record; NaN where it has none without a gap."""
+    signals = np.array([channel.values for channel in record.accelerations])
+    count = int(_STRETCH_S * record.sampling_rate_hz)
+    starts = range(0, signals.shape[1] - count + 1, count)
+    level = np.array([loudness(signals[:, first : first + count]) for first in starts])
+    known = level[np.isfinite(level)]
+    return float(np.max(known) / np.median(known)) if len(known) else NAN
+
+
+def _spectrum(measurement: Measurement) -> tuple[FloatArray, FloatArray]:
+    """Lines in Hz, and the power of all channels on them, each channel of one weight."""
+    samples = min(part.shape[1] for part in measurement.decays)
+    size = np.sqrt(np.mean([np.mean(p**2, axis=1) for p in measurement.decays], axis=0))
+    weight = 1 / np.where(size > 0, size, 1.0)[:, np.newaxis]
+    spectra = [
+        welch(part * weight, measurement.sampling_rate_hz, nperseg=samples)
+        for part in measurement.decays
+    ]
+    power = np.mean([density.sum(axis=0) for _, density in spectra], axis=0)
+    return np.asarray(spectra[0][0]), np.asarray(power)
+
+
+def _height_db(frequency_hz: FloatArray, power: FloatArray, at_hz: float) -> float:
+    """Of the peak at a frequency over the spectrum around."""
+    around = np.abs(frequency_hz / at_hz - 1) < _AROUND
+    near = np.abs(frequency_hz - at_hz) <= max(1.5 * frequency_hz[1], _SAME / 2 * at_hz)
+    floor = float(np.quantile(power[around], _FLOOR)) if around.any() else 0.0
+    top = float(np.max(power[near], initial=0.0))
+    return 10 * float(np.log10(top / floor)) if floor > 0 and top > 0 else NAN
+
+
+def _missed(
+    measurement: Measurement, known_hz: Sequence[float], inspection: Inspection
+) -> list[float]:
+    """Frequencies of strong peaks without a mode."""
+    frequency_hz, power = _spectrum(measurement)
+    options = inspection.options
+    inside = (frequency_hz >= options.band_low_hz) & (frequency_hz <= options.band_high_hz)
+    level = 10 * np.log10(np.maximum(power, np.finfo(float).tiny))
+    least = [level[int(np.argmin(np.abs(frequency_hz - hz)))] for hz in known_hz]
+    strong = float(np.min(least)) if least else -np.inf
+    tops, _ = find_peaks(level, prominence=_PROMINENCE_DB)
+    every = [*known_hz, *(tone.frequency_hz for tone in inspection.tones)]
+    return [
+        float(frequency_hz[top])
+        for top in tops
+        if inside[top]
+        and level[top] > strong
+        and not any(
+            abs(frequency_hz[top] - hz) < max(2 * frequency_hz[1], _SAME * hz) for hz in every
+        )
+    ]
