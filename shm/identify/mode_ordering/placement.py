@@ -77,9 +77,8 @@ _Ordered: TypeAlias = tuple[_Candidate, int, bool]
 LEAST_MARGIN = 6.0
 """Of costs, by which another order is 20 times less likely: in 112 tests of
 tests/worlds/recordings.py all of the wrong orders were below, and 4 of 107 right ones."""
-_LONG_SERIES, _LEAST_OF_LONG = 10, 1.0
-"""Of so many modes all must fit a wrong order: below LEAST_MARGIN such series were right, and are
-kept with a warning; those of six and fewer were wrong in every second test."""
+_LEAST_BY_PATTERN = 5
+"""judgement: level, tension and two end springs fit four frequencies of any order."""
 
 
 def placed(
@@ -196,7 +195,8 @@ def _sure(
     """Without the orders that may be others, where a description should have told them."""
     if described and numbering.basis == "counting":
         return _Numbered([], numbering, 0.0)
-    least = LEAST_MARGIN if len(every) < _LONG_SERIES else _LEAST_OF_LONG
+    few = numbering.basis == "pattern" and len(every) < _LEAST_BY_PATTERN
+    least = np.inf if few else LEAST_MARGIN
     kept = [each for each in every if not described or each[-1] >= least]
     unsure = {id(c.found): n for c, n, _, margin in every if described and margin < least}
     margin = min((each[-1] for each in kept), default=0.0)
