@@ -1,7 +1,4 @@
-"""Gives found modes their plane and order, and sets aside what is no mode of the hanger.
-
-Modes that stand for one of each plane because the two were not told apart.
-"""
+"""Gives found modes their plane and order, and sets aside what is no mode of the hanger."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.alignment import PlaneModes
+from shm.identify.mode_ordering.both_planes import blurred, pair_note, with_both_planes
 from shm.identify.mode_ordering.non_bending_modes import (
     askew_mode,
     doubts,
@@ -25,7 +23,6 @@ from shm.identify.mode_ordering.non_bending_modes import (
 from shm.identify.mode_ordering.one_axis import own_series
 from shm.identify.mode_ordering.order import Expected, Numbering, assign_orders
 from shm.identify.mode_ordering.planes import (
-    is_close,
     planes_of,
     principal_angle,
     sd_in_plane,
@@ -391,57 +388,3 @@ def _irregular_notes(ordered: Sequence[_Ordered]) -> list[str]:
         for candidate, order, irregular in ordered
         if irregular
     ]
-
-
-LEAST_SHARE = 0.15
-"""Of the energy that a mode must have in its weaker plane to stand for both."""
-BLUR = 0.1
-"""Of the bandwidth: what is not resolved over several hits lies nearer than 0.15 of it (measured:
-71 pairs in heavy noise, damping 0.1 to 1 %; the errors' root mean square was 0.035)."""
-
-
-def with_both_planes(
-    modes: Sequence[FoundMode],
-    planes: Sequence[Plane],
-    points: Sequence[ResponsePoint],
-    turned_rad: float = 0.0,
-) -> tuple[list[FoundMode], list[Plane]]:
-    """`modes` and their `planes` with each mode that may be an unresolved pair in either plane.
-
-    Two modes much nearer than their half-power bandwidth may ring down as one, in the direction of
-    the hammer. A mode with a near neighbour is no such pair. `turned_rad`: see `transverse_share`.
-    """
-    both: list[tuple[FoundMode, Plane]] = []
-    single = bool(set(PLANES) - {point.plane for point in points})
-    for mode, plane in zip(modes, planes, strict=True):
-        twice = not single and _stands_for_both(mode, modes, points, turned_rad)
-        both += [(mode, each) for each in PLANES] if twice else [(mode, plane)]
-    return [mode for mode, _ in both], [plane for _, plane in both]
-
-
-def _stands_for_both(
-    mode: FoundMode, modes: Sequence[FoundMode], points: Sequence[ResponsePoint], turned_rad: float
-) -> bool:
-    share = transverse_share(mode.shape, points, turned_rad)
-    alone = not any(
-        is_close(mode.frequency_hz, other.frequency_hz) for other in modes if other is not mode
-    )
-    return alone and LEAST_SHARE <= share <= 1 - LEAST_SHARE
-
-
-def blurred(mode: FoundMode) -> FoundMode:
-    """An unresolved pair's mode: either of the two has its frequency to a tenth of the bandwidth.
-
-    That part of twice damping ratio times frequency is added to the standard deviation.
-    """
-    bandwidth = 2 * mode.damping_ratio * mode.frequency_hz
-    sd = float(np.hypot(np.nan_to_num(mode.frequency_sd_hz), BLUR * bandwidth))
-    return replace(mode, frequency_sd_hz=sd)
-
-
-def pair_note(mode: FoundMode) -> str:
-    """What a reader should know of an unresolved pair."""
-    return (
-        f"the mode at {mode.frequency_hz:.2f} Hz moves in both planes: it stands for one of each, "
-        "uncertain by a tenth of its bandwidth"
-    )
