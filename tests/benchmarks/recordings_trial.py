@@ -92,11 +92,11 @@ def as_record(case: world.Recording) -> Recording:
     )
 
 
-def described(case: world.Recording) -> Hanger | None:
-    """The hanger as its owner describes it; None of what is no bar."""
+def described(case: world.Recording) -> Hanger:
+    """The hanger as its owner describes it: what is no bar as a structure of any kind."""
     told = case.truth.description
     if not told:
-        return None
+        return Hanger.without_model(1)
     area = np.pi / 4 * told["diameter_m"] ** 2
     moment = np.pi / 64 * told["diameter_m"] ** 4
     off = 1 + NOMINAL_OFF * float(np.random.default_rng(case.seed).standard_normal())
