@@ -29,8 +29,11 @@ _MISFIT, _MISFIT_SDS = 0.001, (0.01, 0.02, 0.04)
 
 
 def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Log density of modes that are `off` by so much, of which a few are mistaken."""
-    return np.asarray(np.logaddexp(_log_good(off, variance), math.log(MISTAKEN / MISTAKEN_RANGE)))
+    """Log density of modes that are `off` by so much, of which a few are mistaken; NaN where a mode
+    was not measured."""
+    with np.errstate(invalid="ignore"):
+        mixed = np.logaddexp(_log_good(off, variance), math.log(MISTAKEN / MISTAKEN_RANGE))
+    return np.asarray(mixed)
 
 
 def good_probability(off: FloatArray, variance: FloatArray | float) -> FloatArray:

@@ -25,7 +25,7 @@ from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.values import NAN, ComplexArray, FloatArray
 
 SURE = 2.5
-"""Standard deviations from which a dependence is taken for one; of 32 modes none by chance."""
+"""Standard deviations from which a dependence is taken for one (judgement): by chance one in 80."""
 LEAST_SLOPE = 2e-5
 """Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
 _MOST_SLOPE = 0.01

@@ -36,6 +36,7 @@ import numpy as np
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
 from shm.identify.estimation.poles import PoleSet, poles_of
+from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.estimation.stabilise import (
     completed,
     final_orders,
@@ -54,14 +55,15 @@ the largest standard deviation of a hammer test are taken."""
 _ROWS = 640
 _BLOCK_ROWS = (100, 220)
 _MOST_ROWS = 880
-_ROWS_AMBIENT = 240
-_BLOCK_ROWS_AMBIENT = (60, 120)
-"""Covariances of ambient motion are vague at long lags."""
+_ROWS_FEW = 240
+_BLOCK_ROWS_FEW = (60, 120)
+"""Covariances of ambient motion are vague at long lags; fewer than three hits do not prove what a
+larger model makes of noise."""
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
 _REFERENCES = 4  # judgement: two planes, and two modes that are close in each
 _MAX_ORDER = 132  # judgement: two each of 33 modes a plane; each order more costs seconds
-_MAX_ORDER_AMBIENT = 120
+_MAX_ORDER_FEW = 120
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
@@ -134,12 +136,17 @@ def references(responses: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(vectors[:, -_REFERENCES:].T)
 
 
+def _repeated(measurement: Measurement) -> bool:
+    """Whether hits enough tell modes from noise."""
+    hit = bool(measurement.hits) or measurement.frequency_response is not None
+    return hit and len(measurement.decays) >= LEAST_HITS
+
+
 def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
     """How many time lags the Hankel matrices hold."""
     shortest = min(decay.shape[1] for decay in measurement.decays)
     channels = len(measurement.points)
-    rings = bool(measurement.hits) or measurement.frequency_response is not None
-    rows, bounds = (_ROWS, _BLOCK_ROWS) if rings else (_ROWS_AMBIENT, _BLOCK_ROWS_AMBIENT)
+    rows, bounds = (_ROWS, _BLOCK_ROWS) if _repeated(measurement) else (_ROWS_FEW, _BLOCK_ROWS_FEW)
     shared = min(int(np.clip(rows // channels, *bounds)), _MOST_ROWS // channels)
     wanted = _BLOCK_ROWS_ALONE if channels == 1 else shared
     return int(min(options.block_rows or wanted, shortest // 3))
@@ -150,7 +157,7 @@ def modes_of_hankel(
 ) -> Finding:
     """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows."""
     total = np.sum(matrices, axis=0)
-    most = _MAX_ORDER if measurement.hits else _MAX_ORDER_AMBIENT
+    most = _MAX_ORDER if _repeated(measurement) else _MAX_ORDER_FEW
     max_order = _max_order(total, rows, options.max_order or most)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
