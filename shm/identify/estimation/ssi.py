@@ -62,8 +62,7 @@ larger model makes of noise."""
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
 _REFERENCES = 4  # judgement: two planes, and two modes that are close in each
-_MAX_ORDER = 132  # judgement: two each of 33 modes a plane; each order more costs seconds
-_MAX_ORDER_FEW = 120
+_MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hanger has below 100 Hz
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
@@ -157,8 +156,7 @@ def modes_of_hankel(
 ) -> Finding:
     """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows."""
     total = np.sum(matrices, axis=0)
-    most = _MAX_ORDER if _repeated(measurement) else _MAX_ORDER_FEW
-    max_order = _max_order(total, rows, options.max_order or most)
+    max_order = _max_order(total, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz)

@@ -151,7 +151,8 @@ def _numbered(
     groups = _candidates(found, points, turned_rad)
     length_m = known.length_m if known else NAN
     expected = Expected.of(known) if known else None
-    if len({point.plane for point in points}) == 1:
+    if expected and len({point.plane for point in points}) == 1:
+        # Of what nobody described two series are no more likely than one: it may be no bar.
         (group,) = [each for each in groups if each] or [[]]
         return _on_one_axis(group, length_m, expected)
     numbering = assign_orders([_plane_modes(group, length_m) for group in groups], expected)
@@ -166,9 +167,7 @@ def _numbered(
     return _sure(every, numbering, described=known is not None)
 
 
-def _on_one_axis(
-    group: Sequence[_Candidate], length_m: float, expected: Expected | None
-) -> _Numbered:
+def _on_one_axis(group: Sequence[_Candidate], length_m: float, expected: Expected) -> _Numbered:
     """Those of the axis' own plane; a bar in the other plane may show, too."""
     axis = own_series(
         [each.found for each in group],
@@ -182,7 +181,7 @@ def _on_one_axis(
         if order is not None
     ]
     askew = {id(each.found): n for each, n in zip(group, axis.askew, strict=True) if n}
-    sure = _sure(every, axis.numbering, described=expected is not None)
+    sure = _sure(every, axis.numbering, described=True)
     return replace(sure, askew=askew, undecided=axis.undecided)
 
 
