@@ -185,6 +185,26 @@ def structure_of(
             [options.creep_per_year_sd],
         ]
     )
+    scattering, sds = _scattering(quantities, columns, options)
+    return Structure(
+        layout=Layout(n, q, prior_sd),
+        directions=tuple(_directions(quantities, columns)),
+        quantities=tuple(quantities),
+        scattering=scattering,
+        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
+        scatter_variance=sds**2,
+        scales=np.array(options.scatter_scales),
+    )
+
+
+def _scattering(
+    quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
+) -> tuple[FloatArray, FloatArray]:
+    """What tests of one state scatter along beside the quantities (n, c), and the standard
+    deviations (q + c,) of both before any test."""
+    n = len(columns.modes)
+    steps = np.array([each.step_sd for each in quantities])
+    is_tension = np.array([each.name == TENSION for each in quantities])
     strength, axes = np.linalg.eigh(columns.sensors)
     kept = strength > _SEEN_OF_SENSORS * strength[-1]
     # A joint that gives for a day does so along what it does as it loosens.
@@ -206,15 +226,7 @@ def structure_of(
             np.full(n, options.mode_scatter),
         ]
     )
-    return Structure(
-        layout=Layout(n, q, prior_sd),
-        directions=tuple(_directions(quantities, columns)),
-        quantities=tuple(quantities),
-        scattering=scattering,
-        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
-        scatter_variance=sds**2,
-        scales=np.array(options.scatter_scales),
-    )
+    return scattering, sds
 
 
 def _directions(quantities: Sequence[WatchedQuantity], columns: Columns) -> list[Direction]:
