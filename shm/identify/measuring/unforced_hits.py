@@ -7,8 +7,8 @@ their swells last seconds, and where modes beat, the motion was as large a quart
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import hilbert
 
 from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import (
@@ -71,7 +71,7 @@ def _power(
     step = max(1, int(sampling_rate_hz / wanted))
     slow = np.nan_to_num(thinned(accelerations, sampling_rate_hz, wanted))
     fast = np.diff(slow, axis=1, prepend=slow[:, :1])
-    envelope = np.abs(hilbert(fast, axis=1)) ** 2
+    envelope = np.abs(scipy.signal.hilbert(fast, axis=1)) ** 2
     usual = np.median(envelope, axis=1, keepdims=True)
     moving = usual[:, 0] > 0
     if not np.any(moving):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import find_peaks, welch
+import scipy
 
 from shm.identify.contract import Measurement
 from shm.identify.measuring.ambient import LOUD, loudness
@@ -101,7 +101,7 @@ def _spectrum(measurement: Measurement) -> tuple[FloatArray, FloatArray]:
     size = np.sqrt(np.mean([np.mean(p**2, axis=1) for p in measurement.decays], axis=0))
     weight = 1 / np.where(size > 0, size, 1.0)[:, np.newaxis]
     spectra = [
-        welch(part * weight, measurement.sampling_rate_hz, nperseg=samples)
+        scipy.signal.welch(part * weight, measurement.sampling_rate_hz, nperseg=samples)
         for part in measurement.decays
     ]
     power = np.mean([density.sum(axis=0) for _, density in spectra], axis=0)
@@ -127,7 +127,7 @@ def _missed(
     level = 10 * np.log10(np.maximum(power, np.finfo(float).tiny))
     least = [level[int(np.argmin(np.abs(frequency_hz - hz)))] for hz in known_hz]
     strong = float(np.min(least)) if least else -np.inf
-    tops, _ = find_peaks(level, prominence=_PROMINENCE_DB)
+    tops, _ = scipy.signal.find_peaks(level, prominence=_PROMINENCE_DB)
     every = [*known_hz, *(tone.frequency_hz for tone in inspection.tones)]
     return [
         float(frequency_hz[top])
