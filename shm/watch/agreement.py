@@ -30,7 +30,7 @@ from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import beyond, shift_of_mixture, threshold_of
+from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture, threshold_of
 
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -238,8 +238,15 @@ def _drift(
     weights = [1 / each.variance for each in alike]
     x = float(np.average([each.mean for each in alike], weights=weights))
     sd = math.sqrt(max(each.variance for each in alike))
+    return drift_of(quantity, newest, Shift(x, sd), hanger)
+
+
+def drift_of(
+    quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
+) -> Drift:
+    """What tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
     alone = np.ones(1)
-    at = alone * x, alone * sd
+    at = alone * read.mean, alone * read.sd
     shift, threshold = shift_of_mixture(quantity, alone, *at), threshold_of(quantity, hanger)
     return Drift(
         hanger=hanger.id,
@@ -247,7 +254,7 @@ def _drift(
         time=newest[1],
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=value_at(quantity, x),
+        value=value_at(quantity, read.mean),
         shift_mean=shift.mean,
         shift_sd=shift.sd,
         threshold=threshold,

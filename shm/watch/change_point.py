@@ -196,8 +196,7 @@ def evidence_of(
     new one is looked for after the last of them.
     """
     tests = len(years)
-    suffix = [_suffix(_times(sums.square, years**k)) for k in range(3)]
-    pulls = [_suffix(_times(sums.cross, years**k)) for k in range(2)]
+    suffix, pulls = _moments(sums, years)
     mean, covariance, log_null = _null(sums, years, layout, called, suffix, pulls)
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
@@ -223,8 +222,7 @@ def log_probability_of_called(
     sums: Sums, years: FloatArray, layout: Layout, called: Sequence[Told]
 ) -> float:
     """Of all tests, if nothing changed beyond what was `called`, over all scatters."""
-    suffix = [_suffix(_times(sums.square, years**k)) for k in range(3)]
-    pulls = [_suffix(_times(sums.cross, years**k)) for k in range(2)]
+    suffix, pulls = _moments(sums, years)
     return _total(_null(sums, years, layout, called, suffix, pulls)[2])
 
 
@@ -363,6 +361,14 @@ def _chosen(beginnings: IntArray, most: int) -> IntArray:
     old = beginnings[:-recent]
     picked = np.unique(np.linspace(0, len(old) - 1, most - recent).round().astype(int))
     return np.concatenate([old[picked], beginnings[-recent:]])
+
+
+def _moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Z'WZ and Z'Wy of all tests from each on, weighed by powers of the years."""
+    return (
+        [_suffix(_times(sums.square, years**k)) for k in range(3)],
+        [_suffix(_times(sums.cross, years**k)) for k in range(2)],
+    )
 
 
 def _suffix(values: FloatArray) -> FloatArray:

@@ -31,14 +31,21 @@ from shm.values import (
 )
 from shm.values.drift import ENOUGH_AGAINST
 from shm.values.force_units import force_unit
-from shm.watch.agreement import BY_A_LOAD, CLEAR, Shown, are_of_two_visits, read_alone, scatter_of
+from shm.watch.agreement import (
+    BY_A_LOAD,
+    CLEAR,
+    Shown,
+    are_of_two_visits,
+    drift_of,
+    read_alone,
+    scatter_of,
+)
 from shm.watch.alert_text import message_of_baseline, short_name
 from shm.watch.change_words import is_stiffness, quantity_words, size_words
 from shm.watch.options import WatchOptions
-from shm.watch.quantities import value_at
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import off_the_baseline
-from shm.watch.shift_mixture import beyond, shift_of_mixture, threshold_of
+from shm.watch.shift_mixture import Shift
 
 FEW_TESTS = 2
 """Of a baseline: of three, those that agree outvote the odd one."""
@@ -125,20 +132,7 @@ def _common(
     is_clear = abs(mean) >= CLEAR * sd and moves >= options.least_frequency_shift
     if not is_clear or (each / mean).min() < _SHOWN:
         return None
-    one, at = np.ones(1), (np.array([mean]), np.array([sd]))
-    shift, threshold = shift_of_mixture(quantity, one, *at), threshold_of(quantity, hanger)
-    return Drift(
-        hanger=hanger.id,
-        test=newest[0].id,
-        time=newest[1],
-        quantity=quantity.name,
-        baseline=quantity.baseline,
-        value=value_at(quantity, mean),
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
-        threshold=threshold,
-        probability=beyond(quantity, one, *at, threshold),
-    )
+    return drift_of(quantity, newest, Shift(mean, sd), hanger)
 
 
 def _is_no_load(lead: Drift) -> bool:
