@@ -13,7 +13,7 @@ from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
-from shm.values.rounding import NINETY_PERCENT, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
@@ -358,13 +358,8 @@ def _merged(said: Sequence[tuple[float, str]]) -> str:
     for value, words in said:
         if not math.isnan(value):
             by_value.setdefault(_probability(value), []).append(words)
-    told = (f"{value} {_listed(words)}" for value, words in by_value.items())
+    told = (f"{value} {listed(words)}" for value, words in by_value.items())
     return f"probability {', '.join(told)}" if by_value else ""
-
-
-def _listed(words: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _probability(value: float) -> str:

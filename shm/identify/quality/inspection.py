@@ -9,6 +9,7 @@ from typing import Protocol
 from shm.identify.contract import Finding, Hit, Measurement, Tone
 from shm.identify.options import IdentifyOptions
 from shm.values import QualityCheck, Recording
+from shm.values.rounding import listed
 
 _MOST_TOLD = 4  # technical: of a sentence that can be read
 
@@ -66,10 +67,6 @@ def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
         f"{hit.start_s:.1f} s" + (f" of record {hit.record + 1}" if several else "") for hit in hits
     ]
     return ("the hit at " if len(told) == 1 else "the hits at ") + listed(told)
-
-
-def listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def fault_count(

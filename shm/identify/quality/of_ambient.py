@@ -9,8 +9,9 @@ import scipy
 
 from shm.identify.contract import Measurement
 from shm.identify.measuring.ambient import LOUD, loudness
-from shm.identify.quality.inspection import Inspection, listed
+from shm.identify.quality.inspection import Inspection
 from shm.values import NAN, FloatArray, QualityCheck, Recording
+from shm.values.rounding import listed
 
 _UNSTEADY, _STRETCH_S = 2.5, 5.0
 """Loudest stretch over the median: in 36 records of steady wind up to 2.0, in 11 of 12 with trucks

@@ -8,8 +8,9 @@ import numpy as np
 
 from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
-from shm.identify.quality.inspection import Inspection, listed
+from shm.identify.quality.inspection import Inspection
 from shm.values import NAN, BoolArray, FloatArray, QualityCheck, Verdict
+from shm.values.rounding import listed
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
 _SLOPE = 1e-4

@@ -27,10 +27,10 @@ from shm.identify.quality.inspection import (
     fault_count,
     hits_for,
     hits_of,
-    listed,
     places,
 )
 from shm.values import NAN, Channel, FloatArray, QualityCheck, Recording
+from shm.values.rounding import listed
 
 _PULSES = 5.0
 """So many times 6 ms hold the pulse of the softest tip."""

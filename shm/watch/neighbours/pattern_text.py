@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.values.force_units import force_unit
-from shm.values.rounding import NINETY_PERCENT
+from shm.values.rounding import NINETY_PERCENT, listed
 from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     ExplanationName,
@@ -46,7 +46,7 @@ def _undecided(pattern: BridgePattern) -> str:
         told.append(f"{each.name} (probability {each.probability:.2f}{which})")
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     return (
-        f"It cannot be told yet what moved: {_listed(told)}; the largest shift is "
+        f"It cannot be told yet what moved: {listed(told)}; the largest shift is "
         f"{_percent(largest)} of hanger {largest.hanger}: test it and its neighbours again."
     )
 
@@ -82,7 +82,7 @@ def _each(pattern: BridgePattern) -> str:
         return "Some hangers moved a little, each by itself: test again to see which."
     told = [f"{row.hanger}: {_force(row.shift_n, pattern, '+')}" for row in moved]
     return (
-        f"{len(moved)} hangers moved, and their neighbours did not take it up ({_listed(told)}): "
+        f"{len(moved)} hangers moved, and their neighbours did not take it up ({listed(told)}): "
         "check their tests, sensors and descriptions first, then the hangers themselves."
     )
 
@@ -122,7 +122,7 @@ def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], name: Explanati
     half = sum((row.high_n - row.shift_n) ** 2 for row in answering) ** 0.5
     low_n, high_n = sorted(abs(taken + s * half) for s in (-1, 1))
     verb = "taken up" if lost else "given up"
-    names = _listed([str(row.hanger) for row in answering])
+    names = listed([str(row.hanger) for row in answering])
     many = len(answering) > 1
     return (
         f"{whose} neighbour{'s' if many else ''} {names} {'have' if many else 'has'} {verb} "
@@ -204,9 +204,5 @@ def _percent(row: HangerRow) -> str:
 
 
 def _hangers(hangers: Sequence[int]) -> str:
-    names = _listed([str(each) for each in hangers])
+    names = listed([str(each) for each in hangers])
     return f"Hanger {names}" if len(hangers) == 1 else f"Hangers {names}"
-
-
-def _listed(items: Sequence[str]) -> str:
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
