@@ -1,0 +1,141 @@
+"""Permanent sensors: what arrives from them piece by piece, and what is read from it.
+
+A stream is what one logger sends of one hanger. Its chunks become windows, windows become pooled
+readings of an hour or a day; a day's reading is a modal test like any other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.modes import Mode
+
+StreamEventKind: TypeAlias = Literal[
+    "gap", "overlap", "late", "doubled", "clock step", "clock drift", "refused",
+    "dead", "drifting", "swapped", "saturated", "lost modes",
+]  # fmt: skip
+WindowKind: TypeAlias = Literal["wind", "traffic", "knock", "quiet", "unusable"]
+Period: TypeAlias = Literal["hour", "six hours", "day"]
+
+
+@dataclass(frozen=True)
+class StreamChannel:
+    """A sensor that stays: an acceleration in m/s^2 at `x_m`, in one plane."""
+
+    name: str
+    plane: Plane
+    x_m: float
+    full_scale: float = NAN
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A logger that sends for good, as `bridge.toml` describes it."""
+
+    name: str
+    hanger: int
+    sampling_rate_hz: float
+    channels: tuple[StreamChannel, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Consecutive samples of all channels of a stream: `values` (channels, samples) in m/s^2.
+
+    `sequence` counts the chunks of a stream from any beginning, one by one; `start` is the logger's
+    clock at the first sample.
+    """
+
+    stream: str
+    sequence: int
+    start: datetime
+    sampling_rate_hz: float
+    channels: tuple[str, ...]
+    values: NDArray[np.float32]
+    temperature_c: float = NAN
+    wind_m_s: float = NAN
+
+    @property
+    def end(self) -> datetime:
+        return self.start + timedelta(seconds=self.values.shape[1] / self.sampling_rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Samples of a stream without a gap, however many chunks: `values` (channels, samples)."""
+
+    stream: str
+    start: datetime
+    sampling_rate_hz: float
+    channels: tuple[str, ...]
+    values: FloatArray
+    temperature_c: float = NAN
+    wind_m_s: float = NAN
+
+
+@dataclass(frozen=True)
+class StreamEvent:
+    """What was noticed of a stream, its clock or a sensor, and how it was dealt with."""
+
+    stream: str
+    kind: StreamEventKind
+    start: datetime
+    end: datetime
+    detail: str
+    channel: str = ""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of a stream that is judged and identified as one.
+
+    `level_m_s2` is the rms acceleration in the band of the modes; `unrest` the loudest stretch over
+    the median one; `signal_to_noise_db` the height of the modes' peaks over the floor.
+    """
+
+    stream: str
+    hanger: int
+    start: datetime
+    duration_s: float
+    kind: WindowKind
+    level_m_s2: float
+    unrest: float = NAN
+    signal_to_noise_db: float = NAN
+    temperature_c: float = NAN
+    wind_m_s: float = NAN
+
+
+@dataclass(frozen=True)
+class WindowReading:
+    """The modes of a window, by the last known ones (`tracked`) or `from scratch`, or none."""
+
+    window: Window
+    modes: tuple[Mode, ...]
+    how: Literal["tracked", "from scratch", "none"]
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class PooledReading:
+    """The windows of an hour or a day as one: modes with errors that allow for what repeats.
+
+    `windows` is how many were pooled, `left_out` how many were not; `level_m_s2`, `temperature_c`
+    and `wind_m_s` are means over the pooled ones.
+    """
+
+    stream: str
+    hanger: int
+    start: datetime
+    period: Period
+    modes: tuple[Mode, ...]
+    windows: int
+    left_out: int
+    level_m_s2: float
+    temperature_c: float = NAN
+    wind_m_s: float = NAN
