@@ -32,10 +32,12 @@ from shm_cli.common import (
     hanger_option,
     json_option,
     one_hanger,
+    open_workspace,
     seed_option,
     show,
 )
 from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
+from shm_cli.simulate_stream import Live, simulate_streams
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
 _SPRING = "End spring in N m/rad; clamped if left out."
@@ -142,12 +144,43 @@ class Chosen(TypedDict):
     metavar="WHAT",
     help=f"What a campaign does not measure, may be repeated: {', '.join(LACKS)}.",
 )
+@click.option(
+    "--stream",
+    "as_stream",
+    is_flag=True,
+    help="Permanent sensors instead: days of wind and traffic on every stream that bridge.toml "
+    "describes, sent into the workspace.",
+)
+@click.option(
+    "--days",
+    type=click.FloatRange(0.001, 3660),
+    default=1.0,
+    show_default=True,
+    help="How long a stream.",
+)
+@click.option(
+    "--loss",
+    "losses",
+    multiple=True,
+    metavar="HANGER:PERCENT:DAY",
+    help="A sudden loss of tension in a stream, may be repeated.",
+)
+@click.option(
+    "--speed",
+    type=click.FloatRange(0),
+    default=0.0,
+    show_default=True,
+    help="Seconds of a stream sent a second; 1 is real time, 0 as fast as it goes.",
+)
 @click.option("--tests", type=click.IntRange(1, 10_000), default=1, show_default=True)
 @click.option("--temperature-c", type=float, default=math.nan, help="Unknown if left out.")
 @click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv", show_default=True)
 @click.option(
-    "--out", required=True, type=click.Path(file_okay=False, path_type=Path), metavar="DIR"
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Where the files go; a stream needs none.",
 )
 @seed_option
 @json_option
@@ -156,10 +189,14 @@ def command(
     ctx: click.Context,
     hanger_id: int | None,
     hanger_file: Path | None,
+    as_stream: bool,
+    days: float,
+    losses: tuple[str, ...],
+    speed: float,
     tests: int,
     first: datetime | None,
     form: str,
-    out: Path,
+    out: Path | None,
     seed: int,
     campaign: bool,
     lacking: tuple[str, ...],
@@ -172,12 +209,20 @@ def command(
     gap diagnosis can be planted, in recordings or in a whole campaign of modal tests.
 
     \b
-    Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
+    Examples: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
+              shm simulate --stream --days 3 --loss 7:2:2.5
     """
+    start = first.replace(tzinfo=UTC) if first else None
+    if as_stream:
+        live = Live(days, start, losses, speed, seed)
+        simulate_streams(open_workspace(ctx), live, as_json=as_json)
+        return
+    if out is None:
+        raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
     _refuse_what_does_not_go_together(campaign, lacking, chosen)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     _refuse_other_supports(hanger)
-    start = first.replace(tzinfo=UTC) if first else _FIRST
+    start = start or _FIRST
     out.mkdir(parents=True, exist_ok=True)
     if campaign:
         effects = [effect_of(text) for text in chosen["effects"]]

@@ -200,7 +200,7 @@ class _Ringing:
         """The modal acceleration at each sample; the state goes on with the next chunk."""
         factor = np.exp(pole / self._stream.sampling_rate_hz)
         before = self._states[plane][mode]
-        states, after = scipy.signal.lfilter(
+        states, _ = scipy.signal.lfilter(
             [1.0], [1.0, -factor], pushed.astype(complex), zi=[factor * before]
         )
         self._states[plane][mode] = states[-1]

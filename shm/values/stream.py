@@ -113,12 +113,17 @@ class Window:
 
 @dataclass(frozen=True)
 class WindowReading:
-    """The modes of a window, by the last known ones (`tracked`) or `from scratch`, or none."""
+    """The modes of a window, by the last known ones (`tracked`) or `from scratch`, or none.
+
+    `spectrum_db`: the mean power of the channels, in dB over 1 (m/s^2)^2/Hz, on lines evenly spaced
+    from 0 to half the sampling rate, each the largest of its stretch; for people to look at.
+    """
 
     window: Window
     modes: tuple[Mode, ...]
     how: Literal["tracked", "from scratch", "none"]
     why: str = ""
+    spectrum_db: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from shm.report.figures.specification import (
     Axis,
     Band,
     Bars,
+    Heat,
     Line,
     Mark,
     Panel,
@@ -346,7 +347,16 @@ def _bars(mark: Bars, colour: str) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-_TRACES: dict[type[Mark], Any] = {Line: _line, Points: _points, Band: _band, Bars: _bars}
+def _heat(mark: Heat, colour: str) -> list[dict[str, Any]]:
+    z = [numbers(row) for row in np.asarray(mark.z, float)]
+    shades = [[0, plotting.colour(mark.colour, 0.0)], [1, colour]]
+    place = {"x": numbers(mark.x), "y": numbers(mark.y), "z": z}
+    return [{"type": "heatmap", **place, "colorscale": shades, "showscale": False}]
+
+
+_TRACES: dict[type[Mark], Any] = {
+    Line: _line, Points: _points, Band: _band, Bars: _bars, Heat: _heat
+}  # fmt: skip
 
 
 def escaped(text: str) -> str:

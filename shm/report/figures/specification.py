@@ -126,6 +126,18 @@ class Span(Mark):
     label_line: int = 0
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Heat(Mark):
+    """Colour by value: `z` (y, x) from transparent at its least to `colour` at its largest.
+
+    NaN stays empty. `x` and `y` are the middles of columns and rows.
+    """
+
+    x: Values
+    y: Values
+    z: Values
+
+
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """`range` is from low to high, of a logarithmic axis too."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
@@ -20,6 +21,7 @@ from shm.report.figures.specification import (
     Band,
     Bars,
     Dash,
+    Heat,
     Line,
     Mark,
     Panel,
@@ -212,6 +214,14 @@ def _bars(axes: Axes, mark: Bars) -> None:
         axes.bar_label(bars, mark.labels, padding=5, fontsize=style.TINY + 0.5, color=colours.INK)
 
 
+def _heat(axes: Axes, mark: Heat) -> None:
+    code = colours.PALETTE[mark.colour]
+    shades = LinearSegmentedColormap.from_list(mark.colour, [(1, 1, 1, 0), to_rgba(code)])
+    axes.pcolormesh(
+        mark.x, mark.y, np.asarray(mark.z, float), cmap=shades, shading="nearest", rasterized=True
+    )
+
+
 def _rule(axes: Axes, mark: Rule) -> None:
     draw_it = axes.axvline if mark.axis == "x" else axes.axhline
     look = {**_look(axes, mark), "linewidth": mark.width, "linestyle": _DASHES[mark.dash]}
@@ -247,6 +257,7 @@ _DRAWN: dict[type[Mark], Any] = {
     Points: _points,
     Band: _band,
     Bars: _bars,
+    Heat: _heat,
     Rule: _rule,
     Span: _span,
 }

@@ -1,0 +1,109 @@
+"""`shm simulate --stream`: a bridge that lives, sent into the ring as its loggers would."""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import rich_click as click
+
+from shm.errors import NothingThere, UsageError
+from shm.pipeline import utc_now
+from shm.read.chunk_document import chunk_document
+from shm.simulate.monitored import Loss, MonitoringPlan, streamed
+from shm.store import Workspace
+from shm.values import Hanger
+from shm.values.stream import Chunk, Stream
+from shm_cli.common import advancing_bar, show
+
+_DAY_S = 86400.0
+
+
+@dataclass(frozen=True)
+class Live:
+    """What is simulated; `speed` is how many seconds pass on the bridge in one of ours, 0: any."""
+
+    days: float
+    first: datetime | None
+    losses: tuple[str, ...]
+    speed: float
+    seed: int
+
+
+def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> None:
+    """Sends the days of every stream that `bridge.toml` describes; the ends of all are alike.
+
+    Raises NothingThere where it describes none.
+    """
+    streams = workspace.bridge.streams
+    if not streams:
+        raise NothingThere(
+            "bridge.toml describes no stream.",
+            remedy="Add a [[stream]] table with its channels: see `shm stream --help`.",
+        )
+    first = chosen.first or _whole_hour(utc_now() - timedelta(days=chosen.days))
+    plan = MonitoringPlan(losses=tuple(_loss(text, first) for text in chosen.losses))
+    hangers = [workspace.bridge.hanger(stream.hanger) for stream in streams]
+    seconds = chosen.days * _DAY_S
+    with advancing_bar() as bar:
+        sent = send(
+            arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
+            workspace.ring.append,
+            chosen.speed,
+            told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
+        )
+    if as_json:
+        ends = first + timedelta(seconds=seconds)
+        show({"chunks": sent, "streams": len(streams), "from": first, "until": ends})
+    else:
+        click.echo(f"{sent} chunks of {len(streams)} streams sent; see `shm stream`.")
+
+
+def arriving(
+    sensed: Sequence[tuple[Hanger, Stream]],
+    plan: MonitoringPlan,
+    first: datetime,
+    seconds: float,
+    seed: int,
+) -> Iterator[Chunk]:
+    """The chunks of all streams in the order of time."""
+    each = [streamed(hanger, stream, plan, first, seconds, seed) for hanger, stream in sensed]
+    return heapq.merge(*each, key=lambda chunk: chunk.start)
+
+
+def send(
+    chunks: Iterator[Chunk],
+    take: Callable[[bytes], object],
+    speed: float,
+    told: Callable[[datetime], None],
+) -> int:
+    """How many were taken; with a `speed`, each once the bridge's clock has come to its end."""
+    begun, start, count = time.monotonic(), None, 0
+    for chunk in chunks:
+        count += 1
+        start = start or chunk.start
+        if speed > 0:
+            due = (chunk.end - start).total_seconds() / speed
+            time.sleep(max(0.0, begun + due - time.monotonic()))
+        take(chunk_document(chunk))
+        told(chunk.end)
+    return count
+
+
+def _whole_hour(at: datetime) -> datetime:
+    return at.astimezone(UTC).replace(minute=0, second=0, microsecond=0)
+
+
+def _loss(text: str, first: datetime) -> Loss:
+    """Reads `HANGER:PERCENT:DAY`."""
+    try:
+        hanger, percent, day = text.split(":")
+        return Loss(int(hanger), float(percent) / 100, first + timedelta(days=float(day)))
+    except ValueError:
+        raise UsageError(
+            f"--loss {text!r} is not HANGER:PERCENT:DAY.",
+            remedy="Write --loss 7:2:1.5 for 2 % of hanger 7 after a day and a half.",
+        ) from None

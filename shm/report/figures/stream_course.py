@@ -1,0 +1,157 @@
+"""What a stream of permanent sensors has shown: spectrum, tracked frequencies, tension, health."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from shm.report import formatting
+from shm.report.figures.specification import (
+    Axis,
+    Band,
+    Heat,
+    Line,
+    Mark,
+    Panel,
+    Rule,
+    Span,
+    Specification,
+    limits,
+    stacked,
+)
+from shm.report.figures.time_axes import thinned_words
+from shm.values import FloatArray
+from shm.values.stream import StreamEvent
+from shm.watch.history import Band as Bounds
+
+_HUES = ("blue", "orange", "green", "purple")
+_SHOWN_MODES = len(_HUES)
+_Z_90 = 1.645
+_MOST_COLUMNS = 600  # technical: a spectrogram of more columns than a screen shows
+_BREAK = timedelta(hours=3)  # judgement: after three missing hours a line would be a guess
+_OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost modes")
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """`spectrum_db` (windows, lines) over `line_hz` (lines,), empty where none was kept.
+
+    `modes` are hourly frequencies (hours,) and their sds by name, NaN where a mode was not
+    followed; `tension` is the change since the beginning in per cent with its 90 % interval.
+    """
+
+    stream: str
+    window_times: Sequence[datetime]
+    line_hz: FloatArray
+    spectrum_db: FloatArray
+    hours: Sequence[datetime]
+    modes: Mapping[str, tuple[FloatArray, FloatArray]]
+    tension: Bounds
+    events: Sequence[StreamEvent] = ()
+
+    @property
+    def followed(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """The modes that were followed longest."""
+        seen = {name: int(np.isfinite(hz).sum()) for name, (hz, _) in self.modes.items()}
+        names = sorted(sorted(seen, key=lambda name: -seen[name])[:_SHOWN_MODES])
+        return {name: self.modes[name] for name in names if seen[name]}
+
+
+def specify(course: Course) -> Specification:
+    """Panels over one time axis: spectrum, frequencies, tension with what befell the sensors."""
+    when = [*course.window_times, *course.hours]
+    time = Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
+    panels = [_spectrogram(course)] if course.spectrum_db.size else []
+    panels += [_frequencies(course), _tension(course)]
+    panels[-1] = Panel(**{**vars(panels[-1]), "x": time})
+    return stacked(panels, 6.4)
+
+
+def _spectrogram(course: Course) -> Panel:
+    step = max(1, len(course.window_times) // _MOST_COLUMNS)
+    z = course.spectrum_db[::step].T
+    floor, top = np.nanquantile(z, [0.1, 0.995])
+    heat = Heat(
+        x=course.window_times[::step], y=course.line_hz, z=np.clip(z, floor, top), colour="ink"
+    )
+    return Panel(
+        y=Axis(label="frequency (Hz)", grid=False), marks=[heat], height=1.4, title_side="left",
+        title="Spectrum",
+    )  # fmt: skip
+
+
+def _frequencies(course: Course) -> Panel:
+    marks: list[Mark] = []
+    for (name, (hz, sd)), hue in zip(course.followed.items(), _HUES, strict=False):
+        middle = float(np.nanmedian(hz))
+        shift, reach = 100 * (hz / middle - 1), 100 * _Z_90 * sd / middle
+        times, shift, reach = _broken(course.hours, shift, reach)
+        marks.append(Band(x=times, low=shift - reach, high=shift + reach, colour=hue, opacity=0.2))
+        texts = [f"{name}: {middle * (1 + each / 100):.4f} Hz" for each in shift]
+        marks.append(Line(x=times, y=shift, colour=hue, name=f"{name} ({middle:.3g} Hz)",
+                          texts=texts))  # fmt: skip
+    return Panel(
+        y=Axis(label="change (%)"), marks=marks, title="Tracked frequencies", title_side="left"
+    )
+
+
+def _tension(course: Course) -> Panel:
+    low, middle, high = course.tension.low, course.tension.middle, course.tension.high
+    times, middle, reach = _broken(course.hours, middle, (high - low) / 2)
+    texts = [f"{each:+.2f} %" for each in middle]
+    marks: list[Mark] = [
+        Rule(at=0.0, colour="quiet", dash="dash"),
+        Band(x=times, low=middle - reach, high=middle + reach, colour="blue", opacity=0.2),
+        Line(x=times, y=middle, colour="blue", width=1.3, name="tension", texts=texts),
+        *_health(course.events),
+    ]
+    return Panel(
+        y=Axis(label="change (%)", range=limits(low, high, [-0.5, 0.5])), marks=marks,
+        title="Tension since the beginning, 90 % interval", title_side="left", height=1.2,
+    )  # fmt: skip
+
+
+def _health(events: Sequence[StreamEvent]) -> list[Span]:
+    told = [each for each in events if each.kind in _OF_HEALTH]
+    return [
+        Span(low=each.start, high=max(each.end, each.start + timedelta(minutes=10)), opacity=0.15,
+             colour="red", name="sensor or clock at fault")
+        for each in told
+    ]  # fmt: skip
+
+
+def _broken(
+    hours: Sequence[datetime], *values: FloatArray
+) -> tuple[list[datetime], FloatArray, FloatArray]:
+    """Two courses with a NaN in each long gap, so that no line bridges it."""
+    places = [n for n in range(1, len(hours)) if hours[n] - hours[n - 1] > _BREAK]
+    times = list(hours)
+    for n in reversed(places):
+        times.insert(n, hours[n - 1] + _BREAK / 2)
+    first, second = (np.insert(each, places, np.nan) for each in values)
+    return times, first, second
+
+
+def caption(course: Course) -> str:
+    return (
+        "Above: the power of all channels, dark where it is strong. Middle: the frequencies "
+        "followed from hour to hour, as changes of their medians, with 90 % intervals. Below: the "
+        "change of tension that they mean, and when a sensor or the clock was at fault."
+        f"{thinned_words(len(course.hours))}"
+    )
+
+
+def alt(course: Course) -> str:
+    known = np.flatnonzero(np.isfinite(course.tension.middle))
+    modes = formatting.counted(len(course.followed), "mode")
+    if not len(known):
+        return f"Stream {course.stream}: {modes} followed; no tension yet."
+    last = int(known[-1])
+    low, high = course.tension.low[last], course.tension.high[last]
+    return (
+        f"Stream {course.stream}: {modes} followed; tension at last "
+        f"{course.tension.middle[last]:+.2f} % (90 %: {low:+.2f} to {high:+.2f} %)."
+    )
