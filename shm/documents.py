@@ -40,6 +40,11 @@ def dump(document: object) -> str:
     return json.dumps(_clean(document), indent=2, allow_nan=False)
 
 
+def compact(document: object) -> str:
+    """The same without a blank, for what is kept ten thousandfold."""
+    return json.dumps(_clean(document), separators=(",", ":"), allow_nan=False)
+
+
 def _clean(node: object) -> object:
     """`node` with what JSON cannot hold replaced: NaN by null, times by ISO texts."""
     if isinstance(node, Mapping):

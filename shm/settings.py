@@ -172,6 +172,16 @@ class Settings:
     )
     mqtt_max_bytes: int = _row(50_000_000, "bytes", "larger messages are refused", 1, 268_435_455)
 
+    ring_days: float = _row(30.0, "days", "raw samples of streams are kept so long", 0.1, 36500)
+    ring_bytes: int = _row(
+        200_000_000_000, "bytes", "of raw samples kept at most; the oldest go first", 10**6, None
+    )
+    # Three days offline are caught up with a day to spare.
+    late_hours: float = _row(
+        96.0, "hours", "samples of a stream that come later are refused", 0.1, 8760
+    )
+    window_days: float = _row(40.0, "days", "what windows of streams said is kept so long", 1, 3650)
+
     log_format: str = _choice("of what the daemon tells", "text", "json")
     log_level: str = _choice("the least of what the daemon tells", "info", *_OTHER_LEVELS)
     log_file_bytes: int = _row(

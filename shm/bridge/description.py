@@ -12,9 +12,11 @@ from typing import Any
 
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
+from shm.bridge.streams import stream_named, stream_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
 from shm.values import Hanger
+from shm.values.stream import Stream
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class Bridge:
     disturbances: tuple[Disturbance, ...] = ()
     built: date | None = None
     structures: tuple[Hanger, ...] = ()
+    streams: tuple[Stream, ...] = ()
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -62,6 +65,10 @@ class Bridge:
         return next((each for each in self.structures if each.id == number), None) or self.hanger(
             number
         )
+
+    def stream(self, name: str) -> Stream:
+        """The stream of that name; raises BadInput when the bridge has none such."""
+        return stream_named(self.streams, name)
 
     def hanger(self, hanger_id: int) -> Hanger:
         """The hanger of that number; raises BadInput when the bridge has none such."""
@@ -89,6 +96,10 @@ def load_bridge(path: Path) -> Bridge:
     _refuse_doubles([each.id for each in (*hangers, *structures)], "hanger id", path)
     hooks = tuple(hook_of(table, path) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
+    described = {each.id: each for each in hangers}
+    tables = _tables(document, "stream", path)
+    streams = tuple(stream_of(table, path, described) for table in tables)
+    _refuse_doubles([stream.name for stream in streams], "stream name", path)
     return Bridge(
         name=str(document.get("bridge", {}).get("name", path.parent.name)),
         hangers=hangers,
@@ -100,6 +111,7 @@ def load_bridge(path: Path) -> Bridge:
         ),
         built=_built(document.get("bridge", {}), path),
         structures=structures,
+        streams=streams,
     )
 
 

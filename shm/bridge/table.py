@@ -81,6 +81,10 @@ class Table:
             return value
         raise self.refusal(f"{key} = {value:g} is not from {low:g} to {high:g}", remedy)
 
+    @property
+    def _kind(self) -> str:
+        return self.label.split()[0].strip("[]")
+
     def table(self, key: str) -> Table | None:
         """The sub-table `key`; None where there is none."""
         if key not in self:
@@ -94,9 +98,8 @@ class Table:
         """The list of sub-tables `key`; empty where there is none."""
         found = self.values.get(key, [])
         if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
-            raise self.refusal(
-                f"{key} is not a list of tables", f"Write [[hanger.{key}]] and its keys below."
-            )
+            remedy = f"Write [[{self._kind}.{key}]] and its keys below."
+            raise self.refusal(f"{key} is not a list of tables", remedy)
         return [
             Table(values, f"{self.label} {key} {number}", self.path)
             for number, values in enumerate(found, start=1)

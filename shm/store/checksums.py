@@ -150,6 +150,7 @@ HEALING: Mapping[str, str] = {
     "diagnoses": "Make it again: `shm gap diagnose --hanger {hanger}`.",
     "summaries": "Nothing is lost: `shm db upgrade` makes it again.",
     "watch_states": "Nothing is lost: the next test makes it again.",
+    "stream_watch": "Nothing is lost: the next readings make it again.",
 }
 """What to do about a damaged row, by table; of all others a backup is the only source.
 

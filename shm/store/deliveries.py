@@ -218,7 +218,9 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
     if connection.execute(waiting).first() is not None:
         return
     about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
-    row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one()
+    row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one_or_none()
+    if row is None:  # raised by readings of a stream
+        return
     if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
         write_step(connection, row.recording_id, NOTIFIED, at, row.id)
 

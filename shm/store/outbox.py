@@ -31,7 +31,7 @@ stored_alerts = sa.select(
 
 def raise_alert(
     connection: Connection,
-    test_id: int,
+    test_id: int | None,
     baseline_id: int | None,
     alert: Alert,
     hooks: Sequence[str],

@@ -1,4 +1,4 @@
-"""The store: one database, its verbs in seven repositories by what they are about."""
+"""The store: one database, its verbs in eight repositories by what they are about."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from shm.store.stored_alerts import Alerts
 from shm.store.stored_posteriors import Posteriors
 from shm.store.stored_recordings import Recordings
 from shm.store.stored_silences import Silences
+from shm.store.stored_streams import Streams
 from shm.store.stored_tests import Tests
 from shm.store.stored_watch import Watch
 from shm.store.upkeep import Upkeep
@@ -27,8 +28,8 @@ class Store(Database):
     `recordings` are the received files, how far each has come and what people decided of it;
     `tests` what was identified from them; `posteriors` what was computed from tests, with
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
-    `alerts` those that were raised, and their deliveries; `silences` when no hook is told; `upkeep`
-    tokens, copies, backups and the healing of rows.
+    `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
+    `streams` what permanent sensors said; `upkeep` tokens, copies, backups and the healing of rows.
     """
 
     def __init__(self, engine: Engine):
@@ -39,6 +40,7 @@ class Store(Database):
         self.watch = Watch(engine)
         self.alerts = Alerts(engine)
         self.silences = Silences(engine)
+        self.streams = Streams(engine)
         self.upkeep = Upkeep(engine)
 
     @classmethod

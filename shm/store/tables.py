@@ -20,8 +20,23 @@ from shm.store.columns import (
     unique_where,
 )
 from shm.store.columns import metadata as metadata
+from shm.store.stream_tables import (
+    pooled_readings as pooled_readings,
+)
+from shm.store.stream_tables import (
+    stream_events as stream_events,
+)
+from shm.store.stream_tables import (
+    stream_progress as stream_progress,
+)
+from shm.store.stream_tables import (
+    stream_watch as stream_watch,
+)
+from shm.store.stream_tables import (
+    stream_windows as stream_windows,
+)
 
-SCHEMA = "0009"
+SCHEMA = "0010"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -220,14 +235,15 @@ watch_states = sa.Table(
     sa.Column("content", sa.LargeBinary, nullable=False),
 )
 
-# `baseline_id` is empty of the notice that a test is held: it was compared with nothing.
+# `baseline_id` is empty of the notice that a test is held: it was compared with nothing. `test_id`
+# is empty of what the readings of a stream raised.
 alerts = sa.Table(
     "alerts",
     metadata,
     identity(),
     sa.Column("key", sa.String(255), nullable=False, unique=True),
     sa.Column("hanger", sa.Integer, nullable=False, index=True),
-    reference("tests"),
+    reference("tests", nullable=True),
     reference("baselines", nullable=True),
     sa.Column("time", UtcTime, nullable=False),
     sa.Column("raised_at", UtcTime, nullable=False),

@@ -32,6 +32,7 @@ from tests.helpers.contents import quiet
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.nouns import a_file, a_posterior, a_response
+from tests.helpers.streams import fill_streams
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
@@ -60,6 +61,7 @@ def a_history(folder: Path) -> Workspace:
         _again(workspace, clock)
         _taken_out(workspace, clock)
     with workspace.store() as store:
+        fill_streams(store)
         _decide(store, clock)
         _keep(workspace, store, clock, folder)
     return workspace

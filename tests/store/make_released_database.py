@@ -31,6 +31,7 @@ from tests.helpers.nouns import (
     a_watched_test,
     an_alert,
 )
+from tests.helpers.streams import fill_streams
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 ADOPTED = "beam1+point_mass@everywhere"
@@ -76,6 +77,7 @@ def fill(store: Store) -> None:
     store.watch.rebaseline(baseline, joint, [second], record, LINEAGE, NOW)
     _update_again(store)
     _hold(store)
+    fill_streams(store)
 
 
 def _hold(store: Store) -> None:

@@ -1,0 +1,79 @@
+"""The `[[stream]]` tables of `bridge.toml`: loggers that send for good, and their sensors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from shm.bridge.table import Table
+from shm.errors import BadInput
+from shm.values import NAN, PLANES, Hanger
+from shm.values.stream import Stream, StreamChannel
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+"""What is at once a folder, a level of an MQTT topic and a part of an address."""
+
+
+def stream_of(values: dict[str, Any], path: Path, hangers: Mapping[int, Hanger]) -> Stream:
+    """The stream of a `[[stream]]` table; raises BadInput naming table and key at fault."""
+    table = Table(values, f"stream {values.get('name', '?')}", path)
+    table.refuse_unknown(("name", "hanger", "sampling_rate_hz", "channel"))
+    name = _name(table, "h7")
+    number = table.value("hanger", int, "is not a whole number", "Give the id of its hanger.")
+    if number not in hangers:
+        known = ", ".join(map(str, sorted(hangers))) or "none"
+        raise table.refusal(
+            f"hanger = {number} is not described (known: {known})",
+            "Add a [[hanger]] table with this id, or correct the number.",
+        )
+    channels = tuple(_channel(each, hangers[number]) for each in table.tables("channel"))
+    if not channels:
+        raise table.refusal("it has no channels", "Write a [[stream.channel]] for each sensor.")
+    _refuse_doubles([channel.name for channel in channels], table)
+    return Stream(name, number, table.positive("sampling_rate_hz"), channels)
+
+
+def _channel(table: Table, hanger: Hanger) -> StreamChannel:
+    table.refuse_unknown(("name", "plane", "x_m", "full_scale"))
+    wrong, remedy = "is none of the planes", f"Give {' or '.join(PLANES)}."
+    plane = table.value("plane", str, wrong, remedy, holds=PLANES.__contains__)
+    x_m = table.not_negative("x_m")
+    if x_m > hanger.length_m:
+        raise table.refusal(
+            f"x_m = {x_m:g} is beyond hanger {hanger.id}, which is {hanger.length_m:g} m long",
+            "Measure it from the deck end, in m.",
+        )
+    full_scale = table.positive("full_scale") if "full_scale" in table else NAN
+    return StreamChannel(_name(table, "acc_1"), plane, x_m, full_scale)
+
+
+def _name(table: Table, example: str) -> str:
+    return str(
+        table.value(
+            "name",
+            str,
+            "is no name of at most 64 letters, digits, - and _",
+            f'Write name = "{example}".',
+            holds=lambda text: _NAME.fullmatch(text) is not None,
+        )
+    )
+
+
+def _refuse_doubles(names: list[str], table: Table) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise table.refusal(f"channel {name} is given twice", "Give each a name of its own.")
+
+
+def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
+    """The stream of that name; raises BadInput when the bridge has none such."""
+    for stream in streams:
+        if stream.name == name:
+            return stream
+    known = ", ".join(stream.name for stream in streams) or "none"
+    raise BadInput(
+        f"stream {name!r} is not described in bridge.toml (known: {known}).",
+        remedy="Add a [[stream]] table with this name, or correct the name.",
+    )

@@ -1,0 +1,202 @@
+"""Permanent sensors: what windows said, what they pool to, events, how far the work is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from datetime import datetime, timedelta
+from typing import Any, TypeVar
+
+import sqlalchemy as sa
+from sqlalchemy.engine import Connection, Row
+
+from shm.documents import compact, value_of
+from shm.store.checksums import decoding, readable, whole
+from shm.store.database import Repository, insert
+from shm.store.outbox import raise_alert
+from shm.store.rows import StoredAlert
+from shm.store.stream_tables import (
+    pooled_readings,
+    stream_events,
+    stream_progress,
+    stream_watch,
+    stream_windows,
+)
+from shm.values import Alert, ShapePoint
+from shm.values.modes import Mode
+from shm.values.stream import Period, PooledReading, StreamEvent, WindowReading
+
+HOURS_KEPT = timedelta(days=800)
+"""Readings of an hour and of six: two summers and two winters, and a month to look at them."""
+
+_LASTS: dict[Period, timedelta] = {
+    "hour": timedelta(hours=1),
+    "six hours": timedelta(hours=6),
+    "day": timedelta(days=1),
+}
+_EVENT = tuple(field.name for field in fields(StreamEvent))
+_T = TypeVar("_T", WindowReading, PooledReading)
+
+
+class Streams(Repository):
+    """What permanent sensors said."""
+
+    def save_window(self, reading: WindowReading) -> None:
+        """Keeps what a window said, in the place of what it said before, and that it is done."""
+        window = reading.window
+        row = {"stream": window.stream, "hanger": window.hanger, "start": window.start}
+        row |= {"has_modes": bool(reading.modes), "document": _document(reading)}
+        with self.writing() as connection:
+            _replace(connection, stream_windows, row, "stream", "start")
+            _advance(connection, window.stream, window.start + timedelta(seconds=window.duration_s))
+
+    def list_windows(
+        self, hanger: int, since: datetime, until: datetime
+    ) -> tuple[WindowReading, ...]:
+        """The windows of a hanger that began from `since` on and before `until`, by time."""
+        table = stream_windows
+        within = (table.c.hanger == hanger, table.c.start >= since, table.c.start < until)
+        query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
+        return self._values(table, query, WindowReading)
+
+    def last_modes(self, stream: str) -> tuple[Mode, ...]:
+        """The modes of the latest window of a stream that has any; empty where none has."""
+        table = stream_windows
+        query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
+        found = self._values(table, query.order_by(table.c.start.desc()).limit(1), WindowReading)
+        return found[0].modes if found else ()
+
+    def save_pooled(
+        self,
+        reading: PooledReading,
+        kept: bytes | None = None,
+        alert: Alert | None = None,
+        hooks: Sequence[str] = (),
+        at: datetime | None = None,
+    ) -> StoredAlert | None:
+        """Keeps a reading of an hour or a day, in the place of the one of then before.
+
+        `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
+        owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
+        """
+        end = reading.start + _LASTS[reading.period]
+        row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
+        row["document"] = _document(reading)
+        with self.writing() as connection:
+            _replace(connection, pooled_readings, row, "stream", "period", "start")
+            if kept is not None:
+                state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
+                _replace(connection, stream_watch, state, "hanger")
+            if alert is None:
+                return None
+            return raise_alert(connection, None, None, alert, hooks, at or end)
+
+    def list_pooled(
+        self, hanger: int, period: Period, since: datetime, until: datetime
+    ) -> tuple[PooledReading, ...]:
+        """The readings of a hanger that began from `since` on and before `until`, by time."""
+        table = pooled_readings
+        within = (table.c.start >= since, table.c.start < until)
+        query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
+        return self._values(table, query.order_by(table.c.start, table.c.id), PooledReading)
+
+    def watch_state(self, hanger: int) -> bytes | None:
+        """What the watch of a hanger goes on from; None where there is nothing, or only damage."""
+        query = sa.select(stream_watch).where(stream_watch.c.hanger == hanger)
+        with self.reading() as connection:
+            row = connection.execute(query).one_or_none()
+        return row.content if row is not None and whole(stream_watch, row) else None
+
+    def forget_watch(self, hanger: int) -> None:
+        """Drops what the watch of a hanger would go on from."""
+        with self.writing() as connection:
+            connection.execute(sa.delete(stream_watch).where(stream_watch.c.hanger == hanger))
+
+    def save_event(self, event: StreamEvent) -> None:
+        """Notes something once; what was noted already is not noted again."""
+        row = vars(event)
+        same = (stream_events.c[name] == row[name] for name in _EVENT)
+        with self.writing() as connection:
+            if connection.execute(sa.select(stream_events.c.id).where(*same)).first() is None:
+                insert(connection, stream_events, row)
+
+    def list_events(self, stream: str | None, since: datetime) -> tuple[StreamEvent, ...]:
+        """What was noticed from a time on, of one stream where named, by time."""
+        query = sa.select(stream_events).where(stream_events.c.end >= since)
+        if stream is not None:
+            query = query.where(stream_events.c.stream == stream)
+        with self.reading() as connection:
+            rows = connection.execute(query.order_by(stream_events.c.start, stream_events.c.id))
+            return tuple(readable(rows.all(), _event))
+
+    def progress(self, stream: str) -> datetime | None:
+        """Up to when the windows of a stream are done; None where none is."""
+        query = sa.select(stream_progress).where(stream_progress.c.stream == stream)
+        with self.reading() as connection:
+            row = connection.execute(query).one_or_none()
+        return row.done_until if row is not None and whole(stream_progress, row) else None
+
+    def sweep(self, now: datetime, window_days: float) -> None:
+        """Takes out windows and events of before so many days, and hours of before `HOURS_KEPT`.
+
+        Readings of a day stay for good.
+        """
+        of_hours = pooled_readings.c.period != "day"
+        oldest = now - timedelta(days=window_days)
+        with self.writing() as connection:
+            for chosen in (
+                sa.delete(stream_windows).where(stream_windows.c.start < oldest),
+                sa.delete(stream_events).where(stream_events.c.end < now - HOURS_KEPT),
+                sa.delete(pooled_readings).where(
+                    of_hours, pooled_readings.c.start < now - HOURS_KEPT
+                ),
+            ):
+                connection.execute(chosen)
+
+    def _values(self, table: sa.Table, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
+        def value(row: Row[Any]) -> _T:
+            with decoding(table, row, row.hanger):
+                return value_of(kind, json.loads(row.document))
+
+        with self.reading() as connection:
+            return tuple(readable(connection.execute(query).all(), value))
+
+
+def _document(reading: WindowReading | PooledReading) -> str:
+    """A reading without what is not known or as usual: modes have many such."""
+    document = asdict(reading)
+    document["modes"] = [_told(mode, Mode) for mode in document["modes"]]
+    return compact(document)
+
+
+def _told(values: dict[str, Any], kind: type[Mode | ShapePoint]) -> dict[str, Any]:
+    usual = {field.name: field.default for field in fields(kind)}
+    told = {name: value for name, value in values.items() if not _is_usual(value, usual[name])}
+    if "shape" in told:
+        told["shape"] = [_told(point, ShapePoint) for point in told["shape"]]
+    return told
+
+
+def _is_usual(value: Any, usual: Any) -> bool:
+    return bool(value == usual or (value != value and usual != usual))
+
+
+def _event(row: Row[Any]) -> StreamEvent:
+    with decoding(stream_events, row):
+        return StreamEvent(**{name: getattr(row, name) for name in _EVENT})
+
+
+def _replace(connection: Connection, table: sa.Table, row: dict[str, Any], *keys: str) -> None:
+    former = (table.c[key] == row[key] for key in keys)
+    connection.execute(sa.delete(table).where(*former))
+    connection.execute(sa.insert(table).values(row))
+
+
+def _advance(connection: Connection, stream: str, until: datetime) -> None:
+    """A window that is done anew takes nothing back."""
+    known = sa.select(stream_progress.c.done_until).where(stream_progress.c.stream == stream)
+    before = connection.scalar(known)
+    if before is None or before < until:
+        row = {"stream": stream, "done_until": until}
+        _replace(connection, stream_progress, row, "stream")

@@ -1,0 +1,124 @@
+"""What permanent sensors said is kept: windows, readings, events, the watch, progress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+
+import pytest
+import sqlalchemy as sa
+
+from shm.errors import StoreError
+from shm.store import DeliveryState, Store
+from shm.store.stream_tables import stream_windows
+from tests.helpers.nouns import NOW, an_alert
+from tests.helpers.streams import MODES, a_reading, a_window, an_event
+
+EVER = NOW - timedelta(days=5000), NOW + timedelta(days=5000)
+
+
+def test_a_window_comes_back_and_is_replaced_where_it_is_done_anew(store: Store) -> None:
+    store.streams.save_window(a_window(10, ()))
+    store.streams.save_window(a_window(0))
+    store.streams.save_window(a_window(10))
+    found = store.streams.list_windows(3, *EVER)
+    assert [repr(each) for each in found] == [repr(a_window(0)), repr(a_window(10))]
+    assert store.streams.list_windows(4, *EVER) == ()
+    assert len(store.streams.list_windows(3, NOW, NOW + timedelta(minutes=10))) == 1
+
+
+def test_progress_never_goes_back(store: Store) -> None:
+    assert store.streams.progress("h3") is None
+    for minutes in (10, 0):
+        store.streams.save_window(a_window(minutes))
+        assert store.streams.progress("h3") == NOW + timedelta(minutes=20)
+
+
+def test_the_last_modes_are_those_of_the_latest_window_that_has_any(store: Store) -> None:
+    assert store.streams.last_modes("h3") == ()
+    store.streams.save_window(a_window(10, MODES[:1]))
+    store.streams.save_window(a_window(20, ()))
+    store.streams.save_window(a_window(0))
+    assert repr(store.streams.last_modes("h3")) == repr(MODES[:1])
+
+
+def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:
+    store.streams.save_window(a_window())
+    with store.reading() as connection:
+        text = connection.scalar(sa.select(stream_windows.c.document))
+    assert "null" not in text.split('"modes"')[1]
+    assert len(text) < 600
+
+
+def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) -> None:
+    alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
+    assert store.streams.save_pooled(a_reading(-1)) is None
+    raised = store.streams.save_pooled(a_reading(), b"state", alert, ["mail"])
+    assert raised is not None
+    assert raised.raised_at == NOW + timedelta(hours=1)
+    assert store.streams.watch_state(3) == b"state"
+    assert [repr(each) for each in store.streams.list_pooled(3, "hour", *EVER)] == [
+        repr(a_reading(-1)),
+        repr(a_reading()),
+    ]
+    (owed,) = store.alerts.list_deliveries()
+    assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
+    again = store.streams.save_pooled(a_reading(1), b"later", alert, ["mail"], NOW)
+    assert (again, store.streams.watch_state(3)) == (None, b"later")
+
+
+def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
+    alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
+    store.streams.save_pooled(a_reading(), None, alert, ["mail"], NOW)
+    assert [row.hanger for row in store.alerts.list_rows()] == [3]
+    (owed,) = store.alerts.list_due_deliveries(NOW, 10)
+    store.alerts.save_delivery(owed, NOW)
+    (told,) = store.alerts.list_deliveries()
+    assert (told.state, told.stored.alert.key) == (DeliveryState.DELIVERED, "hanger-3:stream")
+
+
+def test_nothing_of_a_reading_is_kept_where_its_alert_cannot_be(store: Store) -> None:
+    alert = replace(an_alert(), key="x" * 300, message=None)  # type: ignore[arg-type]
+    with pytest.raises(StoreError):
+        store.streams.save_pooled(a_reading(), b"state", alert)
+    assert store.streams.watch_state(3) is None
+    assert store.streams.list_pooled(3, "hour", *EVER) == ()
+
+
+def test_an_event_is_noted_once(store: Store) -> None:
+    for event in (an_event(10), an_event(), an_event()):
+        store.streams.save_event(event)
+    assert store.streams.list_events(None, NOW) == (an_event(), an_event(10))
+    assert store.streams.list_events("h4", NOW) == ()
+    assert store.streams.list_events("h3", NOW + timedelta(minutes=5)) == (an_event(10),)
+
+
+def test_what_is_old_goes_but_days_stay(store: Store) -> None:
+    for days in (0, 39, 41, 801):
+        store.streams.save_window(a_window(-1440 * days))
+        store.streams.save_event(an_event(-1440 * days))
+        for period in ("hour", "six hours", "day"):
+            store.streams.save_pooled(a_reading(-24 * days, period))  # type: ignore[arg-type]
+    store.streams.sweep(NOW, 40)
+    assert len(store.streams.list_windows(3, *EVER)) == 2
+    assert len(store.streams.list_events(None, EVER[0])) == 3
+    periods = ("hour", "six hours", "day")
+    counts = [len(store.streams.list_pooled(3, each, *EVER)) for each in periods]  # type: ignore[arg-type]
+    assert counts == [3, 3, 4]
+
+
+def test_a_damaged_row_hides_no_other(store: Store) -> None:
+    store.streams.save_window(a_window())
+    store.streams.save_window(a_window(10))
+    store.streams.save_pooled(a_reading())
+    store.streams.save_pooled(a_reading(1), b"state")
+    with store.engine.begin() as connection:
+        for table in ("stream_windows", "pooled_readings"):
+            changed = "document = replace(document, '5.8', '5.9')"
+            connection.exec_driver_sql(f"UPDATE {table} SET {changed} WHERE id = 2")
+        connection.exec_driver_sql("UPDATE stream_watch SET hanger = 3, checksum = 1")
+    assert [repr(each) for each in store.streams.list_windows(3, *EVER)] == [repr(a_window())]
+    assert [repr(each) for each in store.streams.list_pooled(3, "hour", *EVER)] == [
+        repr(a_reading())
+    ]
+    assert store.streams.watch_state(3) is None
