@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import rich_click as click
+from shm.read.chunk_document import chunk_document
 
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
-from shm.read.chunk_document import chunk_document
 from shm.simulate.monitored import Loss, MonitoringPlan, streamed
 from shm.store import Workspace
 from shm.values import Hanger

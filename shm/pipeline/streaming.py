@@ -9,20 +9,25 @@ watch's state after it and its alert: this may be killed at any instant and simp
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from collections import defaultdict, deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.pipeline.clock import Clock, utc_now
 from shm.read.atomic import replace_text
-from shm.store import Store, Workspace
-from shm.store.archive import nothing
-from shm.values.stream import Period, Stream, StreamEvent, Window, WindowReading
+from shm.store import Ring, Store, Workspace
+from shm.store.archive import MODES_SUFFIX, nothing
+from shm.values import ModalTest, Posterior
+from shm.values.stream import Period, PooledReading, Stream, Window, WindowReading
+
+if TYPE_CHECKING:
+    from shm.pipeline.stream_steps import Pooled, WindowFound
 
 WINDOW = timedelta(minutes=10)
 """Long enough that a mode at 5 Hz of 0.1 % damping is known to 2e-4 (S. K. Au, 2014)."""
@@ -33,7 +38,11 @@ PERIODS: Mapping[Period, timedelta] = {
 }
 _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
-_AGAIN = timedelta(minutes=1)
+_AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
+_OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
+_UPKEEP = timedelta(minutes=1)  # technical: how often chunks are put together and old ones go
+
+_EVER = datetime.min.replace(tzinfo=UTC)
 
 log = logging.getLogger(__name__)
 
@@ -42,14 +51,19 @@ log = logging.getLogger(__name__)
 class _Running:
     future: Future[Any]
     keep: Callable[[Any], object]
+    fail: Callable[[BaseException], object]
 
 
 class Streaming:
-    """All streams of a workspace; `lanes` is how many steps may be under way at once."""
+    """All streams of a workspace; `lanes` is how many steps may be under way at once.
+
+    Use it while holding the workspace's lock.
+    """
 
     def __init__(
         self,
         workspace: Workspace,
+        ring: Ring,
         store: Store,
         executor: Executor,
         *,
@@ -57,17 +71,20 @@ class Streaming:
         lanes: int = 1,
         wake: Callable[[], object] = nothing,
     ):
-        self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
-        self.wake, self.ring = wake, workspace.ring
+        self.workspace, self.ring, self.store = workspace, ring, store
+        self.executor, self.clock, self.lanes, self.wake = executor, clock, lanes, wake
         self._running: dict[str, _Running] = {}
+        self._done: dict[str, datetime] = {}
         self._pooled: dict[tuple[str, Period], datetime] = {}
         self._not_before: dict[str, datetime] = {}
-        self.use(workspace)
+        self._offsets: defaultdict[str, deque[Mapping[str, float]]] = defaultdict(
+            lambda: deque(maxlen=_OFFSETS)
+        )
+        self._first, self._upkeep_at = 0, _EVER
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge."""
         self.workspace = workspace
-        self._turn = 0
 
     def close(self) -> None:
         """Abandons what is under way: the store still says that it waits."""
@@ -75,17 +92,223 @@ class Streaming:
             running.future.cancel()
 
     def advance(self) -> bool:
-        """Keeps what is finished, begins what has come; whether anything is under way."""
+        """Keeps what is finished, begins what has come; whether anything is under way.
+
+        Raises StoreError where the store cannot be used now.
+        """
         for name, running in list(self._running.items()):
             if running.future.done():
                 del self._running[name]
-                self._keep(name, running)
+                self._finish(name, running)
+        self._keep_house()
         streams = self.workspace.bridge.streams
         # Each turn begins with another, or the first would keep all lanes while they catch up.
-        for stream in (*streams[self._turn :], *streams[: self._turn]):
+        for stream in (*streams[self._first :], *streams[: self._first]):
             if len(self._running) >= self.lanes:
                 break
-            if stream.name not in self._running and self._may_begin(stream):
+            if stream.name not in self._running and self._may_begin(stream.name):
                 self._begin(stream)
-        self._turn = (self._turn + 1) % max(1, len(streams))
+        self._first = (self._first + 1) % max(1, len(streams))
         return bool(self._running)
+
+    def _keep_house(self) -> None:
+        """Now and then: whole stretches become one file each, what is old enough goes."""
+        now = self.clock()
+        if not self.workspace.bridge.streams or now < self._upkeep_at:
+            return
+        self._upkeep_at = now + _UPKEEP
+        for event in (*self.ring.seal(now), *self.ring.sweep(now)):
+            self.store.streams.save_event(event)
+        self.store.streams.sweep(now, self.workspace.settings.window_days)
+
+    def _may_begin(self, name: str) -> bool:
+        return self.clock() >= self._not_before.get(name, _EVER)
+
+    # ------------------------------------------------------------ begin
+
+    def _begin(self, stream: Stream) -> None:
+        """The next step of a stream, if there is one: pools come before further windows."""
+        done = self._done_until(stream.name)
+        if done is None:
+            return
+        for period, length in PERIODS.items():
+            start = self._next_pool(stream, period, length, done)
+            if start is not None:
+                self._begin_pool(stream, period, start)
+                return
+        start = self._next_window(stream, done)
+        if start is not None:
+            self._begin_window(stream, start)
+
+    def _done_until(self, name: str) -> datetime | None:
+        """Up to when the windows are done; where none is, the beginning of the first."""
+        if name not in self._done:
+            done = self.store.streams.progress(name)
+            if done is None:
+                first = self.ring.first_after(name, _EVER)
+                return None if first is None else _floor(first, WINDOW)
+            self._done[name] = done
+        return self._done[name]
+
+    def _next_window(self, stream: Stream, done: datetime) -> datetime | None:
+        """The next ten minutes that hold samples, once all of them have come or are given up."""
+        first = self.ring.first_after(stream.name, done)
+        if first is None:
+            return None
+        start = max(done, _floor(first, WINDOW))
+        whole = self.ring.watermark(stream.name, self.clock()) >= start + WINDOW
+        return start if whole else None
+
+    def _begin_window(self, stream: Stream, start: datetime) -> None:
+        from shm.pipeline.steps import identify_options
+        from shm.pipeline.stream_steps import read_stream_window
+
+        hanger = self.workspace.bridge.tested(stream.hanger)
+        options = identify_options(self.workspace.settings, self.workspace.bridge)
+        self._submit(
+            stream.name,
+            partial(
+                read_stream_window,
+                self.ring.read(stream.name, start, start + WINDOW),
+                stream,
+                self.store.streams.last_modes(stream.name),
+                hanger,
+                options,
+                tuple(self._offsets[stream.name]),
+            ),
+            partial(self._keep_window, stream),
+            partial(self._give_up_window, stream, start),
+        )
+
+    def _next_pool(
+        self, stream: Stream, period: Period, length: timedelta, done: datetime
+    ) -> datetime | None:
+        """The next period that is over and has windows; those without are passed over."""
+        key = stream.name, period
+        start = self._pooled.get(key) or self._pooled_until(stream, period, length)
+        while start is not None and start + length <= done:
+            if self._windows(stream, start, length):
+                break
+            start += length
+        if start is not None:
+            self._pooled[key] = start
+        return start if start is not None and start + length <= done else None
+
+    def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
+        """The end of the last reading of a period; the first window's period where none is."""
+        last = self.store.streams.last_pooled(stream.name, period)
+        if last is not None:
+            return last + length
+        first = self.store.streams.first_window(stream.name)
+        return None if first is None else _floor(first, length)
+
+    def _windows(
+        self, stream: Stream, start: datetime, length: timedelta
+    ) -> tuple[WindowReading, ...]:
+        found = self.store.streams.list_windows(stream.hanger, start, start + length)
+        return tuple(each for each in found if each.window.stream == stream.name)
+
+    def _begin_pool(self, stream: Stream, period: Period, start: datetime) -> None:
+        from shm.pipeline.stream_steps import pool_stream
+
+        hanger = self.workspace.bridge.tested(stream.hanger)
+        self._submit(
+            stream.name,
+            partial(
+                pool_stream,
+                self._windows(stream, start, PERIODS[period]),
+                period,
+                start,
+                hanger,
+                self._baseline(stream.hanger),
+                self.store.streams.watch_state(stream.hanger) if period == "hour" else None,
+                self.workspace.settings.false_call_years,
+            ),
+            partial(self._keep_pooled, stream, period, start),
+            partial(self._give_up_pool, stream, period, start),
+        )
+
+    def _baseline(self, hanger: int) -> Posterior | None:
+        found = self.store.watch.baseline(hanger)
+        return found.posterior if found is not None else None
+
+    def _submit(
+        self,
+        name: str,
+        step: Callable[[], Any],
+        keep: Callable[[Any], object],
+        fail: Callable[[BaseException], object],
+    ) -> None:
+        future = self.executor.submit(step)
+        self._running[name] = _Running(future, keep, fail)
+        future.add_done_callback(lambda _: self.wake())
+
+    # ------------------------------------------------------------ finish
+
+    def _finish(self, name: str, running: _Running) -> None:
+        error = running.future.exception()
+        if error is None:
+            running.keep(running.future.result())
+        elif isinstance(error, BrokenExecutor | MemoryError) or getattr(
+            error, "retry_after_s", None
+        ):
+            self._not_before[name] = self.clock() + _AGAIN
+            log.warning("stream %s is tried again in a minute: %s", name, error)
+        else:
+            log.error("stream %s: a step failed", name, exc_info=error)
+            running.fail(error)
+
+    def _keep_window(self, stream: Stream, found: WindowFound) -> None:
+        for event in found.events:
+            self.store.streams.save_event(event)
+        self._offsets[stream.name].append(found.offsets)
+        self._save(found.reading)
+
+    def _save(self, reading: WindowReading) -> None:
+        window = reading.window
+        self.store.streams.save_window(reading)
+        self._done[window.stream] = window.start + WINDOW
+
+    def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
+        """Said in the window's own row: what one window holds must not stop its stream."""
+        seconds = WINDOW.total_seconds()
+        window = Window(stream.name, stream.hanger, start, seconds, "unusable", float("nan"))
+        why = f"it could not be read: {error}"
+        self._save(WindowReading(window, (), "none", why))
+
+    def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
+        self._pooled[stream.name, period] = start + PERIODS[period]
+        if found.reading is None:
+            return
+        for event in found.events:
+            self.store.streams.save_event(event)
+        if found.test is not None:
+            self._hand_on(found.test, found.reading)
+        if found.alert is not None:
+            end = start + PERIODS[period]
+            why = f"alert {found.alert.key}"
+            self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
+        hooks = [hook.name for hook in self.workspace.bridge.hooks]
+        kept = found.kept or None
+        raised = self.store.streams.save_pooled(
+            found.reading, kept, found.alert, hooks, self.clock()
+        )
+        if raised is not None:
+            log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
+
+    def _hand_on(self, test: ModalTest, reading: PooledReading) -> None:
+        """A day as a modal test into the spool, which takes the same bytes once."""
+        path = self.workspace.spool / f"{test.id}{MODES_SUFFIX}"
+        replace_text(path, dump(modes_document([test])))
+        log.info("day of stream %s: %s", reading.stream, path.name)
+
+    def _give_up_pool(
+        self, stream: Stream, period: Period, start: datetime, error: BaseException
+    ) -> None:
+        self._pooled[stream.name, period] = start + PERIODS[period]
+
+
+def _floor(at: datetime, length: timedelta) -> datetime:
+    """The beginning of the stretch of that length, counted from midnight, that holds a moment."""
+    midnight = at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
+    return midnight + (at - midnight) // length * length

@@ -23,7 +23,7 @@ from shm.store.stream_tables import (
     stream_watch,
     stream_windows,
 )
-from shm.values import Alert, ShapePoint
+from shm.values import Alert, Plane, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import Period, PooledReading, StreamEvent, WindowReading
 
@@ -35,6 +35,8 @@ _LASTS: dict[Period, timedelta] = {
     "six hours": timedelta(hours=6),
     "day": timedelta(days=1),
 }
+_LATEST = 36
+"""Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
 _T = TypeVar("_T", WindowReading, PooledReading)
 
@@ -61,11 +63,35 @@ class Streams(Repository):
         return self._values(table, query, WindowReading)
 
     def last_modes(self, stream: str) -> tuple[Mode, ...]:
-        """The modes of the latest window of a stream that has any; empty where none has."""
+        """The modes of the latest windows of a stream that have any, each as it was seen last.
+
+        A mode that one window hides is looked for again in the next.
+        """
         table = stream_windows
         query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
-        found = self._values(table, query.order_by(table.c.start.desc()).limit(1), WindowReading)
-        return found[0].modes if found else ()
+        latest = query.order_by(table.c.start.desc()).limit(_LATEST)
+        found: dict[tuple[Plane, int], Mode] = {}
+        for reading in self._values(table, latest, WindowReading):
+            for mode in reading.modes:
+                found.setdefault((mode.plane, mode.order), mode)
+        return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
+
+    def first_window(self, stream: str) -> datetime | None:
+        """When the first window of a stream began; None where there is none."""
+        query = sa.select(sa.func.min(stream_windows.c.start)).where(
+            stream_windows.c.stream == stream
+        )
+        with self.reading() as connection:
+            return connection.scalar(query)
+
+    def last_pooled(self, stream: str, period: Period) -> datetime | None:
+        """When the latest reading of a period began; None where there is none."""
+        table = pooled_readings
+        query = sa.select(sa.func.max(table.c.start)).where(
+            table.c.stream == stream, table.c.period == period
+        )
+        with self.reading() as connection:
+            return connection.scalar(query)
 
     def save_pooled(
         self,

@@ -131,7 +131,9 @@ class PooledReading:
     """The windows of an hour or a day as one: modes with errors that allow for what repeats.
 
     `windows` is how many were pooled, `left_out` how many were not; `level_m_s2`, `temperature_c`
-    and `wind_m_s` are means over the pooled ones.
+    and `wind_m_s` are means over the pooled ones. The shifts of tension since the stream's
+    beginning, as fractions with their standard deviations, are the watch's: as it is, and under the
+    conditions of the beginning; `learning` says why there is none yet.
     """
 
     stream: str
@@ -144,3 +146,8 @@ class PooledReading:
     level_m_s2: float
     temperature_c: float = NAN
     wind_m_s: float = NAN
+    tension_shift: float = NAN
+    tension_shift_sd: float = NAN
+    compensated_shift: float = NAN
+    compensated_sd: float = NAN
+    learning: str = ""

@@ -1,4 +1,4 @@
-"""A bridge that lives: its frequencies are those of the planted tension, its chunks have no seam."""
+"""A bridge that lives: frequencies are those of the planted tension, chunks have no seam."""
 
 from __future__ import annotations
 

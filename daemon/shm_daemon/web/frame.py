@@ -28,6 +28,7 @@ STATIC = Path(__file__).with_name("static")
 NAVIGATION = (
     ("/", "Bridge"),
     ("/alerts", "Alerts"),
+    ("/streams", "Sensors"),
     ("/upload", "Upload"),
     ("/operation", "Operation"),
 )

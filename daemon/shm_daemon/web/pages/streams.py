@@ -1,0 +1,197 @@
+"""The pages of permanent sensors: what is live, and what one stream has shown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.responses import JSONResponse
+
+from shm.bridge.streams import stream_named
+from shm.errors import NothingThere
+from shm.pipeline import utc_now
+from shm.pipeline.stream_course import stream_course
+from shm.pipeline.stream_state import StreamState, stream_states
+from shm.report import formatting
+from shm.report.figures import stream_course as figure
+from shm.report.paper import Table
+from shm.values.stream import PooledReading, Stream, StreamEvent
+from shm_daemon.heartbeat import told
+from shm_daemon.web import with_plotly
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.faults import answers
+from shm_daemon.web.frame import page
+from shm_daemon.web.hanger_models import FigureDocument
+from shm_daemon.web.plotting import answer, plain
+from shm_daemon.web.site import Site
+
+router = APIRouter(tags=["streams"])
+
+_STYLES = {
+    "live": "steady",
+    "late": "watch",
+    "silent": "alert",
+    "never heard": "first",
+    "sensor at fault": "alert",
+}
+_EVENTS_SHOWN = 40  # technical: what is read at a glance
+_Z_90 = 1.645
+
+Name = Annotated[str, Path(max_length=64)]
+Days = Annotated[float, Query(gt=0, le=800, description="How far the figure reaches back.")]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A stream as the page lists it."""
+
+    name: str
+    hanger: int
+    state: str
+    style: str
+    cells: tuple[str, ...]
+
+
+@router.get("/streams", include_in_schema=False)
+def streams_page(request: Request, site: AtSite, _: Reader) -> Response:
+    """All streams of the bridge."""
+    rows = [_row(each) for each in _states(site)]
+    headings = ("Last sample", "Lag", "Lost in 24 h", "Last window", "Tension since the beginning")
+    return page(request, "streams.html.j2", rows=rows, headings=headings)
+
+
+@router.get("/streams/{name}", include_in_schema=False)
+def stream_page(
+    request: Request, site: AtSite, _: Reader, name: Name, days: Days = 7.0
+) -> Response:
+    """One stream: its state, what it showed, what befell it."""
+    stream = _stream(site, name)
+    state = next(each for each in _states(site) if each.stream.name == name)
+    return page(
+        request,
+        "stream.html.j2",
+        stream=stream,
+        row=_row(state),
+        facts=_facts(state),
+        events=_events(state.events),
+        address=f"/api/streams/{name}/figure?days={days:g}",
+        days=days,
+    )
+
+
+@router.get("/api/streams", responses=answers(400, 401, 403, 503), summary="Permanent sensors")
+def streams(site: AtSite, _: Reader) -> Any:
+    """Each stream: whether it is live, its lag, what it lost, what its last window said."""
+    return JSONResponse(plain({"streams": [_document(each) for each in _states(site)]}))
+
+
+@router.get(
+    "/api/streams/{name}/figure",
+    response_model=FigureDocument,
+    responses=answers(400, 401, 403, 404, 422, 503),
+    summary="What a stream has shown",
+)
+def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:
+    """A plotly document: spectra, tracked frequencies, tension, sensors at fault."""
+    stream, ring = _stream(site, name), site.ring
+    until = ring.latest().get(name, utc_now())
+    course = stream_course(site.store, stream, until - timedelta(days=days), until)
+    if course is None:
+        raise NothingThere(
+            f"stream {name} has shown nothing in the last {days:g} days.",
+            remedy="See `shm stream` for when it was heard last.",
+        )
+    words = {"caption": figure.caption(course), "alt": figure.alt(course)}
+    return answer({**with_plotly.document(figure.specify(course)), **words})
+
+
+def _states(site: Site) -> tuple[StreamState, ...]:
+    return stream_states(site.workspace, site.ring, site.store, utc_now())
+
+
+def _stream(site: Site, name: str) -> Stream:
+    if name not in [each.name for each in site.workspace.bridge.streams]:
+        raise NothingThere(
+            f"there is no stream {name}.", remedy="See /streams for those there are."
+        )
+    return stream_named(site.workspace.bridge.streams, name)
+
+
+def _row(state: StreamState) -> Row:
+    window = state.window.window if state.window else None
+    modes = len(state.window.modes) if state.window else 0
+    cells = (
+        formatting.moment(state.last_sample) if state.last_sample else "none yet",
+        told(state.lag) if state.lag is not None else "",
+        f"{state.lost_share:.1%}" if math.isfinite(state.lost_share) else "",
+        f"{window.kind}, {formatting.counted(modes, 'mode')}" if window else "none yet",
+        _tension(state.hour),
+    )
+    return Row(state.stream.name, state.stream.hanger, state.state, _STYLES[state.state], cells)
+
+
+def _tension(hour: PooledReading | None) -> str:
+    """The change of tension under the conditions of the beginning, rounded to its interval."""
+    if hour is None:
+        return "no reading yet"
+    if hour.learning:
+        return hour.learning
+    if not math.isfinite(hour.compensated_shift):
+        return "not known"
+    return f"{100 * hour.compensated_shift:+.2f} ± {100 * _Z_90 * hour.compensated_sd:.2f} %"
+
+
+def _facts(state: StreamState) -> list[tuple[str, str, str]]:
+    stream, window = state.stream, state.window
+    behind = told(state.behind) if state.behind is not None else "unknown"
+    found = [
+        ("Hanger", str(stream.hanger), f"{len(stream.channels)} channels"),
+        ("Last sample", formatting.moment(state.last_sample) if state.last_sample else "none yet",
+         f"{behind} of it not read yet"),
+        ("Kept raw", f"{state.ring_bytes / 1e6:.0f} MB", ""),
+        ("Tension", _tension(state.hour), "since the beginning, as of the last hour"),
+    ]  # fmt: skip
+    if window is not None:
+        how = {"tracked": "followed from the last window", "none": "no mode"}.get(
+            window.how, "identified from scratch"
+        )
+        found.append(("Last window", f"{window.window.kind}, {len(window.modes)} modes",
+                      window.why or how))  # fmt: skip
+    return found
+
+
+def _events(events: tuple[StreamEvent, ...]) -> Table:
+    newest = sorted(events, key=lambda each: each.start, reverse=True)
+    rows = tuple(
+        (formatting.moment(each.start), each.kind, each.channel, each.detail)
+        for each in newest[:_EVENTS_SHOWN]
+    )
+    return Table(
+        "What was noticed in the last 24 hours, latest first",
+        ("time", "what", "channel", "detail"),
+        rows,
+        note=formatting.some(len(rows), len(newest), "events").strip(),
+    )
+
+
+def _document(state: StreamState) -> dict[str, Any]:
+    window, hour = state.window, state.hour
+    return {
+        "stream": state.stream.name,
+        "hanger": state.stream.hanger,
+        "state": state.state,
+        "last_sample": state.last_sample,
+        "lag_s": state.lag.total_seconds() if state.lag is not None else None,
+        "behind_s": state.behind.total_seconds() if state.behind is not None else None,
+        "lost_share": state.lost_share,
+        "ring_bytes": state.ring_bytes,
+        "window": window and {"start": window.window.start, "kind": window.window.kind,
+                              "modes": len(window.modes), "how": window.how, "why": window.why},
+        "tension_shift": hour.compensated_shift if hour else None,
+        "tension_shift_sd": hour.compensated_sd if hour else None,
+        "learning": hour.learning if hour else None,
+        "events": [vars(each) for each in state.events],
+    }  # fmt: skip

@@ -1,0 +1,79 @@
+"""How each stream is: live or silent, what it has lost, what its last window and hour said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Literal
+
+from shm.store import Ring, Store, Workspace
+from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
+
+State = Literal["live", "late", "silent", "never heard", "sensor at fault"]
+
+_LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
+"""judgement: loggers send each minute; a router begins anew within five minutes."""
+_LATELY = timedelta(days=1)
+_AT_FAULT = ("dead", "drifting", "swapped", "saturated")
+_FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
+
+
+@dataclass(frozen=True, eq=False)
+class StreamState:
+    """`lost_share` is of the samples of the last 24 hours up to the last one, NaN without any.
+
+    `behind` is how much has come and is not read yet; `events` are those of the last 24 hours.
+    """
+
+    stream: Stream
+    state: State
+    last_sample: datetime | None
+    lag: timedelta | None
+    behind: timedelta | None
+    lost_share: float
+    ring_bytes: int
+    window: WindowReading | None
+    hour: PooledReading | None
+    events: tuple[StreamEvent, ...]
+
+
+def stream_states(
+    workspace: Workspace, ring: Ring, store: Store, now: datetime
+) -> tuple[StreamState, ...]:
+    """One for each stream that `bridge.toml` describes, in its order."""
+    latest = ring.latest()
+    return tuple(
+        _state(stream, latest.get(stream.name), ring, store, now)
+        for stream in workspace.bridge.streams
+    )
+
+
+def _state(
+    stream: Stream, last: datetime | None, ring: Ring, store: Store, now: datetime
+) -> StreamState:
+    events = store.streams.list_events(stream.name, now - _LATELY)
+    progress = store.streams.progress(stream.name)
+    window = store.streams.last_window(stream.name)
+    return StreamState(
+        stream=stream,
+        state=_word(last, events, now),
+        last_sample=last,
+        lag=None if last is None else max(timedelta(0), now - last),
+        behind=None if last is None or progress is None else max(timedelta(0), last - progress),
+        lost_share=ring.lost_share(stream.name, _LATELY),
+        ring_bytes=ring.size_bytes(stream.name),
+        window=window,
+        hour=store.streams.last_hour(stream.name),
+        events=events,
+    )
+
+
+def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:
+    if last is None:
+        return "never heard"
+    if now - last > _SILENT:
+        return "silent"
+    if now - last > _LATE:
+        return "late"
+    faults = (each for each in events if each.kind in _AT_FAULT)
+    return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"

@@ -1,0 +1,111 @@
+"""What is computed of streams: functions of plain values, run wherever the executor puts them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+import numpy as np
+import scipy
+
+from shm.identify import IdentifyOptions
+from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
+from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
+from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
+from shm.watch.stream_watch import StreamOptions, watch_reading
+
+_LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
+_LINES_S = 20.0  # technical: stretches that part modes 0.1 Hz apart
+_FLOOR_DB = -200  # of a channel that is exactly 0
+
+
+@dataclass(frozen=True, eq=False)
+class WindowFound:
+    """What a window says, faults of sensors, and what later windows compare their offsets with."""
+
+    reading: WindowReading
+    events: tuple[StreamEvent, ...]
+    offsets: Mapping[str, float]
+
+
+def read_stream_window(
+    pieces: Sequence[Piece],
+    stream: Stream,
+    known: Sequence[Mode],
+    hanger: Hanger,
+    options: IdentifyOptions,
+    earlier: Sequence[Mapping[str, float]],
+) -> WindowFound:
+    """The modes of ten minutes by the last `known` ones; `earlier` are the offsets before."""
+    reading = read_window(pieces, stream, known, hanger, options)
+    return WindowFound(
+        replace(reading, spectrum_db=spectrum_db(pieces)),
+        sensor_faults(pieces, stream, known, earlier),
+        offsets(pieces),
+    )
+
+
+def spectrum_db(pieces: Sequence[Piece]) -> tuple[int, ...]:
+    """The mean power of the channels, the largest of each of 200 stretches up to half the rate."""
+    found = [_power(piece) for piece in pieces if _is_whole(piece)]
+    if not found:
+        return ()
+    power = np.max(found, axis=0)
+    edges = np.linspace(0, len(power), _LINES + 1).astype(int)
+    largest = np.maximum.reduceat(power, edges[:-1])
+    level = 10 * np.log10(np.maximum(largest, 10.0 ** (_FLOOR_DB / 10)))
+    return tuple(np.round(level).astype(int).tolist())
+
+
+def _is_whole(piece: Piece) -> bool:
+    return piece.values.shape[1] >= _LINES_S * piece.sampling_rate_hz
+
+
+def _power(piece: Piece) -> np.ndarray:
+    known = np.nan_to_num(piece.values)
+    size = int(_LINES_S * piece.sampling_rate_hz)
+    _, density = scipy.signal.welch(known, piece.sampling_rate_hz, nperseg=size, noverlap=0)
+    return np.asarray(density.mean(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Pooled:
+    """A reading of a period, what the watch keeps and calls for, and a day as a modal test."""
+
+    reading: PooledReading | None
+    kept: bytes | None = None
+    alert: Alert | None = None
+    events: tuple[StreamEvent, ...] = ()
+    test: ModalTest | None = None
+
+
+def pool_stream(
+    readings: Sequence[WindowReading],
+    period: Period,
+    start: datetime,
+    hanger: Hanger,
+    baseline: Posterior | None,
+    kept: bytes | None,
+    false_call_years: float,
+) -> Pooled:
+    """The windows of a period as one; an hour goes on to the watch, a day becomes a test."""
+    reading = pooled(readings, period, start)
+    if reading is None:
+        return Pooled(None)
+    if period == "day":
+        return Pooled(reading, test=as_modal_test(reading))
+    if period != "hour" or not hanger.is_modelled:
+        return Pooled(reading)
+    own = hanger.thresholds.false_call_years
+    options = StreamOptions(false_call_years=false_call_years if own is None else own)
+    found = watch_reading(baseline, reading, hanger, kept, options)
+    told = replace(
+        reading,
+        tension_shift=found.tension_shift,
+        tension_shift_sd=found.tension_shift_sd,
+        compensated_shift=found.compensated_shift,
+        compensated_sd=found.compensated_sd,
+        learning=found.learning,
+    )
+    return Pooled(told, found.kept, found.alert, found.events)
