@@ -16,6 +16,11 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 """What is at once a folder, a level of an MQTT topic and a part of an address."""
 
 
+def is_stream_name(text: str) -> bool:
+    """Whether a stream or a channel may be called so."""
+    return _NAME.fullmatch(text) is not None
+
+
 def stream_of(values: dict[str, Any], path: Path, hangers: Mapping[int, Hanger]) -> Stream:
     """The stream of a `[[stream]]` table; raises BadInput naming table and key at fault."""
     table = Table(values, f"stream {values.get('name', '?')}", path)
@@ -56,7 +61,7 @@ def _name(table: Table, example: str) -> str:
             str,
             "is no name of at most 64 letters, digits, - and _",
             f'Write name = "{example}".',
-            holds=lambda text: _NAME.fullmatch(text) is not None,
+            holds=is_stream_name,
         )
     )
 

@@ -189,7 +189,7 @@ class Archive:
                 if file.sidecar_as is not None:
                     _link(self.folder / file.sidecar_as, sidecar_path(path))
             except OSError as error:
-                raise _explained(error, self.folder) from error
+                raise disk_error(error, self.folder) from error
             try:
                 yield path
             except Exception as error:
@@ -214,7 +214,7 @@ class Archive:
             with tempfile.TemporaryDirectory(dir=folder) as temporary:
                 yield Path(temporary) / "file"
         except OSError as error:
-            raise _explained(error, self.folder) from error
+            raise disk_error(error, self.folder) from error
 
     def _place(self, temporary: Path, final: Path) -> None:
         rotten = final.exists() and not is_whole(final)
@@ -254,7 +254,7 @@ class Quarantine:
             _copy_whole(source, target, meanwhile)
             self._explain(target, reason)
         except OSError as error:
-            raise _explained(error, self.folder) from error
+            raise disk_error(error, self.folder) from error
         return target
 
     def move(self, source: Path, name: str, reason: Mapping[str, Any], sidecar: Path) -> Path:
@@ -273,7 +273,7 @@ class Quarantine:
             sync(self.folder)
         except OSError as error:
             if error.errno in DISK_FULL:
-                raise _explained(error, self.folder) from error
+                raise disk_error(error, self.folder) from error
             stays = f"It was left at {source}, as it cannot be moved ({error.strerror})."
             self._explain(target, {**reason, "remedy": f"{reason['remedy']} {stays}"})
             return source
@@ -386,7 +386,7 @@ def _link(source: Path, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _explained(error: OSError, folder: Path) -> ShmError:
+def disk_error(error: OSError, folder: Path) -> ShmError:
     if error.errno in DISK_FULL:
         return StoreError(
             f"{folder} cannot grow: the disk is full.",

@@ -1,0 +1,293 @@
+"""The raw ring of permanent sensors: chunks, durable before they are acknowledged.
+
+Beside the database and never in its way. Any process may append and read; only the holder of the
+workspace's lock seals and sweeps.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from shm.bridge.streams import stream_named
+from shm.documents import dump, format_time
+from shm.errors import BadInput, StoreBusy
+from shm.read.atomic import replace_text
+from shm.read.chunk_document import parse_chunk
+from shm.read.ring_segment import ChunkKey, microseconds, time_of
+from shm.store.archive import disk_error, sync
+from shm.store.ring_files import PERIOD, StreamFolder, checksum_of_chunk, log
+from shm.store.ring_notices import StreamState, load_state
+from shm.store.ring_pieces import joined
+from shm.store.ring_sealing import Note, seal_stream
+from shm.store.ring_sweep import Swept, sweep
+from shm.store.workspace import Workspace
+from shm.values.stream import Chunk, Piece, Stream
+
+MOST_WAITING = 20_000
+"""Judgement: chunks of a stream that are not sealed, a day of one every 4 s. Beyond, whoever seals
+has ended, or cannot: senders, which keep what is not acknowledged, are held up."""
+
+_NO_GAP = timedelta(seconds=1)  # technical: stamps jitter; no window is lost for a second
+_TRIES = 5  # technical: a reader meets a sealing once in a while, and not again at once
+_RATE_OFF = 0.01  # judgement: of the described rate; a clock is not off by 1 %
+_UNLINKED = timedelta(hours=1)  # of what a killed process left half written
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A chunk that is on disk; not `is_new` where it was there before."""
+
+    stream: str
+    sequence: int
+    start: datetime
+    end: datetime
+    is_new: bool
+
+
+class Ring:
+    """All streams of a workspace, below `folder`.
+
+    With `streams` only these are taken, as they are described; with `clock` nothing older than
+    `late` and nothing further ahead than `ahead`. What is noticed goes to `note`.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        streams: Sequence[Stream] | None = None,
+        clock: Callable[[], datetime] | None = None,
+        *,
+        late: timedelta = timedelta(hours=96),
+        ahead: timedelta = timedelta(days=1),
+        note: Note = lambda event: log.info("%s: %s: %s", event.stream, event.kind, event.detail),
+    ):
+        self.folder, self._streams, self._clock = folder, streams, clock
+        self._late, self._ahead, self._note = late, ahead, note
+
+    def append(self, content: bytes) -> Kept:
+        """Keeps a chunk: on disk when this returns. One that came before is not kept twice.
+
+        Raises BadInput where it cannot be used, StoreError with `retry_after_s` where the disk is
+        full, StoreBusy where too many wait.
+        """
+        return self.append_all([content])[0]
+
+    def append_all(self, contents: Sequence[bytes]) -> list[Kept]:
+        """Several at once, which is quicker; where one cannot be used, none is kept."""
+        chunks = [self._fitting(parse_chunk(content)) for content in contents]
+        found = []
+        try:
+            for chunk, content in zip(chunks, contents, strict=True):
+                found.append(self._place(chunk, content))
+            for stream in {chunk.stream for chunk in chunks}:
+                sync(self._folder(stream).incoming)
+        except OSError as error:
+            raise disk_error(error, self.folder) from error
+        return found
+
+    def read(self, stream: str, start: datetime, end: datetime) -> tuple[Piece, ...]:
+        """The samples from `start` on and before `end`, sealed and unsealed alike, by time."""
+        folder, since = self._folder(stream), start - 2 * PERIOD
+        for left in reversed(range(_TRIES)):
+            waiting = folder.waiting()  # first: what is sealed meanwhile is in a segment then
+            found: dict[ChunkKey, Chunk] = {}
+            for segment in folder.segments(since):
+                if segment.start >= end:
+                    break
+                found |= folder.chunks(segment.path)
+            try:
+                for each in waiting:
+                    is_within = since <= time_of(each.key.start_us) < end
+                    if is_within and each.key not in found and (chunk := folder.load(each)):
+                        found[each.key] = chunk
+            except FileNotFoundError:
+                if not left:
+                    raise
+                continue
+            break
+        return joined((self._ordered(chunk) for _, chunk in sorted(found.items())), start, end)
+
+    def seal(self, now: datetime) -> list[tuple[str, datetime]]:
+        """Chunks of finished ten minutes become segments; each stream and beginning of ten minutes
+        that has new samples by it, also where some came late.
+        """
+        sealed: list[tuple[str, datetime]] = []
+        try:
+            for folder in self._folders():
+                starts = seal_stream(folder, now, self._note)
+                sealed.extend((folder.folder.name, start) for start in starts)
+        except OSError as error:
+            raise disk_error(error, self.folder) from error
+        return sealed
+
+    def keep(self, stream: str, start: datetime, end: datetime, why: str) -> None:
+        """Keeps the samples of a time for good, for a reason."""
+        kept = self._folder(stream).folder / "kept"
+        kept.mkdir(parents=True, exist_ok=True)
+        told = {"stream": stream, "start": start, "end": end, "why": why}
+        replace_text(
+            kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json", dump(told) + "\n"
+        )
+
+    def sweep(self, now: datetime, ring_days: float = 30, ring_bytes: int = 200 * 10**9) -> Swept:
+        """Takes out what is older than so many days, and the oldest beyond so many bytes, but for
+        what is kept for good.
+        """
+        for folder in self._folders():
+            for left in folder.folder.glob("*/.*.part"):
+                if left.stat().st_mtime < (now - _UNLINKED).timestamp():
+                    left.unlink(missing_ok=True)
+        return sweep(list(self._folders()), now - timedelta(days=ring_days), ring_bytes)
+
+    def latest(self) -> dict[str, datetime]:
+        """When the last sample of each stream ended."""
+        ends = {folder.folder.name: self._recent(folder) for folder in self._folders()}
+        return {name: time_of(max(e for _, e in spans)) for name, spans in ends.items() if spans}
+
+    def watermark(self, stream: str) -> datetime | None:
+        """Up to when all has come, or is not waited for; None before the first sample.
+
+        A gap is waited for until ten minutes more have come behind it. What comes later yet finds
+        its place, and `seal` tells of it.
+        """
+        spans = sorted(self._recent(self._folder(stream)))
+        if not spans:
+            return None
+        latest = max(end for _, end in spans)
+        until = spans[0][1]
+        for start_us, end_us in spans:
+            is_gap = time_of(start_us) - time_of(until) > _NO_GAP
+            if is_gap and time_of(latest) - time_of(start_us) < PERIOD:
+                return time_of(until)
+            until = max(until, end_us)
+        return time_of(until)
+
+    def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
+        """The beginnings of the ten minutes from `since` on that have sealed samples."""
+        return tuple(dict.fromkeys(each.start for each in self._folder(stream).segments(since)))
+
+    def state(self, stream: str) -> StreamState:
+        """What is known of a stream from what is sealed."""
+        return load_state(self._folder(stream).folder / "state.json")
+
+    def size_bytes(self, stream: str) -> int:
+        """Of all segments of a stream and of what waits."""
+        folder = self._folder(stream)
+        paths = [each.path for each in folder.segments()]
+        paths += [each.path for each in folder.waiting()]
+        return sum(path.stat().st_size for path in paths if path.exists())
+
+    def _fitting(self, chunk: Chunk) -> Chunk:
+        if self._streams is not None:
+            _refuse_other(chunk, stream_named(tuple(self._streams), chunk.stream))
+        if self._clock is not None:
+            _refuse_far(chunk, self._clock(), self._late, self._ahead)
+        return chunk
+
+    def _place(self, chunk: Chunk, content: bytes) -> Kept:
+        folder = self._folder(chunk.stream)
+        folder.make()
+        end_us, checksum = microseconds(chunk.end), checksum_of_chunk(content)
+        key = ChunkKey(microseconds(chunk.start), chunk.sequence, checksum)
+        path = folder.chunk_path(key, end_us)
+        # In this order: what is sealed between both looks is found by the second.
+        is_new = not path.exists() and key not in folder.spans(folder.segment_path(chunk))
+        if is_new:
+            self._refuse_crowd(folder)
+            self._write(path, content)
+        return Kept(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new)
+
+    def _write(self, path: Path, content: bytes) -> None:
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.{id(content)}.part")
+        try:
+            with temporary.open("wb") as file:
+                file.write(content)
+                file.flush()
+                if self._clock is not None:
+                    at = self._clock().timestamp()
+                    os.utime(file.fileno(), (at, at))
+                os.fsync(file.fileno())
+            temporary.rename(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def _refuse_crowd(self, folder: StreamFolder) -> None:
+        if sum(1 for _ in folder.incoming.iterdir()) >= MOST_WAITING:
+            raise StoreBusy(
+                f"{MOST_WAITING} chunks of stream {folder.folder.name} wait to be sealed.",
+                remedy="Look whether the daemon runs: `shm doctor`. Then send them again.",
+                retry_after_s=30.0,
+            )
+
+    def _recent(self, folder: StreamFolder) -> set[tuple[int, int]]:
+        """Start and end of the chunks of the last segments and of those that wait."""
+        spans = {(each.key.start_us, each.end_us) for each in folder.waiting()}
+        segments = list(folder.last_segments())
+        for segment in segments:
+            if segment.start >= segments[-1].start - 2 * PERIOD:
+                ends = folder.spans(segment.path)
+                spans |= {(key.start_us, end_us) for key, end_us in ends.items()}
+        return spans
+
+    def _ordered(self, chunk: Chunk) -> Chunk:
+        """With the channels in the order in which they are described."""
+        described = next((s for s in self._streams or () if s.name == chunk.stream), None)
+        names = tuple(each.name for each in described.channels) if described else chunk.channels
+        if names == chunk.channels or set(names) != set(chunk.channels):
+            return chunk
+        places = [chunk.channels.index(name) for name in names]
+        return replace(chunk, channels=names, values=chunk.values[places])
+
+    def _folder(self, stream: str) -> StreamFolder:
+        return StreamFolder(self.folder / stream)
+
+    def _folders(self) -> Iterator[StreamFolder]:
+        for path in sorted(self.folder.glob("*")):
+            if path.is_dir():
+                yield StreamFolder(path)
+
+
+def ring_of(
+    workspace: Workspace, clock: Callable[[], datetime] | None = None, note: Note | None = None
+) -> Ring:
+    """The ring of a workspace, by its description and settings."""
+    settings = workspace.settings
+    ahead = timedelta(seconds=settings.future_tolerance_seconds)
+    late = timedelta(hours=settings.late_hours)
+    noting = {} if note is None else {"note": note}
+    folder, streams = workspace.folder / "ring", workspace.bridge.streams
+    return Ring(folder, streams, clock, late=late, ahead=ahead, **noting)
+
+
+def _refuse_other(chunk: Chunk, stream: Stream) -> None:
+    """Raises BadInput for a chunk that is not sampled as its stream is described."""
+    missing = {channel.name for channel in stream.channels} ^ set(chunk.channels)
+    rate = chunk.sampling_rate_hz
+    if missing:
+        raise BadInput(
+            f"chunk {chunk.sequence} of stream {stream.name} has not the channels of bridge.toml: "
+            f"{', '.join(sorted(missing))}.",
+            remedy="Send null for a sensor that is away, or correct [[stream.channel]].",
+        )
+    if abs(rate - stream.sampling_rate_hz) > _RATE_OFF * stream.sampling_rate_hz:
+        raise BadInput(
+            f"chunk {chunk.sequence} of stream {stream.name} has {rate:g} Hz where bridge.toml "
+            f"says {stream.sampling_rate_hz:g}.",
+            remedy="Correct sampling_rate_hz there, or in the logger.",
+        )
+
+
+def _refuse_far(chunk: Chunk, now: datetime, late: timedelta, ahead: timedelta) -> None:
+    """Raises BadInput for samples that nobody waits for any more, and for those to come."""
+    when = f"chunk {chunk.sequence} of stream {chunk.stream} is of {format_time(chunk.start)}"
+    if chunk.end < now - late:
+        raise BadInput(
+            f"{when}, longer ago than the {late.total_seconds() / 3600:g} hours of late_hours.",
+            remedy="Set the logger's clock, or raise the setting late_hours.",
+        )
+    if chunk.start > now + ahead:
+        raise BadInput(f"{when}, which is to come.", remedy="Set the logger's clock.")

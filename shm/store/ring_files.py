@@ -1,0 +1,161 @@
+"""The folder of one stream in the ring: its files, their names, and what is set aside.
+
+incoming/START-END-SEQUENCE-CHECKSUM.chunk     chunks as they came, until they are sealed
+20260501/20260501T1210Z-LAYOUT.h5              ten minutes of them, by when they began
+kept/START-END.json                            what is kept for good, and why
+aside/                                         what is damaged, with its reason
+state.json                                     what the next chunks are compared with
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from functools import lru_cache
+from pathlib import Path
+
+from shm.documents import dump
+from shm.errors import BadInput
+from shm.read.atomic import replace_text
+from shm.read.chunk_document import parse_chunk
+from shm.read.ring_segment import ChunkKey, microseconds, read_segment, read_spans, time_of
+from shm.store.archive import sync
+from shm.values.stream import Chunk
+
+log = logging.getLogger(__name__)
+
+PERIOD = timedelta(minutes=10)
+_PERIOD_US = PERIOD // timedelta(microseconds=1)
+_NAME = "%Y%m%dT%H%MZ"
+_SPANS_HELD = 512  # technical: the last segments of 100 streams, some 20 kB each
+
+
+@dataclass(frozen=True, order=True)
+class WaitingChunk:
+    """A chunk that is on disk and not in a segment yet."""
+
+    key: ChunkKey
+    end_us: int
+    path: Path
+
+
+@dataclass(frozen=True, order=True)
+class Segment:
+    """A file of the chunks that began within ten minutes from `start` on."""
+
+    start: datetime
+    path: Path
+
+
+def period_of(time_us: int) -> datetime:
+    """When the ten minutes began that a time is in."""
+    return time_of(time_us // _PERIOD_US * _PERIOD_US)
+
+
+def checksum_of_chunk(content: bytes) -> str:
+    """64 bits of a SHA-256: two chunks of a stream have the same once in 2^64 times."""
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+class StreamFolder:
+    """The files of one stream."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.incoming = folder, folder / "incoming"
+
+    def make(self) -> None:
+        """Makes the folder, to outlast a power cut."""
+        if not self.incoming.is_dir():
+            self.incoming.mkdir(parents=True, exist_ok=True)
+            for folder in (self.folder, self.folder.parent, self.folder.parent.parent):
+                sync(folder)
+
+    def chunk_path(self, key: ChunkKey, end_us: int) -> Path:
+        """Where a chunk waits."""
+        name = f"{key.start_us:017d}-{end_us:017d}-{key.sequence}-{key.checksum}.chunk"
+        return self.incoming / name
+
+    def segment_path(self, chunk: Chunk) -> Path:
+        """The segment for a chunk; one that is sampled otherwise has another."""
+        start = period_of(microseconds(chunk.start))
+        layout = hashlib.sha256(repr((chunk.channels, chunk.sampling_rate_hz)).encode())
+        name = f"{start:{_NAME}}-{layout.hexdigest()[:8]}.h5"
+        return self.folder / f"{start:%Y%m%d}" / name
+
+    def waiting(self) -> list[WaitingChunk]:
+        """The chunks that are not sealed, by time."""
+        found = []
+        for path in self.incoming.glob("[0-9]*.chunk"):
+            start_us, end_us, sequence, checksum = path.stem.split("-")
+            key = ChunkKey(int(start_us), int(sequence), checksum)
+            found.append(WaitingChunk(key, int(end_us), path))
+        return sorted(found)
+
+    def segments(self, since: datetime | None = None) -> Iterator[Segment]:
+        """The segments that began from a time on, by time."""
+        least = "" if since is None else f"{since.astimezone(UTC):{_NAME}}"
+        for day in sorted(self.folder.glob("[0-9]*")):
+            if day.name >= least[:8]:
+                for path in sorted(day.glob("[0-9]*.h5")):
+                    if path.name >= least:
+                        yield Segment(datetime.strptime(path.stem[:14], f"{_NAME[:-1]}%z"), path)
+
+    def last_segments(self) -> Iterator[Segment]:
+        """Those of the last two days that have any."""
+        days = sorted(self.folder.glob("[0-9]*"))[-2:]
+        return self.segments(datetime.strptime(f"{days[0].name}Z", "%Y%m%d%z") if days else None)
+
+    def load(self, waiting: WaitingChunk) -> Chunk | None:
+        """A chunk that is not sealed; None where it is damaged, which is set aside."""
+        content = waiting.path.read_bytes()
+        try:
+            if checksum_of_chunk(content) != waiting.key.checksum:
+                raise BadInput("the chunk is torn: its bytes are not those that came.")
+            return parse_chunk(content)
+        except BadInput as error:
+            self.set_aside(waiting.path, error)
+            return None
+
+    def chunks(self, path: Path) -> dict[ChunkKey, Chunk]:
+        """The chunks of a segment; none where it is damaged, which is set aside, or not there."""
+        try:
+            return read_segment(path)
+        except BadInput as error:
+            self._refuse(path, error)
+            return {}
+
+    def spans(self, path: Path) -> dict[ChunkKey, int]:
+        """The same, but when each ended alone."""
+        try:
+            return _spans(path, path.stat().st_mtime_ns)
+        except FileNotFoundError:
+            return {}
+        except BadInput as error:
+            self._refuse(path, error)
+            return {}
+
+    def _refuse(self, path: Path, error: BadInput) -> None:
+        """Sets a segment aside, unless it is the machine that cannot read it."""
+        if isinstance(error.__cause__, MemoryError):
+            raise error
+        try:
+            path.read_bytes()
+        except FileNotFoundError:
+            return
+        self.set_aside(path, error)
+
+    def set_aside(self, path: Path, error: BadInput) -> None:
+        """Lays a damaged file where nobody reads it, with the reason: the others go on."""
+        aside = self.folder / "aside"
+        aside.mkdir(exist_ok=True)
+        log.error("%s is set aside: %s", path, error.message)
+        replace_text(aside / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
+        path.replace(aside / path.name)
+
+
+@lru_cache(_SPANS_HELD)
+def _spans(path: Path, _modified_ns: int) -> dict[ChunkKey, int]:
+    return read_spans(path)

@@ -1,0 +1,138 @@
+"""What is noticed of a stream as its chunks are sealed: gaps, overlaps, clocks, what came late."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from shm.documents import Misfit, dump, value_of
+from shm.read.atomic import replace_text
+from shm.store.ring_files import PERIOD
+from shm.store.ring_pieces import slack_s
+from shm.values.stream import StreamEvent, StreamEventKind
+
+log = logging.getLogger(__name__)
+
+GRACE = timedelta(seconds=30)  # judgement: how long what is sent at once may be on its way
+_DRIFT_OVER_S = 6 * 3600.0  # derived: a jitter of 50 ms at both ends is then 5 ppm
+_DRIFT_PPM = 100.0  # as the setting frequency_allowance: every frequency is wrong by as much
+
+
+@dataclass(frozen=True)
+class PassedChunk:
+    """Of a chunk what the next is compared with."""
+
+    sequence: int
+    start: datetime
+    end: datetime
+    sampling_rate_hz: float
+    arrived: datetime
+
+
+@dataclass(frozen=True)
+class StreamState:
+    """What is known of a stream: its last chunk, since when its samples have been counted without
+    a break and how long they say that is, and how many seconds came of each ten minutes.
+    """
+
+    last: PassedChunk | None = None
+    counted_since: datetime | None = None
+    counted_s: float = 0.0
+    received_s: dict[str, float] = field(default_factory=dict)
+
+
+def load_state(path: Path) -> StreamState:
+    """The state as it was kept; an empty one where there is none, or a damaged one."""
+    try:
+        return value_of(StreamState, json.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        return StreamState()
+    except (Misfit, ValueError) as error:
+        log.warning("%s begins anew: %s", path, error)
+        return StreamState()
+
+
+def save_state(path: Path, state: StreamState) -> None:
+    """Keeps the state; what it is worth after a power cut, the next chunks show."""
+    replace_text(path, dump(asdict(state)) + "\n")
+
+
+def notice(
+    stream: str, state: StreamState, chunks: Iterable[PassedChunk]
+) -> tuple[StreamState, list[StreamEvent]]:
+    """What chunks, by time, say beside those before; the state after them."""
+    events: list[StreamEvent] = []
+    late: list[PassedChunk] = []
+    for chunk in chunks:
+        if chunk.arrived > chunk.end + PERIOD + GRACE:
+            late.append(chunk)
+        if state.last is None or chunk.start >= state.last.start:
+            events.extend(_between(stream, state.last, chunk))
+            state, drift = _counted(stream, state, chunk)
+            events.extend(drift)
+        elif chunk.sequence == state.last.sequence + 1:
+            events.append(_stepped(stream, state.last, chunk))
+    if late:
+        delay_h = max((each.arrived - each.end).total_seconds() for each in late) / 3600
+        said = f"{len(late)} chunks came up to {delay_h:.1f} hours late and are in their place"
+        last = max(each.end for each in late)
+        events.append(StreamEvent(stream, "late", late[0].start, last, said))
+    return state, events
+
+
+def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Iterator[StreamEvent]:
+    if before is None:
+        return
+    off_s = (chunk.start - before.end).total_seconds()
+    is_next = chunk.sequence == before.sequence + 1
+    if abs(off_s) <= slack_s(is_next, chunk.sampling_rate_hz):
+        return
+    samples = round(abs(off_s) * chunk.sampling_rate_hz)
+    if is_next:
+        yield _stepped(stream, before, chunk)
+    elif off_s > 0:
+        said = f"{samples} samples are missing before chunk {chunk.sequence}"
+        yield _event(stream, "gap", before.end, chunk.start, said)
+    else:
+        said = f"{samples} samples of chunk {chunk.sequence} are there already and do not count"
+        yield _event(stream, "overlap", chunk.start, before.end, said)
+
+
+def _stepped(stream: str, before: PassedChunk, chunk: PassedChunk) -> StreamEvent:
+    off_s = (chunk.start - before.end).total_seconds()
+    said = f"the clock jumped by {off_s:+.3f} s before chunk {chunk.sequence}, which is the next"
+    return _event(stream, "clock step", before.end, chunk.start, said)
+
+
+def _event(
+    stream: str, kind: StreamEventKind, start: datetime, end: datetime, said: str
+) -> StreamEvent:
+    return StreamEvent(stream, kind, min(start, end), max(start, end), said)
+
+
+def _counted(
+    stream: str, state: StreamState, chunk: PassedChunk
+) -> tuple[StreamState, list[StreamEvent]]:
+    """The stamps beside the count of the samples, as long as chunks follow each other."""
+    before, length_s = state.last, (chunk.end - chunk.start).total_seconds()
+    follows = before is not None and chunk.sequence == before.sequence + 1
+    if before is not None and follows:
+        off_s = abs((chunk.start - before.end).total_seconds())
+        follows = off_s <= slack_s(True, chunk.sampling_rate_hz)
+    since = state.counted_since
+    if not follows or since is None:
+        return replace(state, last=chunk, counted_since=chunk.start, counted_s=length_s), []
+    elapsed_s = (chunk.start - since).total_seconds()
+    if elapsed_s < _DRIFT_OVER_S:
+        return replace(state, last=chunk, counted_s=state.counted_s + length_s), []
+    ppm = (state.counted_s - elapsed_s) / elapsed_s * 1e6
+    begun = replace(state, last=chunk, counted_since=chunk.start, counted_s=length_s)
+    if abs(ppm) <= _DRIFT_PPM:
+        return begun, []
+    what = "more" if ppm > 0 else "fewer"
+    said = f"{abs(ppm):.0f} ppm {what} samples came than the stamps say: frequencies are as wrong"
+    return begun, [StreamEvent(stream, "clock drift", since, chunk.start, said)]
